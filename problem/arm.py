@@ -1,0 +1,101 @@
+"""The arm: a chain of joints between links, and the links' inertial parameters.
+
+Each joint moves along or about its own z axis, between two fixed transforms: the pose of link i in link i-1
+is `before @ motion(q) @ after`. Standard D-H (motion first, then a and alpha), modified D-H (a and alpha
+first) and URDF (an origin and any axis) are three ways to write this.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from problem.transforms import Array, rotation_z, translation
+
+PARAMETER_NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")  # eq. 31
+PARAMETER_UNITS = ("kg", *("kg.m",) * 3, *("kg.m2",) * 6)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a joint may do: rad or m, per second, per second squared, N m or N; infinite where unknown."""
+
+    position: tuple[float, float] = (-np.inf, np.inf)
+    velocity: float = np.inf
+    acceleration: float = np.inf
+    torque: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One degree of freedom: a motion about (revolute) or along (prismatic) z between two fixed transforms."""
+
+    name: str
+    kind: Literal["revolute", "prismatic"]
+    before: Array
+    after: Array
+    limits: Limits = Limits()
+
+    def pose(self, position: float) -> Array:
+        """Pose (4, 4) of this joint's link in the link before it, at `position` (rad or m)."""
+        turn = self.kind == "revolute"
+        motion = rotation_z(position) if turn else translation(0, 0, position)
+        return self.before @ motion @ self.after
+
+
+@dataclass(frozen=True)
+class Link:
+    """Inertial parameters about the origin of the link's frame: kg, kg m, kg m2."""
+
+    mass: float
+    first_moment: tuple[float, float, float]
+    inertia: tuple[float, float, float, float, float, float]  # Ixx Iyy Izz Ixy Ixz Iyz
+
+    @property
+    def parameters(self) -> Array:
+        """The ten parameters in the order of eq. 31."""
+        return np.array([self.mass, *self.first_moment, *self.inertia])
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A serial arm; `links` is None where its inertial parameters are unknown.
+
+    gravity: (3,), m/s2, in the base frame. rotor_inertia: one a joint, kg m2 (kg) on the joint side.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    links: tuple[Link, ...] | None = None
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    rotor_inertia: tuple[float, ...] = ()
+
+    def __len__(self) -> int:
+        """Number of joints."""
+        return len(self.joints)
+
+    @property
+    def parameters(self) -> Array:
+        """All links' parameters, (10 * joints,); ValueError for an arm without links."""
+        if self.links is None:
+            raise ValueError(f"the arm {self.name!r} has no `links`: its inertial parameters are unknown")
+        return np.concatenate([link.parameters for link in self.links])
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names like `mcx2`: the parameter of eq. 31 and the number of the link, from 1."""
+        return tuple(f"{name}{link + 1}" for link in range(len(self)) for name in PARAMETER_NAMES)
+
+    def first(self, joints: int) -> "Arm":
+        """The arm cut behind its first `joints` joints; what came behind is gone, not locked."""
+        links = self.links[:joints] if self.links is not None else None
+        return Arm(self.name, self.joints[:joints], links, self.gravity, self.rotor_inertia[:joints])
+
+
+def link_poses(arm: Arm, positions: Array) -> list[Array]:
+    """Pose (4, 4) of each link in the base frame at joint positions (joints,), rad or m."""
+    poses, pose = [], np.eye(4)
+    for joint, position in zip(arm.joints, positions, strict=True):
+        pose = pose @ joint.pose(float(position))
+        poses.append(pose)
+    return poses

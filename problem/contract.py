@@ -1,0 +1,40 @@
+"""What every problem offers: a box, and what is said of a population of points in it."""
+
+from typing import NamedTuple, Protocol
+
+from problem.transforms import Array
+
+
+class Evaluation(NamedTuple):
+    """Results of a population, (points,) each.
+
+    fitness: what is minimised, penalties included. value: what is reported, without them (for an excitation
+    the condition number of the trajectory itself). violation: 0 where every limit is kept.
+    """
+
+    fitness: Array
+    value: Array
+    violation: Array
+
+
+class Problem(Protocol):
+    """A black box to minimise over lower <= x <= upper, (dimension,) each."""
+
+    @property
+    def name(self) -> str:
+        """Short name for tables."""
+        ...
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, (dimension,)."""
+        ...
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, (dimension,)."""
+        ...
+
+    def evaluate(self, points: Array) -> Evaluation:
+        """Results of points (points, dimension); each is the same to the bit in any batch."""
+        ...

@@ -1,0 +1,79 @@
+"""The black-box problem: a point in a box, the trajectory it stands for, and how good that is."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from problem.arm import Arm
+from problem.base_parameters import BaseParameters
+from problem.contract import Evaluation
+from problem.fitness import Criterion, condition_number, singular_values
+from problem.limits import Constraints
+from problem.motion import Motion
+from problem.trajectory import Trajectory, instants
+from problem.transforms import Array
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """What a broken limit costs: fitness + step + weight * violation, with `step` paid once."""
+
+    step: float
+    weight: float
+
+    def cost(self, violation: Array) -> Array:
+        """Cost (points,) of violations (points,)."""
+        return np.where(violation > 0, self.step + self.weight * violation, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationProblem:
+    """Find the trajectory from which the base parameters of an arm are seen best."""
+
+    name: str
+    arm: Arm
+    base: BaseParameters
+    trajectory: Trajectory
+    duration: float
+    samples: int
+    constraints: Constraints
+    criterion: Criterion
+    penalty: Penalty
+    unit_columns: bool = False
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, (dimension,)."""
+        return self.trajectory.lower
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, (dimension,)."""
+        return self.trajectory.upper
+
+    @cached_property
+    def times(self) -> Array:
+        """Instants (samples,) at which a trajectory is judged, s."""
+        return instants(self.duration, self.samples)
+
+    def evaluate(self, points: Array) -> Evaluation:
+        """Fitness, condition number and violation of points (points, dimension).
+
+        Each point's result is the same to the bit in any batch; a point that is not finite costs infinitely.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._evaluate(points)
+
+    def _evaluate(self, points: Array) -> Evaluation:
+        excitation = self.trajectory.motions(np.ascontiguousarray(points, dtype=np.float64), self.times)
+        violation = self.constraints.violation(excitation)
+        reached = excitation.overreach == 0
+        merit, value = np.zeros(len(points)), np.full(len(points), np.inf)
+        merit[reached], value[reached] = self._judge(excitation.motion.select(reached))
+        return Evaluation(merit + self.penalty.cost(violation), value, violation)
+
+    def _judge(self, motion: Motion) -> tuple[Array, Array]:
+        """Criterion and condition number of motions (points, samples, joints), (points,) each."""
+        values = singular_values(self.arm, motion, self.base.columns, self.unit_columns)
+        return self.criterion.value(values), condition_number(values)

@@ -1,0 +1,280 @@
+/* Observation matrix, Gram matrix, torques and Fourier series for whole populations of trajectories.
+ *
+ * Eight samples at a time in one vector; the order of every sum is fixed and no product is fused with a sum
+ * (-ffp-contract=off), so that the results are the same to the bit on every processor and for every batch. */
+
+#include <stdint.h>
+#include <string.h>
+
+#define LANES 8
+#define MAX_JOINTS 16
+typedef double V __attribute__((vector_size(8 * LANES)));
+typedef int64_t I __attribute__((vector_size(8 * LANES)));
+#define INLINE static inline __attribute__((always_inline))
+
+#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__clang__)
+#define FOR_EACH_PROCESSOR __attribute__((target_clones("avx512f", "avx2", "default")))
+#else
+#define FOR_EACH_PROCESSOR
+#endif
+
+/* A joint as two fixed transforms about a motion along or about z; see problem/arm.py. */
+typedef struct {
+    int prismatic, shifted_before, shifted_after;
+    double before_rotation[9], before_shift[3];
+    double after_rotation[9], after_shift[3]; /* the shift in coordinates of the link's own frame */
+    double axis[3];                           /* z of the joint in the link's own frame */
+} JointData;
+
+typedef struct { V x, y, z; } Vec;
+typedef struct { V m[9]; } Mat;
+
+INLINE Vec add(Vec a, Vec b) { return (Vec){a.x + b.x, a.y + b.y, a.z + b.z}; }
+INLINE V dot(Vec a, Vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+INLINE Vec scaled(const double *a, V s) { return (Vec){a[0] * s, a[1] * s, a[2] * s}; }
+INLINE Vec cross(Vec a, Vec b) {
+    return (Vec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+INLINE Vec constant(const double *a) {
+    V zero = {0};
+    return (Vec){zero + a[0], zero + a[1], zero + a[2]};
+}
+/* transpose(R) v: from the parent's frame into the link's */
+INLINE Vec into(const Mat *r, Vec v) {
+    const V *m = r->m;
+    return (Vec){m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z,
+                 m[2] * v.x + m[5] * v.y + m[8] * v.z};
+}
+
+/* Sine and cosine: Cody and Waite's reduction by pi/2 in three parts, then the minimax polynomials of
+ * fdlibm's k_sin.c and k_cos.c (Sun Microsystems, 1993); within 2 ulp for |x| < 1e4. */
+INLINE void sine_cosine(V x, V *sine, V *cosine) {
+    const double magic = 6755399441055744.0; /* 1.5 * 2^52: adding it rounds to the nearest integer */
+    V shifted = x * 0.63661977236758134308 + magic;
+    V turns = shifted - magic;
+    I quadrant = (I)shifted;
+    V r = ((x - turns * 1.57079632673412561417e+00) - turns * 6.07710050630396597660e-11) -
+          turns * 2.02226624879595063154e-21;
+    V z = r * r;
+    V s = r + r * z * (-1.66666666666666324348e-01 +
+                       z * (8.33333333332248946124e-03 +
+                            z * (-1.98412698298579493134e-04 +
+                                 z * (2.75573137070700676789e-06 +
+                                      z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)))));
+    V c = 1.0 - (0.5 * z - z * z * (4.16666666666666019037e-02 +
+                                    z * (-1.38888888888741095749e-03 +
+                                         z * (2.48015872894767294178e-05 +
+                                              z * (-2.75573143513906633035e-07 +
+                                                   z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))))));
+    I odd = (quadrant & 1) != 0;
+    I sin_sign = (quadrant & 2) << 62, cos_sign = ((quadrant + 1) & 2) << 62;
+    *sine = (V)((((I)c & odd) | ((I)s & ~odd)) ^ sin_sign);
+    *cosine = (V)((((I)s & odd) | ((I)c & ~odd)) ^ cos_sign);
+}
+
+/* R = before * Rz * after, entry by entry, with the zeros and ones of the fixed rotations left in place. */
+INLINE void rotation(const JointData *j, V c, V s, Mat *out) {
+    for (int row = 0; row < 3; row++) {
+        const double *b = j->before_rotation + 3 * row;
+        V bx = b[0] * c + b[1] * s, by = b[1] * c - b[0] * s;
+        for (int col = 0; col < 3; col++) {
+            const double *a = j->after_rotation + col;
+            out->m[3 * row + col] = bx * a[0] + by * a[3] + b[2] * a[6];
+        }
+    }
+}
+
+/* Motion of a joint's axis as seen in a link's frame: turning part, and speed of the frame's origin. */
+typedef struct { Vec angular, linear; } Screw;
+
+/* Ten entries of the row of one joint for one link, eq. 29-31 and 39:
+ * the wrench of the link about its own origin, projected on the joint's motion. */
+INLINE void row_of_link(Vec a, Vec al, Vec w, const V *wxx, Screw s, V *out) {
+    Vec e = cross(s.angular, w);
+    Vec g = cross(a, s.angular);
+    V xx = wxx[0], yy = wxx[1], zz = wxx[2], xy = wxx[3], xz = wxx[4], yz = wxx[5];
+    out[0] = dot(s.linear, a);
+    out[1] = (xy + al.z) * s.linear.y + (xz - al.y) * s.linear.z - (yy + zz) * s.linear.x + g.x;
+    out[2] = (xy - al.z) * s.linear.x + (yz + al.x) * s.linear.z - (xx + zz) * s.linear.y + g.y;
+    out[3] = (xz + al.y) * s.linear.x + (yz - al.x) * s.linear.y - (xx + yy) * s.linear.z + g.z;
+    out[4] = s.angular.x * al.x + e.x * w.x;
+    out[5] = s.angular.y * al.y + e.y * w.y;
+    out[6] = s.angular.z * al.z + e.z * w.z;
+    out[7] = s.angular.x * al.y + s.angular.y * al.x + e.x * w.y + e.y * w.x;
+    out[8] = s.angular.x * al.z + s.angular.z * al.x + e.x * w.z + e.z * w.x;
+    out[9] = s.angular.y * al.z + s.angular.z * al.y + e.y * w.z + e.z * w.y;
+}
+
+/* rows[(i * joints + j) * 10 + k]: joint i, link j >= i, parameter k, for eight samples (eq. 9-39). */
+INLINE void rows_of_samples(int joints, const JointData *data, const double *gravity, const V *q, const V *qd,
+                            const V *qdd, V *rows) {
+    Screw screws[MAX_JOINTS];
+    const double still[3] = {0, 0, 0};
+    const double upward[3] = {-gravity[0], -gravity[1], -gravity[2]};
+    Vec w = constant(still), al = w, a = constant(upward);
+    for (int j = 0; j < joints; j++) {
+        const JointData *d = data + j;
+        V zero = {0}, c = zero + 1.0, s = zero;
+        if (!d->prismatic) sine_cosine(q[j], &s, &c);
+        Mat r;
+        rotation(d, c, s, &r);
+        Vec shift = constant(d->before_shift);
+        if (d->prismatic) {
+            const double along[3] = {d->before_rotation[2], d->before_rotation[5], d->before_rotation[8]};
+            shift = add(shift, scaled(along, q[j]));
+        }
+        if (d->prismatic || d->shifted_before)
+            a = add(a, add(cross(al, shift), cross(w, cross(w, shift))));
+        Vec motion = scaled(d->axis, qd[j]), motion_rate = scaled(d->axis, qdd[j]);
+        w = into(&r, w), al = into(&r, al), a = into(&r, a);
+        Vec carried = cross(w, motion);
+        if (d->prismatic) {
+            a = add(a, add(motion_rate, add(carried, carried)));
+        } else {
+            al = add(al, add(motion_rate, carried));
+            w = add(w, motion);
+        }
+        Vec arm = constant(d->after_shift);
+        if (d->shifted_after) a = add(a, add(cross(al, arm), cross(w, cross(w, arm))));
+        for (int i = 0; i < j; i++) {
+            Vec linear = screws[i].linear;
+            if (d->prismatic || d->shifted_before) linear = add(linear, cross(screws[i].angular, shift));
+            screws[i].angular = into(&r, screws[i].angular);
+            screws[i].linear = into(&r, linear);
+            if (d->shifted_after) screws[i].linear = add(screws[i].linear, cross(screws[i].angular, arm));
+        }
+        screws[j].angular = constant(d->prismatic ? still : d->axis);
+        screws[j].linear = d->prismatic ? constant(d->axis) : cross(screws[j].angular, arm);
+        V products[6] = {w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z, w.y * w.z};
+        for (int i = 0; i <= j; i++)
+            row_of_link(a, al, w, products, screws[i], rows + 10 * (i * joints + j));
+    }
+}
+
+/* Eight samples of one trajectory, (samples, joints) in memory, as one vector a joint; missing ones are 0. */
+INLINE void load(int joints, int count, const double *from, V *to) {
+    for (int j = 0; j < joints; j++) {
+        double lanes[LANES] = {0};
+        for (int l = 0; l < count; l++) lanes[l] = from[l * joints + j];
+        memcpy(to + j, lanes, sizeof lanes);
+    }
+}
+
+INLINE int at_most_lanes(int64_t left) { return left < LANES ? (int)left : LANES; }
+
+/* Full observation matrix of each trajectory: (trajectories, samples, joints, 10 joints). */
+FOR_EACH_PROCESSOR
+void observation_matrices(int joints, const JointData *data, const double *gravity, int64_t samples,
+                          const double *q, const double *qd, const double *qdd, double *out) {
+    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
+    int width = 10 * joints;
+    for (int64_t s = 0; s < samples; s += LANES) {
+        int count = at_most_lanes(samples - s);
+        load(joints, count, q + s * joints, vq);
+        load(joints, count, qd + s * joints, vqd);
+        load(joints, count, qdd + s * joints, vqdd);
+        rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
+        for (int l = 0; l < count; l++)
+            for (int i = 0; i < joints; i++) {
+                double *row = out + ((s + l) * joints + i) * width;
+                for (int k = 10 * i; k < width; k++) row[k] = rows[i * width + k][l];
+            }
+    }
+}
+
+/* Gram matrix of chosen columns of each trajectory's observation matrix, (trajectories, chosen, chosen).
+ * columns: ascending; first[i]: the first chosen column that can be non-zero in the row of joint i. */
+FOR_EACH_PROCESSOR
+void gram_matrices(int joints, const JointData *data, const double *gravity, int64_t trajectories, int64_t samples,
+                   const double *q, const double *qd, const double *qdd, int chosen, const int *columns,
+                   const int *first, double *scratch, double *out) {
+    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
+    V row[MAX_JOINTS * 10];
+    V *sums = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
+    int width = 10 * joints;
+    for (int64_t p = 0; p < trajectories; p++) {
+        memset(sums, 0, sizeof(V) * chosen * chosen);
+        for (int64_t s = 0; s < samples; s += LANES) {
+            int64_t at = (p * samples + s) * joints;
+            int count = at_most_lanes(samples - s);
+            load(joints, count, q + at, vq);
+            load(joints, count, qd + at, vqd);
+            load(joints, count, qdd + at, vqdd);
+            rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
+            V present;
+            for (int l = 0; l < LANES; l++) present[l] = l < count;
+            for (int i = 0; i < joints; i++) {
+                for (int k = first[i]; k < chosen; k++) row[k] = rows[i * width + columns[k]];
+                if (count < LANES)
+                    for (int k = first[i]; k < chosen; k++) row[k] *= present;
+                for (int k = first[i]; k < chosen; k++) {
+                    V value = row[k], *sum = sums + k * chosen;
+                    for (int c = k; c < chosen; c++) sum[c] += value * row[c];
+                }
+            }
+        }
+        double *gram = out + p * chosen * chosen;
+        for (int k = 0; k < chosen; k++)
+            for (int c = k; c < chosen; c++) {
+                V v = sums[k * chosen + c];
+                gram[k * chosen + c] = gram[c * chosen + k] =
+                    ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+            }
+    }
+}
+
+/* Torques of given inertial parameters, (samples, joints): the observation matrix times (10 joints,). */
+FOR_EACH_PROCESSOR
+void torques(int joints, const JointData *data, const double *gravity, int64_t samples, const double *q,
+             const double *qd, const double *qdd, const double *parameters, double *out) {
+    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
+    int width = 10 * joints;
+    for (int64_t s = 0; s < samples; s += LANES) {
+        int count = at_most_lanes(samples - s);
+        load(joints, count, q + s * joints, vq);
+        load(joints, count, qd + s * joints, vqd);
+        load(joints, count, qdd + s * joints, vqdd);
+        rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
+        for (int i = 0; i < joints; i++) {
+            V torque = {0};
+            for (int k = 10 * i; k < width; k++) torque += rows[i * width + k] * parameters[k];
+            for (int l = 0; l < count; l++) out[(s + l) * joints + i] = torque[l];
+        }
+    }
+}
+
+/* Sums of basis functions: out (trajectories, samples, joints) = sum over k of
+ * basis (samples, terms) * coefficients (trajectories, joints, terms). */
+FOR_EACH_PROCESSOR
+void series(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
+            const double *coefficients, double *out) {
+    for (int64_t p = 0; p < trajectories; p++)
+        for (int64_t s = 0; s < samples; s++)
+            for (int j = 0; j < joints; j++) {
+                const double *c = coefficients + (p * joints + j) * terms, *b = basis + s * terms;
+                double sum = 0;
+                for (int k = 0; k < terms; k++) sum += b[k] * c[k];
+                out[(p * samples + s) * joints + j] = sum;
+            }
+}
+
+/* Peaks of each joint of each trajectory: lowest and highest position, largest speed and acceleration;
+ * (trajectories, joints, 4). */
+FOR_EACH_PROCESSOR
+void peaks(int64_t trajectories, int64_t samples, int joints, const double *q, const double *qd, const double *qdd,
+           double *out) {
+    for (int64_t p = 0; p < trajectories; p++)
+        for (int j = 0; j < joints; j++) {
+            int64_t at = p * samples * joints + j;
+            double low = q[at], high = q[at], speed = 0, acceleration = 0;
+            for (int64_t s = 0; s < samples; s++, at += joints) {
+                double v = qd[at] < 0 ? -qd[at] : qd[at], a = qdd[at] < 0 ? -qdd[at] : qdd[at];
+                low = q[at] < low ? q[at] : low;
+                high = q[at] > high ? q[at] : high;
+                speed = v > speed ? v : speed;
+                acceleration = a > acceleration ? a : acceleration;
+            }
+            double *peak = out + (p * joints + j) * 4;
+            peak[0] = low, peak[1] = high, peak[2] = speed, peak[3] = acceleration;
+        }
+}

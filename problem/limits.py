@@ -1,0 +1,103 @@
+"""Limits of the arm and of its workspace, and by how much a motion breaks them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from problem.arm import Arm, Limits
+from problem.kinematics import body_points
+from problem.motion import Motion
+from problem.native import lib, pointer
+from problem.regressor import rigid_body_torque
+from problem.trajectory import Excitation
+from problem.transforms import Array
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where the joints' frames and the tool may be, in the base frame, m.
+
+    reach: largest distance from the origin; floor: lowest height; keep_out: opposite corners of a box.
+    """
+
+    reach: float = np.inf
+    floor: float = -np.inf
+    keep_out: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None
+    tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def limited(self) -> bool:
+        """Whether there is anything to check."""
+        return np.isfinite(self.reach) or np.isfinite(self.floor) or self.keep_out is not None
+
+    def excess(self, points: Array) -> Array:
+        """How far points (batch, samples, points, 3) leave the workspace at worst, (batch,), m."""
+        worst = np.linalg.norm(points, axis=-1).max(axis=(1, 2)) - self.reach
+        worst = np.maximum(worst, self.floor - points[..., 2].min(axis=(1, 2)))
+        if self.keep_out is not None:
+            low, high = np.sort(np.array(self.keep_out), axis=0)
+            depth = np.minimum(points - low, high - points).min(axis=-1)
+            worst = np.maximum(worst, depth.max(axis=(1, 2)))
+        return np.asarray(np.maximum(worst, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Constraints:
+    """All limits of one arm; one entry a joint, infinite where there is none.
+
+    lower, upper: position; velocity; acceleration; torque. The violation of each is measured relative to
+    the limit (for positions to half their range, for lengths to one metre).
+    """
+
+    arm: Arm
+    limits: tuple[Limits, ...]
+    workspace: Workspace = Workspace()
+
+    def violation(self, excitation: Excitation) -> Array:
+        """Sum over all limits of log(1 + relative excess), (points,): 0 where every limit is kept.
+
+        The logarithm keeps a motion near a singularity comparable with the others. For a path out of reach,
+        whose joint motion means nothing, only the overreach counts, and it counts more than any limit.
+        Infinite for a motion that is not finite.
+        """
+        within_reach = np.log1p(self._excesses(excitation.motion)).sum(axis=-1)
+        out_of_reach = 1e3 * (1.0 + excitation.overreach)
+        violation = np.where(excitation.overreach > 0, out_of_reach, within_reach)
+        return np.where(np.isnan(violation), np.inf, violation)
+
+    def _excesses(self, motion: Motion) -> Array:
+        """Relative excess of each limit, (points, limits)."""
+        lowest, highest, speed, acceleration = np.moveaxis(peaks(motion), -1, 0)
+        low, high = np.array([limit.position for limit in self.limits]).T
+        half_range = np.where(np.isfinite(high - low), (high - low) / 2, 1.0)
+        columns = [
+            (low - lowest) / half_range,
+            (highest - high) / half_range,
+            speed / [limit.velocity for limit in self.limits] - 1.0,
+            acceleration / [limit.acceleration for limit in self.limits] - 1.0,
+        ]
+        torque_limit = np.array([limit.torque for limit in self.limits])
+        if np.any(np.isfinite(torque_limit)):
+            columns.append(np.abs(drive_torque(self.arm, motion)).max(axis=1) / torque_limit - 1.0)
+        if self.workspace.limited:
+            points = body_points(self.arm, motion.position, np.array(self.workspace.tool))
+            columns.append(self.workspace.excess(points)[:, None])
+        return np.asarray(np.maximum(np.concatenate(columns, axis=1), 0.0))
+
+
+def drive_torque(arm: Arm, motion: Motion) -> Array:
+    """Torque (..., samples, joints) that the drives give: the rigid links and the rotors, N m (N)."""
+    torque = rigid_body_torque(arm, motion)
+    return torque + motion.acceleration * np.array(arm.rotor_inertia) if arm.rotor_inertia else torque
+
+
+def peaks(motion: Motion) -> Array:
+    """Lowest and highest position, largest speed and acceleration, (points, joints, 4).
+
+    motion: (points, samples, joints).
+    """
+    points, samples, joints = motion.position.shape
+    out = np.empty((points, joints, 4))
+    arrays = (motion.position, motion.velocity, motion.acceleration, out)
+    lib.peaks(points, samples, joints, *(pointer(array) for array in arrays))
+    return out

@@ -1,0 +1,223 @@
+"""Typed settings of the problems, one class a preset; each choice that the paper leaves open has its key here."""
+
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt
+
+from problem.arm import Arm
+from problem.base_parameters import BaseParameters, base_parameters
+from problem.cartesian_fourier import CartesianFourier
+from problem.contract import Problem
+from problem.errors import InputError
+from problem.excitation_problem import ExcitationProblem, Penalty
+from problem.fitness import Criterion
+from problem.frame import in_random_frame
+from problem.functions import FUNCTIONS, TestFunction
+from problem.inverse_kinematics import planar_arm
+from problem.joint_fourier import JointFourier
+from problem.limit_settings import LimitSettings, PerJoint, Positive, Vector, WorkspaceSettings, one_a_joint
+from problem.limits import Constraints
+from problem.robot_file import load_arm
+from problem.settings import Settings
+from problem.trajectory import Trajectory
+from problem.transforms import Array
+
+NotNegative = Annotated[float, Ge(0)]
+Count = Annotated[int, Ge(1)]
+
+
+class CriterionSettings(Settings):
+    """Eq. 44, D- or E-optimality; within limits the default weights add less than a tenth of cond."""
+
+    kind: Literal["eq44", "d_optimality", "e_optimality"] = "eq44"
+    weight_smallest: NotNegative = 0.01
+    weight_largest: NotNegative = 0.01
+
+    def build(self) -> Criterion:
+        """The criterion."""
+        return Criterion(self.kind, self.weight_smallest, self.weight_largest)
+
+
+class PenaltySettings(Settings):
+    """What a broken limit costs: step + weight * violation; the step makes it worse than any gain in cond."""
+
+    step: NotNegative = 100.0
+    weight: Positive = 1000.0
+
+    def build(self) -> Penalty:
+        """The penalty."""
+        return Penalty(self.step, self.weight)
+
+
+class ExcitationSettings(Settings):
+    """What all excitation problems share.
+
+    arm: a built-in name or a file. joints: how many of its first joints move, all if left out. duration: s.
+    samples: instants, both ends included. columns: which columns are kept as base parameters, where there is
+    a choice. unit_columns: scale columns to unit length. tool: a point in the last link's frame, m, that the
+    workspace limits too. frame_seed: search in randomly shifted coordinates.
+    """
+
+    arm: str = "irb120-arm"
+    joints: Count | None = None
+    duration: Positive = 10.0
+    samples: Annotated[int, Ge(2)] = 100
+    columns: Literal["later_columns", "earlier_columns"] | tuple[str, ...] = "later_columns"
+    unit_columns: bool = False
+    criterion: CriterionSettings = CriterionSettings()
+    penalty: PenaltySettings = PenaltySettings()
+    limits: LimitSettings = LimitSettings()
+    workspace: WorkspaceSettings = WorkspaceSettings()
+    tool: Vector = (0.0, 0.0, 0.0)
+    frame_seed: Annotated[int, Ge(0)] | None = None
+
+    title: ClassVar[str] = ""
+
+    def build(self) -> Problem:
+        """The problem. Raises InputError where the settings do not fit the arm."""
+        arm = self._arm()
+        trajectory = self.trajectory(arm)
+        limits = self.limits.of(arm)
+        if any(np.isfinite(limit.torque) for limit in limits) and arm.links is None:
+            raise InputError(f"a torque limit needs the inertial parameters of '{arm.name}': its file has no `links`")
+        problem = ExcitationProblem(
+            name=self.title,
+            arm=arm,
+            base=self._base(arm),
+            trajectory=trajectory,
+            duration=self.duration,
+            samples=self.samples,
+            constraints=Constraints(arm, limits, self.workspace.build(self.tool)),
+            criterion=self.criterion.build(),
+            penalty=self.penalty.build(),
+            unit_columns=self.unit_columns,
+        )
+        return problem if self.frame_seed is None else in_random_frame(problem, self.frame_seed)
+
+    def trajectory(self, arm: Arm) -> Trajectory:
+        """The family of trajectories that is searched."""
+        raise NotImplementedError
+
+    def _arm(self) -> Arm:
+        arm = load_arm(self.arm)
+        if self.joints is not None and self.joints > len(arm):
+            raise InputError(f"joints: {self.joints} is more than the {len(arm)} of '{arm.name}'")
+        return arm.first(self.joints or len(arm))
+
+    def _base(self, arm: Arm) -> BaseParameters:
+        try:
+            base = base_parameters(arm, self.columns)
+        except ValueError as error:
+            raise InputError(f"columns: {error}") from None
+        if self.samples * len(arm) < len(base):
+            raise InputError(
+                f"samples: {self.samples} of {len(arm)} joints cannot show {len(base)} base parameters; "
+                f"take {-(-len(base) // len(arm))} or more"
+            )
+        return base
+
+
+class PaperSettings(ExcitationSettings):
+    """The paper's problem: eq. 44-48 on the first three joints of the IRB 120.
+
+    one_c: one c for all harmonics, as in the published optimum, or one each. centre: of the circle, m; the
+    shoulder by default. radius_limit: of each a_k, m: their sum may just leave the reach of the wrist, 0.58 m.
+    coefficient_limit: of b_k and c, m/s. rest: eq. 48 by a window on the Fourier part. elbow: branch of the
+    inverse kinematics. The circle turns joint 1 once round, which its range, +-165 deg, does not allow: by
+    default its position is not limited (`limits: {position: robot}` limits it). Speeds are the data sheet's;
+    no acceleration limit is published: 40 rad/s2. The tool point is the flange with a straight wrist.
+    """
+
+    preset: Literal["paper"] = "paper"
+    harmonics: Count = 3
+    one_c: bool = True
+    rest: bool = True
+    elbow: Literal["up", "down"] = "up"
+    centre: Vector = (0.0, 0.0, 0.29)
+    radius_limit: Positive = 0.2
+    coefficient_limit: Positive = 0.5
+    tool: Vector = (0.0, 0.0, 0.374)
+    limits: LimitSettings = LimitSettings(
+        position=(None, (-1.919862177194, 1.919862177194), (-1.919862177194, 1.221730476396)),
+        acceleration=40.0,
+    )
+
+    title: ClassVar[str] = "paper"
+
+    def trajectory(self, arm: Arm) -> CartesianFourier:
+        """Eq. 45-47 with inverse kinematics."""
+        return CartesianFourier(
+            arm=planar_arm(arm, np.array(self.tool)),
+            duration=self.duration,
+            harmonics=self.harmonics,
+            centre=self.centre,
+            radius_limit=self.radius_limit,
+            coefficient_limit=self.coefficient_limit,
+            one_c=self.one_c,
+            rest=self.rest,
+            elbow_up=self.elbow == "up",
+        )
+
+
+class JointFourierSettings(ExcitationSettings):
+    """Finite Fourier series in joint space, five harmonics (Swevers 1997).
+
+    coefficient_limit: of a_k and b_k, rad/s, one number or one a joint; the speed limit shared among the
+    harmonics if left out. rest: start and end at rest. No acceleration limit is published: 40 rad/s2.
+    """
+
+    preset: Literal["joint-fourier"] = "joint-fourier"
+    harmonics: Count = 5
+    rest: bool = False
+    coefficient_limit: PerJoint | None = None
+    limits: LimitSettings = LimitSettings(acceleration=40.0)
+
+    title: ClassVar[str] = "joint-fourier"
+
+    def trajectory(self, arm: Arm) -> JointFourier:
+        """The series for every joint of the arm."""
+        if self.rest and self.harmonics < 2:
+            raise InputError("rest: true needs at least two harmonics")
+        lower, upper = np.array([limit.position for limit in self.limits.of(arm)]).T
+        if not np.all(np.isfinite(upper - lower)):
+            lower, upper = np.where(np.isfinite(upper - lower), [lower, upper], [[-np.pi], [np.pi]])
+        return JointFourier(
+            duration=self.duration,
+            harmonics=self.harmonics,
+            centre=(lower + upper) / 2,
+            reach=(upper - lower) / 2,
+            coefficient_limit=self._coefficient_limit(arm),
+            rest=self.rest,
+        )
+
+    def _coefficient_limit(self, arm: Arm) -> Array:
+        if self.coefficient_limit is not None:
+            return np.array(one_a_joint("coefficient_limit", self.coefficient_limit, arm))
+        speeds = np.array([limit.velocity for limit in self.limits.of(arm)])
+        if not np.all(np.isfinite(speeds)):
+            raise InputError(f"'{arm.name}' has joints without a speed limit: give `coefficient_limit` in rad/s")
+        return np.asarray(speeds / self.harmonics)
+
+
+class RandomFrameSettings(JointFourierSettings):
+    """`joint-fourier` in randomly shifted coordinates: the fair ground for algorithms drawn to the origin."""
+
+    preset: Literal["random-frame"] = "random-frame"  # type: ignore[assignment]
+    frame_seed: Annotated[int, Ge(0)] | None = 1
+
+
+class FunctionSettings(Settings):
+    """A classical test function; shift_seed moves its optimum to a random place in the inner half of the box."""
+
+    preset: Literal["sphere", "ellipsoid", "rosenbrock", "rastrigin", "ackley"]
+    dimension: Count = 15
+    half_width: Annotated[float, Gt(0)] = 5.0
+    shift_seed: Annotated[int, Ge(0)] | None = None
+
+    def build(self) -> Problem:
+        """The function on its box."""
+        optimum = np.zeros(self.dimension)
+        if self.shift_seed is not None:
+            optimum = np.random.default_rng(self.shift_seed).uniform(-0.5, 0.5, self.dimension) * self.half_width
+        return TestFunction(self.preset, FUNCTIONS[self.preset], self.half_width, optimum)

@@ -1,0 +1,114 @@
+"""Dynamics that are linear in the inertial parameters: tau = W(q, qd, qdd) phi (eq. 9-41).
+
+The torque is the moment (force) of each link's wrench projected on the joint's own axis. The paper's eq. 39
+takes the z-component in the link's frame instead; with standard D-H frames the axis is z of the frame before.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problem.arm import Arm, Joint
+from problem.motion import Motion
+from problem.native import ffi, lib, pointer
+from problem.transforms import Array
+
+MAX_JOINTS = 16  # as in kernel.c
+LANES = 8
+
+
+def observation_matrix(arm: Arm, motion: Motion) -> Array:
+    """Rows that map the inertial parameters to joint torques, tau = W @ phi (eq. 39-41).
+
+    motion: (..., samples, joints). Returns (..., samples * joints, 10 * joints), the joints of one sample in
+    consecutive rows, N m per parameter unit; parameters in the order of eq. 31, link by link.
+    Raises ValueError if the joint counts differ.
+    """
+    joints = _checked(arm, motion)
+    out = np.zeros((*motion.batch, motion.samples * joints, 10 * joints))
+    samples = motion.position.size // joints
+    lib.observation_matrices(joints, *_compiled(arm), samples, *_arrays(motion), pointer(out))
+    return out
+
+
+def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
+    """W.T @ W for chosen columns of the observation matrix, without building it.
+
+    motion: (..., samples, joints); columns: (chosen,), ascending. Returns (..., chosen, chosen).
+    Each trajectory's result is the same to the bit in any batch. Raises ValueError if joint counts differ or
+    a column does not exist.
+    """
+    joints = _checked(arm, motion)
+    out = np.empty((*motion.batch, len(columns), len(columns)))
+    scratch = np.empty(LANES * (len(columns) ** 2 + 1))
+    chosen, first = _chosen(np.asarray(columns, dtype=np.int32).tobytes(), joints)
+    trajectories = int(np.prod(motion.batch, dtype=int))
+    lib.gram_matrices(
+        joints, *_compiled(arm), trajectories, motion.samples, *_arrays(motion), len(chosen),
+        pointer(chosen, "int *"), pointer(first, "int *"), pointer(scratch), pointer(out),
+    )  # fmt: skip
+    return out
+
+
+def rigid_body_torque(arm: Arm, motion: Motion, parameters: Array | None = None) -> Array:
+    """Joint torques of the rigid links, W @ phi, without rotors and friction.
+
+    motion: (..., samples, joints); parameters: (10 * joints,), the arm's own if left out.
+    Returns (..., samples, joints), N m (N). Raises ValueError without parameters or if joint counts differ.
+    """
+    joints = _checked(arm, motion)
+    phi = np.ascontiguousarray(arm.parameters if parameters is None else parameters, dtype=np.float64)
+    if phi.shape != (10 * joints,):
+        raise ValueError(f"{arm.name!r} takes {10 * joints} parameters, not an array of shape {phi.shape}")
+    out = np.empty(motion.position.shape)
+    samples = motion.position.size // joints
+    lib.torques(joints, *_compiled(arm), samples, *_arrays(motion), pointer(phi), pointer(out))
+    return out
+
+
+@lru_cache(maxsize=64)
+def _chosen(columns: bytes, joints: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The columns, checked, and for each joint the first of them that can be non-zero in its rows."""
+    chosen = np.frombuffer(columns, dtype=np.int32)
+    if np.any(chosen < 0) or np.any(chosen >= 10 * joints) or np.any(np.diff(chosen) <= 0):
+        raise ValueError(f"columns should be ascending, from 0 to {10 * joints - 1}, not {chosen.tolist()}")
+    return chosen, np.searchsorted(chosen, 10 * np.arange(joints)).astype(np.int32)
+
+
+def _checked(arm: Arm, motion: Motion) -> int:
+    if motion.joints != len(arm):
+        raise ValueError(f"the motion has {motion.joints} joints, the arm {arm.name!r} has {len(arm)}")
+    if len(arm) > MAX_JOINTS:
+        raise ValueError(f"arms of up to {MAX_JOINTS} joints are supported; {arm.name!r} has {len(arm)}")
+    return len(arm)
+
+
+def _arrays(motion: Motion) -> tuple[object, object, object]:
+    return pointer(motion.position), pointer(motion.velocity), pointer(motion.acceleration)
+
+
+@lru_cache(maxsize=64)
+def _compiled(arm: Arm) -> tuple[object, object]:
+    """The arm and its gravity as the C kernel reads them."""
+    data = ffi.new("JointData[]", len(arm))
+    for entry, joint in zip(data, arm.joints, strict=True):
+        _fill(entry, joint)
+    return data, ffi.new("double[3]", [float(value) for value in arm.gravity])
+
+
+def _fill(entry: object, joint: Joint) -> None:
+    rotation = joint.after[:3, :3]
+    shift = rotation.T @ joint.after[:3, 3]
+    values = {
+        "prismatic": int(joint.kind == "prismatic"),
+        "shifted_before": int(bool(np.any(joint.before[:3, 3]))),
+        "shifted_after": int(bool(np.any(shift))),
+        "before_rotation": joint.before[:3, :3].ravel().tolist(),
+        "before_shift": joint.before[:3, 3].tolist(),
+        "after_rotation": rotation.ravel().tolist(),
+        "after_shift": shift.tolist(),
+        "axis": rotation[2].tolist(),
+    }
+    for name, value in values.items():
+        setattr(entry, name, value)

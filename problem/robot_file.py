@@ -1,0 +1,120 @@
+"""Robot files: `robot.yaml` with Denavit-Hartenberg parameters, a URDF, or the name of a built-in arm."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from annotated_types import Gt, Len
+from pydantic import Field, model_validator
+
+from problem.arm import Arm, Joint, Limits, Link
+from problem.errors import InputError
+from problem.settings import Settings, nearest
+from problem.transforms import rotation_x, rotation_z, translation
+from problem.urdf import read_urdf
+from problem.yaml_input import read_yaml, validate
+
+BUILT_IN = Path(__file__).parent / "robots"
+Positive = Annotated[float, Gt(0)]
+Vector = tuple[float, float, float]
+
+
+class JointEntry(Settings):
+    """One row of the D-H table with its limits; m and rad, `d` is added to the variable of a prismatic joint."""
+
+    name: str
+    type: Literal["revolute", "prismatic"]
+    a: float
+    d: float
+    alpha: float
+    theta_offset: float = 0.0
+    position_limits: tuple[float, float] | None = None
+    velocity_limit: Positive | None = None
+    acceleration_limit: Positive | None = None
+    torque_limit: Positive | None = None
+
+    @model_validator(mode="after")
+    def _limits_in_order(self) -> "JointEntry":
+        if self.position_limits and self.position_limits[0] >= self.position_limits[1]:
+            low, high = self.position_limits
+            raise ValueError(f"position_limits of {self.name} should be [lower, upper], so [{high}, {low}]")
+        return self
+
+    def limits(self) -> Limits:
+        """The limits given; the others are infinite."""
+        given = {
+            "position": self.position_limits,
+            "velocity": self.velocity_limit,
+            "acceleration": self.acceleration_limit,
+            "torque": self.torque_limit,
+        }
+        return Limits(**{name: value for name, value in given.items() if value is not None})  # type: ignore[arg-type]
+
+    def build(self, convention: str) -> Joint:
+        """The joint between its fixed transforms (Denavit 1955; Craig 1989 for `modified`)."""
+        own = rotation_z(self.theta_offset) @ translation(0, 0, self.d)
+        link = rotation_x(self.alpha) @ translation(self.a, 0, 0)
+        still = translation(0, 0, 0)
+        before, after = (own, link) if convention == "standard" else (link @ own, still)
+        return Joint(self.name, self.type, before, after, self.limits())
+
+
+class LinkEntry(Settings):
+    """Inertial parameters about the origin of the link's D-H frame: kg, kg m, kg m2."""
+
+    mass: float
+    first_moment: Vector
+    inertia: tuple[float, float, float, float, float, float]
+
+
+class RobotFile(Settings):
+    """`robot.yaml`; links and rotor inertias are optional."""
+
+    name: str
+    dh_convention: Literal["standard", "modified"]
+    gravity: Vector = (0.0, 0.0, -9.81)
+    joints: Annotated[tuple[JointEntry, ...], Len(min_length=1)]
+    links: tuple[LinkEntry, ...] | None = None
+    rotor_inertia: tuple[Annotated[float, Field(ge=0)], ...] | None = None
+
+    @model_validator(mode="after")
+    def _one_entry_a_joint(self) -> "RobotFile":
+        for name in ("links", "rotor_inertia"):
+            entries = getattr(self, name)
+            if entries is not None and len(entries) != len(self.joints):
+                raise ValueError(f"{name} should have {len(self.joints)} entries, one a joint, has {len(entries)}")
+        return self
+
+    def build(self) -> Arm:
+        """The arm that the file describes."""
+        joints = tuple(entry.build(self.dh_convention) for entry in self.joints)
+        links = None
+        if self.links is not None:
+            links = tuple(Link(entry.mass, entry.first_moment, entry.inertia) for entry in self.links)
+        return Arm(self.name, joints, links, self.gravity, self.rotor_inertia or ())
+
+
+def built_in_arms() -> list[str]:
+    """Names of the arms that come with armlab."""
+    return sorted(path.stem for path in BUILT_IN.glob("*.yaml"))
+
+
+def load_arm(robot: str, beside: Path | None = None) -> Arm:
+    """The arm of a robot file, a URDF, or a built-in name.
+
+    robot: a path (relative to the folder `beside`, else to the working folder) or a built-in name.
+    Raises InputError, in one line, for a missing or faulty file and for a chain that is not serial.
+    """
+    if robot in built_in_arms():
+        return _from_yaml(BUILT_IN / f"{robot}.yaml", robot)
+    path = (beside or Path()) / robot
+    if path.suffix == ".urdf":
+        return read_urdf(path)
+    if path.suffix in (".yaml", ".yml"):
+        return _from_yaml(path, str(path))
+    raise InputError(
+        f"unknown robot '{robot}', neither a .yaml or .urdf file nor a built-in arm: {nearest(robot, built_in_arms())}"
+    )
+
+
+def _from_yaml(path: Path, where: str) -> Arm:
+    return validate(RobotFile, read_yaml(path), where).build()
