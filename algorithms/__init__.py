@@ -1,0 +1,1 @@
+"""Metaheuristics, one a file, behind one ask/tell interface."""

@@ -1,0 +1,84 @@
+"""What an algorithm promises, and what it may rely on (ask and tell, one population at a time).
+
+    state = algorithm.init(params, population, box, horizon, rng)
+    while not algorithm.finished(state):
+        X, state = algorithm.ask(state)          # the first ask gives the first population itself
+        state = algorithm.tell(state, X, objective(X))
+
+An algorithm knows no budget, bound policy, log, file or seed. `algorithms.check` tests the promises.
+"""
+
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array: TypeAlias = NDArray[np.float64]
+
+ParamsT = TypeVar("ParamsT", contravariant=True)
+StateT = TypeVar("StateT")
+
+
+class Box(NamedTuple):
+    """The search box: lower and upper limits, each (d,), lower < upper."""
+
+    lower: Array
+    upper: Array
+
+
+class Algorithm(Protocol[ParamsT, StateT]):
+    """A metaheuristic: a class that holds functions, never data; everything that changes is in its State.
+
+    Params: a frozen dataclass of hyper-parameters, all with defaults.
+    A State can be pickled and resumed; `ask` and `tell` use up the State that they are given (it may be
+    changed in place, as its random generator always is): go on with the one they return.
+    """
+
+    name: ClassVar[str]
+    Params: ClassVar[type[Any]]
+
+    @staticmethod
+    def init(params: ParamsT, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> StateT:
+        """State before the first population (n, d) is evaluated; horizon = planned iterations after it."""
+        ...
+
+    @staticmethod
+    def ask(state: StateT) -> tuple[Array, StateT]:
+        """The next population (n, d), possibly outside the box; the caller owns the array."""
+        ...
+
+    @staticmethod
+    def tell(state: StateT, X: Array, fitness: Array) -> StateT:
+        """Learn the fitness (n,) of X (n, d), the asked points as the bound policy moved them.
+
+        Neither array is kept or changed. A fitness that is not finite is a loss.
+        """
+        ...
+
+    @staticmethod
+    def incumbent(state: StateT) -> tuple[Array, float]:
+        """The algorithm's own present best (d,) and its fitness; a mutation may forget a better one.
+
+        The caller owns the array. Before anything finite was told the fitness is +inf.
+        """
+        ...
+
+    @staticmethod
+    def finished(state: StateT) -> bool:
+        """Whether the algorithm has nothing left to try."""
+        ...
+
+
+AnyAlgorithm: TypeAlias = type[Algorithm[Any, Any]]
+
+
+def as_loss(fitness: Array) -> Array:
+    """A copy in which everything that is not finite, minus infinity too, counts as +infinity."""
+    loss = fitness.copy()
+    loss[~np.isfinite(loss)] = np.inf
+    return loss
+
+
+def uniform_points(n: int, box: Box, rng: np.random.Generator) -> Array:
+    """n points drawn uniformly in the box, (n, d)."""
+    return box.lower + (box.upper - box.lower) * rng.random((n, len(box.lower)))

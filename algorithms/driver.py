@@ -1,0 +1,146 @@
+"""The loop that every algorithm runs in: ask, into the box, evaluate, keep the best, tell."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algorithms.bounds import bound_policy
+from algorithms.contract import AnyAlgorithm, Array, Box, as_loss
+
+Objective = Callable[[Array], Array]
+
+
+class Batch(NamedTuple):
+    """One evaluated population: points (n, d), their fitness (n,), and the algorithm after it was told them.
+
+    present_best: fitness of the algorithm's incumbent.
+    """
+
+    X: Array
+    fitness: Array
+    present_best: float
+    state: Any
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a run found; histories have one entry a batch (k).
+
+    best_x (d,), best_fitness: best of all evaluated points, the first of equals; +inf if none was finite.
+    history_evaluations (k,): evaluations used up to and with the batch.
+    best_so_far (k,), best_x_history (k, d): the best up to and with the batch.
+    present_best (k,): fitness of the algorithm's incumbent after it was told the batch.
+    final_state: can be pickled and given to `iterate` to go on.
+    """
+
+    best_x: Array
+    best_fitness: float
+    evaluations: int
+    history_evaluations: NDArray[np.int64]
+    best_so_far: Array
+    best_x_history: Array
+    present_best: Array
+    final_state: Any
+
+
+def planned_iterations(evaluations: int, swarm_size: int) -> int:
+    """The horizon: populations that fit into the budget after the first one."""
+    return max(evaluations // swarm_size - 1, 0)
+
+
+def minimise(
+    algorithm: AnyAlgorithm,
+    params: Any,
+    objective: Objective,
+    box: Box,
+    population: Array,
+    evaluations: int,
+    rng: np.random.Generator,
+    bounds: str = "clip",
+) -> Result:
+    """Run an algorithm from the first population (n, d) until the budget is used up or it is finished.
+
+    objective: (n, d) -> (n,), smaller is better. evaluations: the budget, never exceeded.
+    bounds: name of the policy in `algorithms.bounds`. Points are never rescaled.
+    Raises ValueError for a budget below 1, an impossible box, or an objective that returns another shape.
+    """
+    _check_problem(box, population, evaluations)
+    horizon = planned_iterations(evaluations, len(population))
+    state = algorithm.init(params, population, box, horizon, rng)
+    batches = list(iterate(algorithm, state, objective, box, evaluations, bounds))
+    if not batches:
+        raise ValueError(f"algorithm {algorithm.name!r} was finished before its first population")
+    return summary(batches)
+
+
+def iterate(
+    algorithm: AnyAlgorithm,
+    state: Any,
+    objective: Objective,
+    box: Box,
+    evaluations: int,
+    bounds: str = "clip",
+) -> Iterator[Batch]:
+    """Go on from a State for at most so many evaluations, one batch at a time.
+
+    A last batch that the budget cuts is evaluated as far as it goes and counts for the best, but is not told:
+    an algorithm is only told whole populations. So a run is resumed from the state after a whole batch. The
+    state of a batch is used up when the next batch is taken: pickle it before, to keep it.
+    """
+    into_box = bound_policy(bounds)
+    walls = box
+    while evaluations > 0 and not algorithm.finished(state):
+        asked, state = algorithm.ask(state)
+        if walls.lower.shape != asked.shape:
+            walls = Box(*(np.tile(wall, (len(asked), 1)) for wall in box))  # numpy is faster on equal shapes
+        X = into_box(asked, walls)[:evaluations]
+        fitness = _evaluate(objective, X)
+        if len(X) == len(asked):
+            state = algorithm.tell(state, X, fitness)
+        evaluations -= len(X)
+        yield Batch(X, fitness, algorithm.incumbent(state)[1], state)
+
+
+def summary(batches: Sequence[Batch]) -> Result:
+    """The Result of one run from its batches, in order (at least one)."""
+    X = np.concatenate([batch.X for batch in batches])
+    losses = as_loss(np.concatenate([batch.fitness for batch in batches]))
+    best = np.minimum.accumulate(losses)
+    improves = np.append(True, losses[1:] < best[:-1])
+    holder = np.maximum.accumulate(np.where(improves, np.arange(len(losses)), 0))  # row of the best so far
+    used = np.cumsum([len(batch.X) for batch in batches])
+    return Result(
+        best_x=X[holder[-1]],
+        best_fitness=float(best[-1]),
+        evaluations=int(used[-1]),
+        history_evaluations=used,
+        best_so_far=best[used - 1],
+        best_x_history=X[holder[used - 1]],
+        present_best=np.array([batch.present_best for batch in batches]),
+        final_state=batches[-1].state,
+    )
+
+
+def _evaluate(objective: Objective, X: Array) -> Array:
+    fitness = np.asarray(objective(X), dtype=np.float64)
+    if fitness.shape != (len(X),):
+        raise ValueError(f"the objective returned shape {fitness.shape} for {len(X)} points, not ({len(X)},)")
+    return fitness
+
+
+def _check_problem(box: Box, population: Array, evaluations: int) -> None:
+    if evaluations < 1:
+        raise ValueError(f"the budget is {evaluations} evaluations: it must be at least 1")
+    if population.ndim != 2 or 0 in population.shape:
+        raise ValueError(f"the first population has shape {population.shape}, not (points, dimensions)")
+    if not box.lower.shape == box.upper.shape == population.shape[1:]:
+        raise ValueError(
+            f"the box has {box.lower.shape} lower and {box.upper.shape} upper limits for points of "
+            f"{population.shape[1]} dimensions"
+        )
+    for d, (low, high) in enumerate(zip(box.lower, box.upper, strict=True)):
+        if not -np.inf < low < high < np.inf:
+            raise ValueError(f"box dimension {d}: lower limit {low} must be finite and below upper limit {high}")

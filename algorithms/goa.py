@@ -1,0 +1,117 @@
+"""Grasshopper optimisation (Saremi, Mirjalili and Lewis 2017, doi 10.1016/j.advengsoft.2017.01.004).
+
+Form: eq. 2.7 of that paper in all coordinates at once, the whole swarm moved together; the social force s of
+eq. 2.3 with f = 0.5 and l = 1.5; c of eq. 2.8 falls linearly and reaches its last value at the last planned
+iteration; the target is the best point so far. It draws no random numbers: all chance is in the first
+population.
+
+Eq. 2.3 takes distances as plain numbers, so the coordinates are normalised by the box inside this file: a
+difference between 0 and the width of the box becomes a distance between 1 and 4, the interval that the paper
+names, and unit vectors are those of the normalised coordinates. So the units do not matter.
+
+How peers differ: the authors' MATLAB works on pairs of coordinates and wraps distances into [2, 4) by a
+remainder; mealpy multiplies by an extra normal number.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from algorithms.contract import Array, Box
+from algorithms.leaders import Leaders, leader, no_leaders, promote
+
+PAIR_COORDINATES = 2**15  # 256 KiB an array
+
+
+@dataclass(frozen=True)
+class GOAParams:
+    """Table 2 for c; attraction f and its length l as in the paper."""
+
+    first_c: float = 1.0
+    last_c: float = 4e-5
+    attraction: float = 0.5
+    attraction_length: float = 1.5
+
+
+@dataclass
+class GOAState:
+    params: GOAParams
+    position: Array
+    leaders: Leaders
+    box: Box
+    horizon: int
+    iteration: int = 0
+
+
+class GOA:
+    """Grasshoppers that repel each other when near, attract when far, and are drawn to the target."""
+
+    name = "goa"
+    Params = GOAParams
+
+    @staticmethod
+    def init(params: GOAParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> GOAState:
+        return GOAState(params, population.copy(), no_leaders(population, 1), box, horizon)
+
+    @staticmethod
+    def ask(state: GOAState) -> tuple[Array, GOAState]:
+        if state.iteration > 0:
+            state.position = _hop(state)
+        return state.position.copy(), state
+
+    @staticmethod
+    def tell(state: GOAState, X: Array, fitness: Array) -> GOAState:
+        promote(state.leaders, X, fitness)
+        state.position[...] = X
+        state.iteration += 1
+        return state
+
+    @staticmethod
+    def incumbent(state: GOAState) -> tuple[Array, float]:
+        return leader(state.leaders)
+
+    @staticmethod
+    def finished(state: GOAState) -> bool:
+        return False
+
+
+def _hop(state: GOAState) -> Array:
+    params, width = state.params, state.box.upper - state.box.lower
+    progress = min(state.iteration / max(state.horizon, 1), 1.0)
+    c = params.first_c - progress * (params.first_c - params.last_c)  # eq. 2.8
+    forces = social_forces((state.position - state.box.lower) / width, params)
+    X: Array = c * (c * width / 2.0 * forces) + state.leaders.position[0]  # eq. 2.7
+    return X
+
+
+def social_forces(U: Array, params: GOAParams) -> Array:
+    """The sum over the others in eq. 2.7, in normalised coordinates, (n, d) -> (n, d).
+
+    A few grasshoppers at a time against all, so that the pairs stay in the processor's cache.
+    """
+    others = np.ascontiguousarray(U.T)
+    few = max(PAIR_COORDINATES // U.size, 1)
+    return np.concatenate([_forces_on(others[:, i : i + few], others, params) for i in range(0, len(U), few)])
+
+
+def _forces_on(some: Array, others: Array, params: GOAParams) -> Array:
+    """Forces on some (d, m) of the others (d, n), (m, d)."""
+    difference = others[:, None, :] - some[:, :, None]  # x_j - x_i: (d, i, j)
+    squared_distance = np.square(difference).sum(axis=0)
+    squared_distance[squared_distance == 0.0] = 1.0  # itself or a twin: the difference is zero already
+    r = np.abs(difference)
+    r *= 3.0
+    r += 1.0
+    force = _social(r, params)
+    difference /= np.sqrt(squared_distance)
+    force *= difference
+    return np.ascontiguousarray(np.add.reduce(force, axis=2).T)
+
+
+def _social(r: Array, params: GOAParams) -> Array:
+    """Eq. 2.3, s(r) = f exp(-r / l) - exp(-r); overwrites r."""
+    force: Array = r * (-1.0 / params.attraction_length)
+    np.exp(force, out=force)
+    force *= params.attraction
+    force -= np.exp(np.negative(r, out=r), out=r)
+    return force

@@ -1,0 +1,135 @@
+"""MuPSO: a particle swarm whose whole swarm mutates when it stagnates (the paper's eq. 1-8 and Table 2).
+
+Form: inertia weight w (eq. 3) and social coefficient c2 (eq. 4) geometric in the iteration number, so that
+both reach their last value at the last planned iteration; a counter q of stagnant iterations (eq. 5-6); at
+q >= Q the whole swarm is drawn anew (eq. 7-8), at rest, its personal bests and its global best forgotten,
+while the schedules run on.
+
+What the paper leaves open, and how it is read here:
+- Fitness in eq. 5-7 is that of the swarm's present global best, which a mutation forgets.
+- Eq. 6 is literal by default: q counts while e_(it-1) - e_it < E, so an iteration whose improvement grows
+  counts as stagnant too. `stagnation="no_improvement"` counts while e_it < E. The error before a swarm's
+  first step is 0.
+- Eq. 7 names nothing for E < Fitness <= 1e-3 at q >= Q: the swarm then flies on as it is.
+- No speed limit is named, but w > 1 makes the swarm explode without one: half of the box width, Vmax = Xmax,
+  which Shi and Eberhart (1998) advise together with a weight that falls in time; the same as in SPSO here.
+No other package has this algorithm; `algorithms.spso` says how particle swarms differ.
+"""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from algorithms.contract import Array, Box, uniform_points
+from algorithms.swarm import Swarm, fly, global_best, land, new_swarm
+
+
+@dataclass(frozen=True)
+class MuPSOParams:
+    """Table 2, E and Q of eq. 6-7; velocity_limit is a fraction of the width of the box."""
+
+    first_inertia: float = 2.1
+    last_inertia: float = 0.6
+    cognitive: float = 2.24
+    first_social: float = 1.8
+    last_social: float = 3.9
+    abandonment_threshold: float = 1e-8
+    abandonment_limit: int = 10
+    mutation_threshold: float = 1e-3
+    stagnation: Literal["second_difference", "no_improvement"] = "second_difference"
+    velocity_limit: float = 0.5
+
+    def __post_init__(self) -> None:
+        if self.stagnation not in ("second_difference", "no_improvement"):
+            raise ValueError(f"stagnation is {self.stagnation!r}: second_difference or no_improvement")
+
+
+@dataclass
+class MuPSOState:
+    """iteration: populations told; q: abandonment counter; mutations: iterations with a swarm drawn anew."""
+
+    params: MuPSOParams
+    swarm: Swarm
+    box: Box
+    horizon: int
+    rng: np.random.Generator
+    iteration: int = 0
+    fitness: float | None = None  # of the present global best; None for a swarm that was not evaluated yet
+    fitness_error: float = 0.0
+    q: int = 0
+    mutations: list[int] = field(default_factory=list)
+
+
+class MuPSO:
+    """Mutating particle swarm optimisation."""
+
+    name = "mupso"
+    Params = MuPSOParams
+
+    @staticmethod
+    def init(params: MuPSOParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> MuPSOState:
+        return MuPSOState(params, new_swarm(population, box, params.velocity_limit), box, horizon, rng)
+
+    @staticmethod
+    def ask(state: MuPSOState) -> tuple[Array, MuPSOState]:
+        if _must_mutate(state):
+            _mutate(state)
+        elif state.iteration > 0:
+            _fly(state)
+        return state.swarm.position.copy(), state
+
+    @staticmethod
+    def tell(state: MuPSOState, X: Array, fitness: Array) -> MuPSOState:
+        land(state.swarm, X, fitness)
+        state.iteration += 1
+        _count_stagnation(state)
+        return state
+
+    @staticmethod
+    def incumbent(state: MuPSOState) -> tuple[Array, float]:
+        x, fitness = global_best(state.swarm)
+        return x.copy(), fitness
+
+    @staticmethod
+    def finished(state: MuPSOState) -> bool:
+        return _abandoned(state) and global_best(state.swarm)[1] <= state.params.abandonment_threshold  # eq. 7
+
+
+def _fly(state: MuPSOState) -> None:
+    params = state.params
+    progress = min(state.iteration / max(state.horizon, 1), 1.0)
+    w = _geometric(params.first_inertia, params.last_inertia, progress)  # eq. 3
+    c2 = _geometric(params.first_social, params.last_social, progress)  # eq. 4
+    fly(state.swarm, w, params.cognitive, c2, state.rng)
+
+
+def _geometric(first: float, last: float, progress: float) -> float:
+    """first * n**it with n chosen so that `last` is reached at the horizon; progress = it / horizon."""
+    return first * float((last / first) ** progress)
+
+
+def _count_stagnation(state: MuPSOState) -> None:
+    fitness = global_best(state.swarm)[1]
+    if state.fitness is not None:
+        error = 0.0 if fitness == state.fitness else state.fitness - fitness  # eq. 5; inf - inf is no progress
+        literal = state.params.stagnation == "second_difference"
+        slowing = state.fitness_error - error if literal else error
+        state.q = state.q + 1 if slowing < state.params.abandonment_threshold else 0  # eq. 6
+        state.fitness_error = error
+    state.fitness = fitness
+
+
+def _abandoned(state: MuPSOState) -> bool:
+    return state.q >= state.params.abandonment_limit
+
+
+def _must_mutate(state: MuPSOState) -> bool:
+    return _abandoned(state) and global_best(state.swarm)[1] > state.params.mutation_threshold  # eq. 7
+
+
+def _mutate(state: MuPSOState) -> None:
+    position = uniform_points(len(state.swarm.position), state.box, state.rng)  # eq. 8
+    state.swarm = new_swarm(position, state.box, state.params.velocity_limit)
+    state.fitness, state.fitness_error, state.q = None, 0.0, 0
+    state.mutations.append(state.iteration)

@@ -1,0 +1,55 @@
+"""Random search: every population is drawn uniformly in the box; the yardstick that a search has to beat."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from algorithms.contract import Array, Box, uniform_points
+from algorithms.leaders import Leaders, leader, no_leaders, promote
+
+
+@dataclass(frozen=True)
+class RandomSearchParams:
+    """There is nothing to set."""
+
+
+@dataclass
+class RandomSearchState:
+    population: Array
+    box: Box
+    leaders: Leaders
+    rng: np.random.Generator
+    started: bool = False
+
+
+class RandomSearch:
+    """Uniform points, none of which learns from another."""
+
+    name = "random-search"
+    Params = RandomSearchParams
+
+    @staticmethod
+    def init(
+        params: RandomSearchParams, population: Array, box: Box, horizon: int, rng: np.random.Generator
+    ) -> RandomSearchState:
+        return RandomSearchState(population.copy(), box, no_leaders(population, 1), rng)
+
+    @staticmethod
+    def ask(state: RandomSearchState) -> tuple[Array, RandomSearchState]:
+        if state.started:
+            state.population = uniform_points(len(state.population), state.box, state.rng)
+        return state.population.copy(), state
+
+    @staticmethod
+    def tell(state: RandomSearchState, X: Array, fitness: Array) -> RandomSearchState:
+        promote(state.leaders, X, fitness)
+        state.started = True
+        return state
+
+    @staticmethod
+    def incumbent(state: RandomSearchState) -> tuple[Array, float]:
+        return leader(state.leaders)
+
+    @staticmethod
+    def finished(state: RandomSearchState) -> bool:
+        return False

@@ -1,0 +1,69 @@
+"""Algorithms by name: built-in ones, and third parties' of the entry-point group `armlab.algorithms`.
+
+Names are found without importing anything, so a broken plug-in troubles only those who ask for it.
+"""
+
+from difflib import get_close_matches
+from importlib.metadata import EntryPoint, entry_points
+
+from algorithms.contract import AnyAlgorithm
+
+GROUP = "armlab.algorithms"
+
+_BUILT_IN = {
+    "mupso": "algorithms.mupso:MuPSO",
+    "spso": "algorithms.spso:SPSO",
+    "woa": "algorithms.woa:WOA",
+    "gwo": "algorithms.gwo:GWO",
+    "goa": "algorithms.goa:GOA",
+    "de": "algorithms.de:DE",
+    "random-search": "algorithms.random_search:RandomSearch",
+    "cma-es": "algorithms.cmaes:CMAES",
+}
+
+
+class UnknownAlgorithmError(ValueError):
+    """No algorithm is registered under that name."""
+
+
+class BrokenAlgorithmError(ValueError):
+    """The name is registered, but what stands behind it cannot be used."""
+
+
+def names() -> list[str]:
+    """All registered names: the built-in ones in the paper's order, then the plug-ins'."""
+    plug_ins = sorted(entry.name for entry in entry_points(group=GROUP))
+    return list(dict.fromkeys([*_BUILT_IN, *plug_ins]))
+
+
+def load(name: str) -> AnyAlgorithm:
+    """The algorithm class registered under a name.
+
+    Raises UnknownAlgorithmError with the nearest name, BrokenAlgorithmError if it is registered twice or
+    cannot be imported.
+    """
+    entries = [entry for entry in _entries() if entry.name == name]
+    if not entries:
+        raise UnknownAlgorithmError(f"unknown algorithm {name!r}: {_advice(name)}")
+    if len(entries) > 1:
+        places = " and ".join(entry.value for entry in entries)
+        raise BrokenAlgorithmError(f"algorithm {name!r} is registered more than once: {places}")
+    return _import(entries[0])
+
+
+def _entries() -> list[EntryPoint]:
+    built_in = [EntryPoint(name, value, GROUP) for name, value in _BUILT_IN.items()]
+    return [*built_in, *entry_points(group=GROUP)]
+
+
+def _advice(name: str) -> str:
+    near = get_close_matches(name, names(), n=1)
+    return f"did you mean {near[0]!r}?" if near else f"choose one of {', '.join(names())}"
+
+
+def _import(entry: EntryPoint) -> AnyAlgorithm:
+    try:
+        algorithm: AnyAlgorithm = entry.load()
+    except (ImportError, AttributeError, SyntaxError) as error:
+        raise BrokenAlgorithmError(f"algorithm {entry.name!r} ({entry.value}) cannot be imported: {error}") from error
+    return algorithm
