@@ -1,0 +1,65 @@
+# armlab. `make table3` and `make test` do everything on a machine with Python 3.11, git, make and gcc.
+PYTHON ?= python3
+BIN := .venv/bin
+KERNEL := problem/kernel.c problem/kernel_build.py
+
+.DEFAULT_GOAL := help
+.PHONY: help install install-dev table3 figure2 figure3 test lint speed regression lock clean
+
+help: ## what can be made
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
+
+# --- the environment: `run` is what running needs, `dev` adds the tests, the peers and the engines
+
+install: .venv/run ## what running needs, into .venv, from the lock file
+install-dev: .venv/dev ## what the tests need too
+
+.venv/bin/python:
+	$(PYTHON) -m venv .venv
+
+.venv/run: requirements/run.lock pyproject.toml setup.py $(KERNEL) | .venv/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+.venv/dev: .venv/run requirements/dev.lock
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/dev.lock
+	@touch $@
+
+lock: .venv/dev ## choose the versions of all dependencies anew
+	$(BIN)/uv pip compile --quiet --upgrade --python-version 3.11 --generate-hashes --no-emit-index-url --extra dev \
+		--custom-compile-command "make lock" pyproject.toml -o requirements/dev.lock
+	$(BIN)/uv pip compile --quiet --python-version 3.11 --generate-hashes --no-emit-index-url --extra build \
+		--custom-compile-command "make lock" --constraint requirements/dev.lock pyproject.toml -o requirements/run.lock
+
+# --- results
+
+table3: .venv/run ## the paper's comparison: results/table3.csv and .md
+	$(BIN)/armlab table3
+
+figure2: .venv/run ## best cost and time against swarm size
+	$(BIN)/armlab figure2
+
+figure3: .venv/run ## average convergence
+	$(BIN)/armlab figure3
+
+speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results/speed.json and .md
+	$(BIN)/armlab speed
+
+# --- checks
+
+test: .venv/dev lint regression ## every test
+	$(BIN)/pytest -n auto
+
+lint: .venv/dev ## style, types and import contracts
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+regression: .venv/dev ## the best condition numbers against the committed baseline
+	$(BIN)/armlab regression
+
+clean: ## everything that was made here, the environment included
+	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

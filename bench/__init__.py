@@ -1,0 +1,1 @@
+"""Configuration, runner, run store, statistics, tables, figures and the command line."""

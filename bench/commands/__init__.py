@@ -1,0 +1,1 @@
+"""The commands of `armlab`, without any logic of their own."""

@@ -1,0 +1,79 @@
+"""Commands that run experiments."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from bench.commands.progress import trial_bar
+
+_STORE = Path(".armlab/runs.sqlite")
+
+
+def _run_options(command: Callable[..., None]) -> Callable[..., None]:
+    options = (
+        click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core]."),
+        click.option(
+            "--store",
+            type=click.Path(path_type=Path),
+            default=_STORE,
+            show_default=True,
+            help="File that keeps finished trials.",
+        ),
+        click.option(
+            "--results",
+            type=click.Path(path_type=Path),
+            default=Path("results"),
+            show_default=True,
+            help="Folder for tables and figures.",
+        ),
+        click.option("--dry-run", is_flag=True, help="List the trials and estimate the time; run nothing."),
+        click.option("--fresh", is_flag=True, help="Compute again what is already kept."),
+        click.option("--overwrite", is_flag=True, help="Replace results of another configuration."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@_run_options
+def run(config: Path, **options: Any) -> None:
+    """Run what is missing of an experiment and write its results."""
+    _run([config], **options)
+
+
+@click.command()
+@_run_options
+def table3(**options: Any) -> None:
+    """Table 3 of the paper: configs/table3.yaml."""
+    _run([Path("configs/table3.yaml")], **options)
+
+
+@click.command()
+@_run_options
+def figure2(**options: Any) -> None:
+    """Figure 2, as published and at equal evaluations: configs/figure2*.yaml."""
+    _run([Path("configs/figure2.yaml"), Path("configs/figure2_equal_evaluations.yaml")], **options)
+
+
+@click.command()
+@_run_options
+def figure3(**options: Any) -> None:
+    """Figure 3 of the paper: configs/figure3.yaml."""
+    _run([Path("configs/figure3.yaml")], **options)
+
+
+def _run(configs: Sequence[Path], workers: int | None, dry_run: bool, **options: Any) -> None:
+    from joblib import cpu_count
+
+    from bench.dry_run import describe
+    from bench.experiment import Options, run_experiment
+
+    settings = Options(workers=workers or cpu_count(), **options)
+    for config in configs:
+        lines = describe(config, settings) if dry_run else run_experiment(config, settings, trial_bar)
+        for line in lines:
+            click.echo(line)

@@ -1,0 +1,116 @@
+"""The configuration of an experiment: one YAML file, typed, with every mistake told in one line."""
+
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from problem.settings import Settings, validate
+from problem.yaml_input import read_yaml
+
+
+def _as_list(value: Any) -> Any:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _as_choice(value: Any) -> Any:
+    return {"name": value} if isinstance(value, str) else value
+
+
+class AlgorithmChoice(Settings):
+    """An algorithm by its registered name, with other hyper-parameters than its defaults if given.
+
+    label: its name in tables and figures.
+    """
+
+    name: str
+    label: str = ""
+    params: dict[str, Any] = Field(default_factory=dict)
+
+
+class ProblemChoice(Settings):
+    """A problem as `problem.registry` reads it, and its name in tables and figures."""
+
+    label: str
+    settings: dict[str, Any]
+
+
+def _split_label(value: Any) -> Any:
+    """Our own key `label` apart from the problem's keys; a bare name is a preset."""
+    if isinstance(value, str):
+        return _split_label({"preset": value})
+    if not isinstance(value, dict):
+        return value
+    settings = {key: item for key, item in value.items() if key != "label"}
+    return {"label": value.get("label", value.get("preset", "problem")), "settings": settings}
+
+
+PositiveInt = Annotated[int, Field(ge=1)]
+OneOrMany = Annotated[tuple[PositiveInt, ...], BeforeValidator(_as_list), Field(min_length=1)]
+
+
+class Experiment(Settings):
+    """What is compared with what: every problem x algorithm x swarm size x budget x repetition.
+
+    iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or
+    evaluations: the budget itself. output: what is made of the outcomes beside the table.
+    printed: show the paper's Table 3 beside ours.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+    problem: Annotated[
+        tuple[Annotated[ProblemChoice, BeforeValidator(_split_label)], ...],
+        BeforeValidator(_as_list),
+        Field(min_length=1),
+    ]
+    algorithms: Annotated[tuple[Annotated[AlgorithmChoice, BeforeValidator(_as_choice)], ...], Field(min_length=1)]
+    swarm_size: OneOrMany
+    iterations: OneOrMany | None = None
+    evaluations: OneOrMany | None = None
+    repetitions: PositiveInt
+    seed: Annotated[int, Field(ge=0)]
+    bounds: Literal["clip", "reflect", "wrap"] = "clip"
+    output: Literal["table", "convergence", "swarm_sizes"] = "table"
+    printed: bool = False
+
+    @model_validator(mode="after")
+    def _one_budget(self) -> Self:
+        if (self.iterations is None) == (self.evaluations is None):
+            raise ValueError("should hold exactly one of 'iterations' and 'evaluations'")
+        if min(self.evaluations or (max(self.swarm_size),)) < max(self.swarm_size):
+            raise ValueError("'evaluations' should be enough for one population of 'swarm_size'")
+        return self
+
+    @model_validator(mode="after")
+    def _nothing_twice(self) -> Self:
+        lists: dict[str, list[str] | list[int]] = {
+            "problem": [problem.label for problem in self.problem],
+            "algorithms": [algorithm.label or algorithm.name for algorithm in self.algorithms],
+            "swarm_size": list(self.swarm_size),
+            "iterations": list(self.iterations or ()),
+            "evaluations": list(self.evaluations or ()),
+        }
+        for key, entries in lists.items():
+            if len(set(entries)) < len(entries):
+                raise ValueError(f"'{key}' holds an entry twice: remove it or give each a 'label' of its own")
+        return self
+
+    @model_validator(mode="after")
+    def _fits_output(self) -> Self:
+        sweeps = len(self.problem) > 1 or len(self.iterations or self.evaluations or ()) > 1
+        if self.output != "table" and sweeps:
+            raise ValueError(f"output '{self.output}' should have one problem and one budget")
+        if self.output == "convergence" and len(self.swarm_size) > 1:
+            raise ValueError("output 'convergence' should have one 'swarm_size'")
+        return self
+
+    def budgets(self, swarm_size: int) -> tuple[int, ...]:
+        """The budgets in evaluations for a swarm size."""
+        if self.evaluations is not None:
+            return self.evaluations
+        return tuple(swarm_size * (iterations + 1) for iterations in self.iterations or ())
+
+
+def read_experiment(path: Path) -> Experiment:
+    """The experiment in a YAML file; raises InputError, in one line, for any mistake in it."""
+    return validate(Experiment, read_yaml(path), str(path))

@@ -1,0 +1,53 @@
+"""Results on the disk: whole files or none, and never over the results of another configuration."""
+
+import os
+import tempfile
+from itertools import zip_longest
+from pathlib import Path
+
+from problem.errors import InputError
+
+
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Replace a file in one step, so that a crash leaves the old or the new one, never a half."""
+    data = content.encode() if isinstance(content, str) else content
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        draft.write_bytes(data)
+        draft.replace(path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def settings_path(folder: Path, name: str) -> Path:
+    """Where the full settings of the results of that name stand, beside them."""
+    return folder / f"{name}.settings.yaml"
+
+
+def check_folder(folder: Path, name: str, settings: str) -> None:
+    """Make sure, before hours of work, that results of these settings may be written there.
+
+    Raises InputError if the folder cannot be written, or holds results of that name and other settings.
+    """
+    there = settings_path(folder, name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+        found = there.read_bytes().decode(errors="replace") if there.exists() else None
+    except OSError as error:
+        raise InputError(f"cannot write to the results folder {folder}: {error.strerror}") from None
+    way_out = "choose another folder with --results, or replace them with --overwrite"
+    if found is None and (folder / f"{name}.csv").exists():
+        raise InputError(f"{folder}/{name}.csv is there without {there.name}, which tells its origin: {way_out}")
+    if found not in (None, settings):
+        difference = _first_difference(str(found), settings)
+        raise InputError(f"{folder} holds results of another configuration ({difference}): {way_out}")
+
+
+def _first_difference(found: str, settings: str) -> str:
+    pairs = zip_longest(found.splitlines(), settings.splitlines(), fillvalue="nothing")
+    old, new = next(((old, new) for old, new in pairs if old != new), ("other line ends", "ours"))
+    return f"'{old.strip()}' there, '{new.strip()}' here"

@@ -1,0 +1,87 @@
+"""Paired comparisons of algorithms that started from the same first populations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy.stats import wilcoxon
+
+from algorithms.contract import Array
+from bench.regression.comparison import holm
+from bench.seeds import named_generator
+from bench.statistics import is_feasible
+
+RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class Duel:
+    """A subject against a rival over paired repetitions.
+
+    superiority: chance that an end of the subject is better than one of the rival, ties counting half (A12, Vargha and
+    Delaney 2000), with a 95 % bootstrap interval. p: two-sided Wilcoxon signed-rank test on log10 of the ends, after
+    Holm over the duels that were fought together.
+    """
+
+    subject: str
+    rival: str
+    superiority: float
+    low: float
+    high: float
+    p: float
+
+    def winner(self, rate: float = 0.05) -> str | None:
+        """Who is better where the test rejects equality at that rate, else None."""
+        if self.p > rate:
+            return None
+        return self.subject if self.superiority > 0.5 else self.rival
+
+
+def duels(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> list[Duel]:
+    """Duels of (subject, rival) labels in a tidy frame of one problem, swarm size and budget, Holm over all of them."""
+    losses = log_losses(frame)
+    p = holm(np.array([signed_rank_p(losses[subject], losses[rival]) for subject, rival in pairs]))
+    return [
+        Duel(subject, rival, *superiority(losses[subject], losses[rival]), float(adjusted))
+        for (subject, rival), adjusted in zip(pairs, p, strict=True)
+    ]
+
+
+def against(frame: pd.DataFrame, subject: str) -> list[Duel]:
+    """The subject against every other algorithm of the frame."""
+    return duels(frame, [(subject, str(rival)) for rival in frame["algorithm"].unique() if rival != subject])
+
+
+def log_losses(frame: pd.DataFrame) -> dict[str, Array]:
+    """By algorithm, log10 of its ends in the order of the repetitions.
+
+    An infeasible end is worse than every feasible one of the frame by more than those differ, so that ranks see it as
+    the worst; two infeasible ends are equal.
+    """
+    values, violations = frame["value"].to_numpy(), frame["violation"].to_numpy()
+    feasible = is_feasible(values, violations)
+    logs = np.log10(values[feasible]) if feasible.any() else np.zeros(1)
+    loss = pd.Series(logs.max() + np.ptp(logs) + 1.0, index=frame.index)
+    loss[feasible] = np.log10(values[feasible])
+    ordered = frame.assign(loss=loss).sort_values("repetition", kind="stable")
+    return {str(label): rows["loss"].to_numpy() for label, rows in ordered.groupby("algorithm", sort=False)}
+
+
+def signed_rank_p(subject: Array, rival: Array) -> float:
+    """Two-sided p-value of Wilcoxon's signed-rank test with Pratt's treatment of equal pairs; 1 if all are equal."""
+    difference = subject - rival
+    if not difference.any():
+        return 1.0
+    return float(wilcoxon(difference, zero_method="pratt", method="approx").pvalue)
+
+
+def superiority(subject: Array, rival: Array) -> tuple[float, float, float]:
+    """A12 of losses (n,) with a 95 % percentile interval; repetitions are resampled in pairs."""
+    wins = (np.sign(rival[None, :] - subject[:, None]) + 1) / 2
+    n = len(subject)
+    drawn = named_generator("bootstrap", n).integers(n, size=(RESAMPLES, n))
+    counts = (drawn[:, :, None] == np.arange(n)).sum(axis=1)
+    resampled = ((counts @ wins) * counts).sum(axis=1) / n**2
+    low, high = np.quantile(resampled, [0.025, 0.975])
+    return float(wins.mean()), float(low), float(high)

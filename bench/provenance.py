@@ -1,0 +1,43 @@
+"""Where numbers come from: versions, linear algebra, machine and commit, written beside every outcome."""
+
+import json
+import platform
+import subprocess
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+_PACKAGES = ("armlab", "numpy", "scipy", "cmaes", "joblib")
+
+
+def provenance() -> str:
+    """JSON text with the versions, BLAS, processor, operating system and commit of this installation."""
+    blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+    facts = {
+        "python": platform.python_version(),
+        **{package: version(package) for package in _PACKAGES},
+        "blas": f"{blas['name']} {blas['version']}",
+        "processor": _processor(),
+        "system": platform.platform(),
+        "commit": _commit(),
+    }
+    return json.dumps(facts, sort_keys=True)
+
+
+def _processor() -> str:
+    """The processor's name; Linux tells it only in /proc."""
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+def _commit() -> str | None:
+    """`git describe` of the source tree, with -dirty if files were changed; None outside of one."""
+    command = ["git", "describe", "--always", "--dirty", "--abbrev=40", "--exclude=*"]
+    try:
+        done = subprocess.run(command, cwd=Path(__file__).parent, capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        return None
+    return done.stdout.strip() or None

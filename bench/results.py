@@ -1,0 +1,59 @@
+"""From the run store to the files of an experiment: tables, figures, and the settings that made them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from bench.config import Experiment
+from bench.convergence import convergence_table
+from bench.files import settings_path, write_whole
+from bench.frame import tidy_frame
+from bench.markdown import summary_page
+from bench.plan import Entry
+from bench.store import RunStore
+from bench.table import as_csv, summary_table, times_table
+
+Files = dict[str, str | bytes]
+
+
+def write_results(
+    experiment: Experiment, entries: Sequence[Entry], settings: str, store: RunStore, folder: Path
+) -> list[Path]:
+    """Write what the experiment's `output` names; returns the files.
+
+    The settings come last, so that results cut off half-way are not taken for whole ones.
+    """
+    make = {"table": _table, "swarm_sizes": _swarm_sizes, "convergence": _convergence}[experiment.output]
+    files = make(experiment, entries, store) | {settings_path(folder, experiment.name).name: settings}
+    for name, content in files.items():
+        write_whole(folder / name, content)
+    return [folder / name for name in files]
+
+
+def _table(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+    frame = tidy_frame(entries, store)
+    table = summary_table(frame)
+    return {
+        f"{experiment.name}.csv": as_csv(table),
+        f"{experiment.name}.md": summary_page(table, experiment),
+        f"{experiment.name}_times.csv": as_csv(times_table(frame)),
+    }
+
+
+def _swarm_sizes(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+    from bench.figure2 import draw_cost, draw_times  # matplotlib takes longer to import than a small run
+
+    frame = tidy_frame(entries, store)
+    cost, times = draw_cost(summary_table(frame)), draw_times(times_table(frame))
+    figures = _named(experiment.name, cost) | _named(f"{experiment.name}_times", times)
+    return _table(experiment, entries, store) | figures
+
+
+def _convergence(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+    from bench.figure3 import draw_convergence  # matplotlib takes longer to import than a small run
+
+    table = convergence_table(entries, store)
+    return {f"{experiment.name}.csv": as_csv(table)} | _named(experiment.name, draw_convergence(table))
+
+
+def _named(name: str, images: dict[str, bytes]) -> Files:
+    return {f"{name}.{suffix}": image for suffix, image in images.items()}

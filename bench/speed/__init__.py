@@ -1,0 +1,1 @@
+"""How fast armlab is, beside other packages in the same run."""

@@ -1,0 +1,57 @@
+"""Figures of a set of ends, some of them infeasible: what Table 3 says of an algorithm."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from algorithms.contract import Array
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Minimum, average and sample standard deviation (n - 1) are of the feasible ends alone, NaN without any.
+
+    Median and quartiles are of all ends, an infeasible one counting as infinite.
+    """
+
+    minimum: float
+    average: float
+    standard_deviation: float
+    median: float
+    lower_quartile: float
+    upper_quartile: float
+    feasible_share: float
+
+
+def summarise(values: Array, violations: Array) -> Summary:
+    """The summary of ends with values (n,) and violations (n,), n >= 1; a violation of 0 is feasible."""
+    feasible = is_feasible(values, violations)
+    good = values[feasible]
+    ends = np.where(feasible, values, np.inf)
+    return Summary(
+        minimum=float(good.min()) if len(good) else math.nan,
+        average=float(good.mean()) if len(good) else math.nan,
+        standard_deviation=float(good.std(ddof=1)) if len(good) > 1 else math.nan,
+        median=quantile(ends, 0.5),
+        lower_quartile=quantile(ends, 0.25),
+        upper_quartile=quantile(ends, 0.75),
+        feasible_share=float(feasible.mean()),
+    )
+
+
+def is_feasible(values: Array, violations: Array) -> NDArray[np.bool_]:
+    """Where a value is finite and nothing is violated."""
+    return np.asarray(np.isfinite(values) & (violations == 0))
+
+
+def quantile(values: Array, share: float) -> float:
+    """Linear between neighbours, as numpy's default, but right for infinite values, where numpy gives NaN."""
+    ordered = np.sort(values)
+    place = share * (len(ordered) - 1)
+    below = math.floor(place)
+    weight = place - below
+    if weight == 0:
+        return float(ordered[below])
+    return float((1 - weight) * ordered[below] + weight * ordered[below + 1])

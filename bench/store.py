@@ -1,0 +1,150 @@
+"""The run store: finished trials in one SQLite file that survives crashes and two runners at once."""
+
+import sqlite3
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from bench.outcome import Curves, Outcome
+from problem.errors import InputError
+
+APPLICATION_ID = 0x41524D4C  # "ARML", in the header of the file: SQLite's own place for it
+SCHEMA_VERSION = 1
+_SCHEMA = """
+CREATE TABLE trials (
+    key TEXT PRIMARY KEY, value REAL, violation REAL, fitness REAL, evaluations INTEGER NOT NULL,
+    seconds REAL NOT NULL, provenance INTEGER NOT NULL REFERENCES provenance (id)
+) WITHOUT ROWID;
+CREATE TABLE arrays (
+    key TEXT NOT NULL REFERENCES trials (key), name TEXT NOT NULL, dtype TEXT NOT NULL, data BLOB NOT NULL,
+    PRIMARY KEY (key, name)
+) WITHOUT ROWID;
+CREATE TABLE provenance (id INTEGER PRIMARY KEY, facts TEXT NOT NULL UNIQUE);
+"""
+_BEST_X = "best_x"
+_LOCK_SECONDS = 60.0
+
+
+class RunStore:
+    """Outcomes by trial key. An outcome that is there is never written again; a commit is on the disk."""
+
+    def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
+        self._connection = connection
+        self._path = path
+
+    def done(self, keys: Iterable[str]) -> set[str]:
+        """Those of the keys whose outcome is there."""
+        with _plainly(self._path):
+            find = "SELECT 1 FROM trials WHERE key = ?"
+            return {key for key in keys if self._connection.execute(find, (key,)).fetchone()}
+
+    def add(self, outcomes: Sequence[tuple[str, Outcome]], provenance: str) -> None:
+        """Write outcomes by key in one durable transaction; keys that another runner has written stay."""
+        with _plainly(self._path), _transaction(self._connection) as sql:
+            sql.execute("INSERT INTO provenance (facts) VALUES (?) ON CONFLICT DO NOTHING", (provenance,))
+            (source,) = sql.execute("SELECT id FROM provenance WHERE facts = ?", (provenance,)).fetchone()
+            for key, outcome in outcomes:
+                _insert(sql, key, outcome, source)
+
+    def get(self, key: str) -> Outcome:
+        """The outcome of a key; raises KeyError if it is not there."""
+        with _plainly(self._path):
+            find = "SELECT value, violation, fitness, evaluations, seconds FROM trials WHERE key = ?"
+            row = self._connection.execute(find, (key,)).fetchone()
+            if row is None:
+                raise KeyError(key)
+            find = "SELECT name, dtype, data FROM arrays WHERE key = ?"
+            blobs = self._connection.execute(find, (key,)).fetchall()
+        arrays = {name: np.frombuffer(data, dtype) for name, dtype, data in blobs}
+        best_x = arrays.pop(_BEST_X)
+        value, violation, fitness = (np.nan if number is None else number for number in row[:3])
+        return Outcome(value, violation, fitness, row[3], row[4], best_x, Curves(**arrays))
+
+    def forget(self, keys: Iterable[str]) -> None:
+        """Drop outcomes, so that they are computed again."""
+        with _plainly(self._path), _transaction(self._connection) as sql:
+            for key in keys:
+                sql.execute("DELETE FROM arrays WHERE key = ?", (key,))
+                sql.execute("DELETE FROM trials WHERE key = ?", (key,))
+
+
+@contextmanager
+def open_store(path: Path) -> Iterator[RunStore]:
+    """The store in a file, made if there is none.
+
+    Raises InputError, in one line, for a folder or file that cannot be written, a corrupt file, another
+    program's file, and a store of another version of the schema.
+    """
+    with _plainly(path):
+        connection = _connect(path)
+    try:
+        with _plainly(path):
+            _prepare(connection, path)
+        yield RunStore(connection, path)
+    finally:
+        connection.close()
+
+
+def _connect(path: Path) -> sqlite3.Connection:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return sqlite3.connect(path, timeout=_LOCK_SECONDS, isolation_level=None)
+
+
+def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+    with _transaction(connection) as sql:
+        (is_empty,) = sql.execute("SELECT count(*) = 0 FROM sqlite_master").fetchone()
+        if is_empty:
+            for statement in _SCHEMA.split(";"):
+                sql.execute(statement)
+            sql.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+            sql.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        _check_header(sql, path)
+    connection.execute("PRAGMA journal_mode = WAL")
+    connection.execute("PRAGMA synchronous = FULL")  # in WAL mode less would lose the last commits with the power
+
+
+def _check_header(sql: sqlite3.Connection, path: Path) -> None:
+    (owner,) = sql.execute("PRAGMA application_id").fetchone()
+    (version,) = sql.execute("PRAGMA user_version").fetchone()
+    if owner != APPLICATION_ID:
+        raise InputError(f"{path} is a database of another program: name another file with --store")
+    if version != SCHEMA_VERSION:
+        raise InputError(
+            f"{path} is a run store of version {version}, this program writes version {SCHEMA_VERSION}: "
+            f"delete it, or name another file with --store"
+        )
+
+
+def _insert(sql: sqlite3.Connection, key: str, outcome: Outcome, source: int) -> None:
+    figures = (outcome.value, outcome.violation, outcome.fitness, outcome.evaluations, outcome.seconds)
+    insert = "INSERT INTO trials VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING"
+    cursor = sql.execute(insert, (key, *figures, source))
+    if cursor.rowcount == 0:
+        return
+    curves = {field.name: getattr(outcome.curves, field.name) for field in fields(outcome.curves)}
+    for name, array in {_BEST_X: outcome.best_x, **curves}.items():
+        blob = (key, name, array.dtype.str, array.tobytes())
+        sql.execute("INSERT INTO arrays VALUES (?, ?, ?, ?)", blob)
+
+
+@contextmanager
+def _transaction(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+    connection.execute("BEGIN IMMEDIATE")
+    with connection:  # commits, or rolls back if anything is raised
+        yield connection
+
+
+@contextmanager
+def _plainly(path: Path) -> Iterator[None]:
+    """What a file system or SQLite complains of, in one line; our own mistakes in SQL pass through."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"cannot write the run store {path}: {error.strerror}") from None
+    except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
+        raise
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"cannot use the run store {path}: {error}") from None

@@ -1,0 +1,85 @@
+"""A small experiment, the command in a process of its own, and an algorithm of a third party."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bench.execute import loaded
+
+SMALL = """\
+name: small
+problem: {preset: sphere, dimension: 3}
+algorithms: [spso, de]
+swarm_size: 5
+iterations: 4
+repetitions: 3
+seed: 1
+"""
+PLUG_IN = """\
+import time
+from algorithms.random_search import RandomSearch
+
+class PlugIn(RandomSearch):
+    name = "plug-in"
+
+    @staticmethod
+    def init(params, population, box, horizon, rng):
+        with open({notes!r}, "a") as file:
+            file.write("x")
+        {statement}
+        return RandomSearch.init(params, population, box, horizon, rng)
+"""
+ROOT = Path(__file__).parents[2]
+Armlab = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """The configuration file of a small experiment: 2 algorithms x 3 repetitions."""
+    path = tmp_path / "small.yaml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.fixture(autouse=True)
+def _found_from_any_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+
+
+@pytest.fixture
+def armlab(tmp_path: Path) -> Armlab:
+    """Runs `armlab` with arguments in an empty folder, in a process of its own."""
+
+    def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
+        command = [sys.executable, "-m", "bench.cli", *map(str, arguments)]
+        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+
+    return run
+
+
+@pytest.fixture
+def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path]:
+    """Installs a third party's algorithm `plug-in`: random search that first does what it is given.
+
+    Returns the file that has one letter a started run.
+    """
+    site, notes = tmp_path / "site", tmp_path / "notes.txt"
+
+    def install(statement: str) -> Path:
+        information = site / "plug_in-1.0.dist-info"
+        information.mkdir(parents=True)
+        (information / "METADATA").write_text("Metadata-Version: 2.1\nName: plug-in\nVersion: 1.0\n")
+        (information / "entry_points.txt").write_text("[armlab.algorithms]\nplug-in = plug_in:PlugIn\n")
+        (site / "plug_in.py").write_text(PLUG_IN.format(notes=str(notes), statement=statement))
+        notes.touch()
+        monkeypatch.syspath_prepend(str(site))
+        monkeypatch.delitem(sys.modules, "plug_in", raising=False)  # that of another test
+        loaded.cache_clear()
+        monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{site}")
+        return notes
+
+    return install

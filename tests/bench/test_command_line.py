@@ -1,0 +1,113 @@
+"""The command line answers at once, runs what it is told and writes whole results."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+
+Armlab = Callable[..., "subprocess.CompletedProcess[str]"]
+COLUMNS = "algorithm,minimum,average,standard_deviation,median,lower_quartile,upper_quartile,feasible_share,evaluations"
+
+
+def test_help_imports_nothing_heavy() -> None:
+    command = [sys.executable, "-X", "importtime", "-m", "bench.cli", "--help"]
+    imported = subprocess.run(command, capture_output=True, text=True, check=True).stderr
+    names = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in imported.splitlines()}
+    assert "click" in names
+    assert not names & {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "joblib", "yaml", "tqdm", "algorithms"}
+
+
+def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, tmp_path: Path) -> None:
+    done = armlab("run", small)
+    assert done.returncode == 0, done.stderr
+    written = sorted(path.name for path in (tmp_path / "results").iterdir())
+    assert written == ["small.csv", "small.md", "small.settings.yaml", "small_times.csv"]
+    assert [Path(line).name for line in done.stdout.splitlines()] == [
+        "small.csv", "small.md", "small_times.csv", "small.settings.yaml",
+    ]  # fmt: skip
+    lines = (tmp_path / "results" / "small.csv").read_text().splitlines()
+    assert lines[0] == COLUMNS
+    assert [line.split(",")[0] for line in lines[1:]] == ["spso", "de"]
+    assert all(line.endswith(",1,25") for line in lines[1:])
+
+
+def test_a_second_run_changes_no_byte_of_the_results(armlab: Armlab, small: Path, tmp_path: Path) -> None:
+    armlab("run", small)
+    first = {path.name: path.read_bytes() for path in (tmp_path / "results").iterdir()}
+    armlab("run", small)
+    assert {path.name: path.read_bytes() for path in (tmp_path / "results").iterdir()} == first
+
+
+def test_fresh_computes_again_and_changes_the_times_alone(armlab: Armlab, small: Path, tmp_path: Path) -> None:
+    armlab("run", small)
+    first = {path.name: path.read_bytes() for path in (tmp_path / "results").iterdir()}
+    armlab("run", small, "--fresh")
+    second = {path.name: path.read_bytes() for path in (tmp_path / "results").iterdir()}
+    assert {name for name in first if first[name] != second[name]} == {"small_times.csv"}
+
+
+def test_dry_run_lists_the_trials_and_runs_nothing(armlab: Armlab, small: Path, tmp_path: Path) -> None:
+    lines = armlab("run", small, "--dry-run", "--workers", "2").stdout.splitlines()
+    assert lines[:3] == [
+        "sphere: spso, swarm size 5, 25 evaluations: 3 repetitions, 0 done",
+        "sphere: de, swarm size 5, 25 evaluations: 3 repetitions, 0 done",
+        "6 trials, 0 done, 6 to do",
+    ]
+    assert lines[3].startswith("about 0.")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["small.yaml"]
+    armlab("run", small)
+    assert "6 trials, 6 done, 0 to do" in armlab("run", small, "--dry-run").stdout
+
+
+def test_a_sweep_has_a_row_for_each_problem_and_swarm_size(armlab: Armlab, small: Path, tmp_path: Path) -> None:
+    problems = "[{preset: sphere, dimension: 3}, {preset: sphere, dimension: 2, label: plane}]"
+    text = small.read_text().replace("{preset: sphere, dimension: 3}", problems)
+    small.write_text(text.replace("swarm_size: 5", "swarm_size: [5, 6]"))
+    assert armlab("run", small).returncode == 0
+    table = pd.read_csv(tmp_path / "results" / "small.csv")
+    assert list(table.columns[:3]) == ["problem", "swarm_size", "algorithm"]
+    assert len(table) == 2 * 2 * 2
+    assert set(table["problem"]) == {"sphere", "plane"}
+    assert list(table["evaluations"].unique()) == [25, 30]
+
+
+def test_a_trial_that_raises_ends_the_run_with_exit_code_1_and_no_table(
+    armlab: Armlab, small: Path, tmp_path: Path, plug_in: Callable[[str], Path]
+) -> None:
+    plug_in("raise ZeroDivisionError('of a third party')")
+    small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
+    done = armlab("run", small, "--workers", "2")
+    assert done.returncode == 1
+    assert "3 trials raised an error and are not kept" in done.stderr
+    assert "ZeroDivisionError: of a third party" in done.stderr
+    assert not (tmp_path / "results" / "small.csv").exists()
+    dry = armlab("run", small, "--dry-run")
+    assert "6 trials, 3 done, 3 to do" in dry.stdout
+    assert dry.returncode == 1
+    assert "plug-in on" in dry.stderr
+
+
+def test_list_names_algorithms_and_problems(armlab: Armlab) -> None:
+    said = armlab("list").stdout
+    assert "mupso, spso, woa, gwo, goa, de" in said
+    assert "sphere" in said
+
+
+def test_check_tells_an_algorithm_that_keeps_its_promises(armlab: Armlab) -> None:
+    assert armlab("check", "de").stdout == "de keeps its promises\n"
+
+
+def test_check_names_the_broken_promise(armlab: Armlab, plug_in: Callable[[str], Path]) -> None:
+    plug_in("population = population[:1]")
+    done = armlab("check", "plug-in")
+    assert done.returncode == 1
+    assert "PlugIn" in done.stderr or "plug-in" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_a_reader_that_goes_away_is_no_traceback(small: Path) -> None:
+    command = f"{sys.executable} -m bench.cli list | true"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    assert done.stderr == ""

@@ -1,0 +1,182 @@
+"""The regression check from its configuration to its verdict, on small problems."""
+
+import json
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bench.execute import run_trial
+from bench.regression.baseline import Baseline, read_baseline, write_baseline
+from bench.regression.command import BASELINE, Regression
+from bench.regression.defects import DEFECTS
+from bench.regression.guard import judge
+from bench.regression.sweep import Cell, Ends, Sweep, ends_of, entries_of, read_sweep
+from problem.errors import InputError
+
+SWEEP = """\
+name: small
+problem: [{preset: sphere, dimension: 3}]
+algorithms: [spso, de]
+swarm_size: 10
+iterations: 15
+repetitions: 12
+seed: 1
+false_alarm_rate: 0.01
+baseline: {repetitions: 40, seed: 2}
+calibration: {repetitions: 60, seed: 3, defect_repetitions: 20, runs: 50}
+"""
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> Path:
+    path = tmp_path / "small.yaml"
+    path.write_text(SWEEP)
+    return path
+
+
+@pytest.fixture
+def sweep(config: Path) -> Sweep:
+    return read_sweep(config)
+
+
+def regression(config: Path) -> Regression:
+    bar = SimpleNamespace(update=lambda trials: None)
+    return Regression(config, config.parent / "results", 1, lambda total, done: nullcontext(bar))
+
+
+def ends(*values: float) -> Ends:
+    return {Cell("paper", "de"): np.array(values)}
+
+
+def both(*values: float) -> Ends:
+    return {Cell("sphere", name): np.array(values) for name in ("spso", "de")}
+
+
+def test_unchanged_code_passes_and_is_identical_to_the_baselines_own_run(config: Path) -> None:
+    check = regression(config)
+    assert check.update_baseline().exit_code == 0
+    written = (config.parent / "results" / BASELINE).read_bytes()
+    report = check.check()
+    assert report.exit_code == 0
+    assert report.lines[-1] == (
+        "passed: 2 cells, 2 statistics each, family-wise false-alarm rate 0.01; "
+        "2 of 2 cells are identical to the baseline's own fixed run."
+    )
+    assert check.check().lines == report.lines
+    check.update_baseline()
+    assert (config.parent / "results" / BASELINE).read_bytes() == written
+
+
+def test_a_defect_fails_the_check_with_its_algorithm_named(config: Path) -> None:
+    check = regression(config)
+    check.update_baseline()
+    with DEFECTS["de-without-selection"].inject():
+        report = check.check()
+    assert report.exit_code == 1
+    (sentence,) = [line for line in report.lines if line.startswith("de on sphere is WORSE: median ")]
+    assert sentence.endswith(" after Holm.")
+    assert not any(line.startswith("spso on") for line in report.lines)
+
+
+def test_calibration_writes_rates_power_and_what_each_defect_printed(config: Path) -> None:
+    check = regression(config)
+    check.update_baseline()
+    report = check.calibrate()
+    figures = json.loads((config.parent / "results/regression_calibration.json").read_text())
+    assert len(report.lines) == 2
+    assert 0 <= figures["false_alarm_rate"]["committed_baseline"] <= 0.2
+    assert set(figures["power"]["+0.15"]) == {"spso on sphere", "de on sphere"}
+    assert figures["defects"]["de-without-selection"]["found_by_fixed_run"]
+    assert figures["defects"]["de-without-selection"]["power"] == 1.0
+    assert not figures["defects"]["sign-of-a-column"]["found_by_fixed_run"]
+    assert "mupso-without-mutation" not in figures["defects"]  # MuPSO takes no part here
+    page = (config.parent / "results/regression_calibration.md").read_text()
+    assert "de on sphere is WORSE: median " in page
+
+
+def test_a_worse_cell_is_told_in_a_sentence_with_its_factor() -> None:
+    baseline = Baseline(ends(*np.linspace(10, 20, 41)), ends(*np.linspace(10, 20, 21)))
+    verdict = judge(baseline, ends(*np.linspace(20, 40, 21)), 0.01)
+    assert not verdict.passed
+    assert verdict.sentences()[0].startswith(
+        "de on paper is WORSE: median 15.00 -> 30.00 (x 2.00), best 10.00 -> 20.00 (x 2.00), p = "
+    )
+    assert verdict.identical == 0
+
+
+def test_a_cell_that_is_too_good_fails_too() -> None:
+    baseline = Baseline(ends(*np.linspace(10, 20, 41)), ends(*np.linspace(10, 20, 21)))
+    assert "de on paper is BETTER than chance allows" in judge(baseline, ends(*np.linspace(5, 10, 21)), 0.01).lines()[2]
+
+
+def test_an_end_that_violates_a_limit_counts_as_infinite_and_others_with_nine_digits(sweep: Sweep) -> None:
+    spso = entries_of(sweep)[:3]
+    outcomes = [replace(run_trial(spso[0].trial), value=1 / 3, violation=broken) for broken in (0.0, 0.2, 0.0)]
+    (values,) = ends_of(zip(spso, outcomes, strict=True)).values()
+    np.testing.assert_array_equal(values, [0.333333333, np.inf, 0.333333333])
+
+
+def test_a_baseline_with_infeasible_ends_survives_the_file(sweep: Sweep, tmp_path: Path) -> None:
+    path = tmp_path / "baseline.json"
+    write_baseline(path, sweep, Baseline(both(3.25, np.inf, 1.5), both(np.inf)))
+    read = read_baseline(path, sweep)
+    np.testing.assert_array_equal(read.ends[Cell("sphere", "de")], [1.5, 3.25, np.inf])
+    np.testing.assert_array_equal(read.fixed_run[Cell("sphere", "de")], [np.inf])
+    assert "provenance" in json.loads(path.read_text())
+
+
+def test_a_baseline_of_other_settings_is_refused_with_the_key(sweep: Sweep, tmp_path: Path) -> None:
+    path = tmp_path / "baseline.json"
+    write_baseline(path, sweep, Baseline(ends(1.0), ends(1.0)))
+    other = sweep.model_copy(update={"swarm_size": (20,)})
+    with pytest.raises(InputError, match="made with another 'swarm_size' than configuration 'small' has: make it anew"):
+        read_baseline(path, other)
+
+
+def test_a_baseline_without_a_cell_is_refused(sweep: Sweep, tmp_path: Path) -> None:
+    path = tmp_path / "baseline.json"
+    write_baseline(path, sweep, Baseline(ends(1.0), ends(1.0)))
+    with pytest.raises(InputError, match=r"'cells' in .* are not those of configuration 'small': make it anew"):
+        read_baseline(path, sweep)
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (None, "there is no baseline"),
+        ("{", "cannot read the baseline"),
+        ("[]", "is not a baseline of schema"),
+        ('{"schema": "regression-baseline/1"}', "'configuration' is missing"),
+    ],
+)
+def test_a_missing_or_broken_baseline_is_one_line(
+    content: str | None, complaint: str, sweep: Sweep, tmp_path: Path
+) -> None:
+    path = tmp_path / "baseline.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=complaint) as caught:
+        read_baseline(path, sweep)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "complaint"),
+    [
+        ("seed: 2", "seed: 1", "should be three different numbers"),
+        ("swarm_size: 10", "swarm_size: [10, 20]", "should have one 'swarm_size' and one budget"),
+        ("repetitions: 60", "repetitions: 50", "'calibration.repetitions' should be enough"),
+        ("defect_repetitions: 20", "defect_repetitions: 11", "'calibration.defect_repetitions' should be enough"),
+        ("false_alarm_rate: 0.01", "false_alarm_rate: 1.0", "'false_alarm_rate'"),
+        ("runs: 50", "run: 50", "did you mean 'runs'"),
+    ],
+)
+def test_a_mistake_in_the_configuration_is_one_line(right: str, wrong: str, complaint: str, config: Path) -> None:
+    config.write_text(SWEEP.replace(right, wrong))
+    with pytest.raises(InputError, match=complaint) as caught:
+        read_sweep(config)
+    assert "\n" not in str(caught.value)
