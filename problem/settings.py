@@ -1,6 +1,7 @@
 """Typed settings: pydantic models whose complaints are one line that a person can act on."""
 
 import difflib
+import re
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
@@ -11,6 +12,7 @@ from problem.errors import InputError
 
 T = TypeVar("T")
 _UNKNOWN_KEY = "unknown_key"
+_KEY = re.compile(r"(?!(float|int|str|bool|none)$)[A-Za-z_]\w*")
 
 
 class Settings(BaseModel):
@@ -80,7 +82,9 @@ def _reason(detail: ErrorDetails) -> str:
 
 
 def _path(location: tuple[int | str, ...]) -> str:
-    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in location)
+    """Keys and places; pydantic adds the tried members of a union, which are no keys of the file."""
+    places = (part for part in location if isinstance(part, int) or _KEY.fullmatch(part))
+    parts = (f"[{part}]" if isinstance(part, int) else f".{part}" for part in places)
     return "".join(parts).removeprefix(".")
 
 
