@@ -21,6 +21,7 @@ _COMMANDS = {
     "list": "bench.commands.names:list_names",
     "base": "bench.commands.names:base",
     "check": "bench.commands.names:check",
+    "recording": "recordings.cli:recording",
     "speed": "bench.commands.speed:speed",
     "regression": "bench.commands.regression:regression",
 }

@@ -1,0 +1,1 @@
+"""Readers of other formats: each gives the columns of one file as a table."""

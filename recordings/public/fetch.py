@@ -1,0 +1,54 @@
+"""Fetches the raw files of a public recording, checks them, and writes them as a recording folder."""
+
+import hashlib
+import os
+from pathlib import Path
+
+from problem.errors import InputError
+from problem.settings import nearest
+from recordings.public.convert import CONVERTERS
+from recordings.public.registry import PUBLIC, PublicRecording, RemoteFile
+from recordings.write import write_recording
+
+LOCAL_COPIES = "ARMLAB_RECORDINGS"
+
+
+def fetch_recording(name: str, folder: Path) -> Path:
+    """Writes a public recording into a new folder and returns its path.
+
+    The raw files come from the folder that the environment variable ARMLAB_RECORDINGS names, else from their
+    public address into the user's cache; a file with another SHA-256 is refused. Raises InputError for an
+    unknown name, a file that cannot be had, and a folder that is not empty.
+    """
+    if name not in PUBLIC:
+        raise InputError(f"unknown recording '{name}': {nearest(name, list(PUBLIC))}")
+    files = [raw_file(PUBLIC[name], file) for file in PUBLIC[name].files]
+    return write_recording(CONVERTERS[name](*files), folder)
+
+
+def raw_file(recording: PublicRecording, file: RemoteFile) -> Path:
+    """Path of one raw file whose content is as registered; from the local copies, else downloaded."""
+    local = os.environ.get(LOCAL_COPIES)
+    if not local:
+        return _downloaded(recording, file)
+    path = Path(local) / recording.folder / file.name
+    try:
+        found = hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"cannot read {path} ({LOCAL_COPIES}): {error.strerror}") from None
+    if found != file.sha256:
+        raise InputError(f"{path} is not the registered file: its SHA-256 is {found}, not {file.sha256}")
+    return path
+
+
+def _downloaded(recording: PublicRecording, file: RemoteFile) -> Path:
+    try:
+        import pooch
+    except ImportError:
+        raise InputError("to download recordings install pooch: pip install 'armlab[recordings]'") from None
+    cache = Path(pooch.os_cache("armlab")) / recording.folder
+    try:
+        return Path(pooch.retrieve(file.address, f"sha256:{file.sha256}", file.name, cache))
+    except (OSError, ValueError) as error:  # no connection; another content than registered
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"cannot fetch {file.address}: {reason}; or set {LOCAL_COPIES} to a local copy") from None

@@ -1,0 +1,159 @@
+"""Public recordings: the right raw files, and conversions that the equations of motion confirm.
+
+The local copies are those that ARMLAB_RECORDINGS names; without them these tests have nothing to look at.
+"""
+
+import json
+import os
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_allclose
+from refusals import refusal
+
+from problem.arm import Arm, link_poses
+from problem.base_parameters import base_parameters
+from problem.regressor import observation_matrix
+from problem.robot_file import load_arm
+from problem.transforms import Array
+from problem.urdf import read_urdf
+from recordings.cli import PUBLIC_NAMES
+from recordings.differentiate import Signals, differentiate
+from recordings.load import load_recording
+from recordings.public.fetch import LOCAL_COPIES, fetch_recording, raw_file
+from recordings.public.registry import PUBLIC
+from recordings.recording import Recording
+from recordings.recording_file import FILE_NAME
+
+NEEDS_COPIES = pytest.mark.skipif(LOCAL_COPIES not in os.environ, reason=f"{LOCAL_COPIES} names no local copies")
+FIGURES = {  # percent of the torque, all joints: first run / the last one, rigid and with friction, rounded up
+    "emps": ((71, 70), (4.5, 7.0)),
+    "staubli-tx40": ((79, 82), (10.5, 18.0)),
+    "unisa-ur10": ((43, 70), (9.0, 15.0)),
+    "unisa-panda": ((4.5, 5.5), (3.0, 4.0)),
+    "kuka-kr300": ((45, 65), (12.0, 47.0)),
+}
+
+
+@pytest.fixture(params=PUBLIC_NAMES)
+def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Recording:
+    return load_recording(fetch_recording(request.param, tmp_path / request.param))
+
+
+def rows(arm: Arm, signals: Signals, friction: bool) -> tuple[Array, Array]:
+    """Filtered columns and torques, all joints below each other."""
+    motion = signals.motion
+    columns = [observation_matrix(arm, motion)[:, base_parameters(arm).columns]]
+    own = (motion.velocity, np.sign(motion.velocity), motion.acceleration, np.ones_like(motion.velocity))
+    for signal in own if friction else ():
+        columns.append((signal[:, :, None] * np.eye(len(arm))).reshape(-1, len(arm)))
+    return signals.columns(np.hstack(columns)), signals.torque.ravel()
+
+
+def percent(recording: Recording, friction: bool) -> list[float]:
+    """Error of plain least squares, fitted on the runs that identify, on the first and the last run."""
+    signals = [differentiate(run, step=max(run.samples // 4000, 1)) for run in recording.runs]
+    pairs = [rows(recording.arm, each, friction) for each in signals]
+    matrix, torque = pairs[0]
+    lengths = np.linalg.norm(matrix, axis=0)
+    fitted = np.linalg.lstsq(matrix / lengths, torque, rcond=1e-9)[0] / lengths
+    errors = [100 * np.linalg.norm(y - X @ fitted) / np.linalg.norm(y) for X, y in pairs]
+    return [errors[0], errors[-1]]
+
+
+@NEEDS_COPIES
+def test_the_equations_of_motion_explain_the_converted_torques(recording: Recording) -> None:
+    """A wrong gear, sign, unit or D-H row doubles these errors."""
+    for limits, friction in zip(FIGURES[recording.arm.name], (False, True), strict=True):
+        for error, limit in zip(percent(recording, friction), limits, strict=True):
+            assert error < limit
+
+
+@NEEDS_COPIES
+def test_runs_that_validate_take_no_part_in_identification(recording: Recording) -> None:
+    identify, validate = recording.with_role("identify"), recording.with_role("validate")
+    assert len(identify) == 1
+    assert len(validate) == len(recording.runs) - 1 >= 1
+    assert recording.robot == recording.arm.name
+
+
+@NEEDS_COPIES
+def test_fetched_recordings_follow_the_schema(recording: Recording) -> None:
+    schema = json.loads((Path(__file__).parents[1] / "schemas" / "recording.schema.json").read_text())
+    jsonschema.validate(yaml.safe_load((recording.folder / FILE_NAME).read_text()), schema)
+
+
+@NEEDS_COPIES
+def test_axes_5_and_6_of_the_tx40_are_coupled_as_published(tmp_path: Path) -> None:
+    transmission = load_recording(fetch_recording("staubli-tx40", tmp_path / "new")).transmission
+    gears = np.diag([32.0, 32, 45, -48, 45, 32])
+    gears[5, 4] = 32
+    assert_allclose(transmission.position @ gears, np.eye(6), atol=1e-12)
+    assert_allclose(transmission.offset, [0, -np.pi / 2, np.pi / 2, 0, 0, 0])
+    assert transmission.torque[4, 5] == 32
+    assert_allclose(np.diag(transmission.torque), np.diag(gears))
+
+
+@NEEDS_COPIES
+def test_the_tx40_is_that_of_its_urdf() -> None:
+    published = read_urdf(Path(os.environ[LOCAL_COPIES]) / "staubli_tx40" / "tx40_mdh_modified.urdf")
+    built_in = load_arm("staubli-tx40")
+    for position in np.random.default_rng(0).uniform(-2, 2, (5, 6)):
+        for one, other in zip(link_poses(published, position), link_poses(built_in, position), strict=True):
+            assert_allclose(one, other, atol=1e-10)
+    assert_allclose(built_in.parameters, published.parameters, atol=1e-12)
+    assert [joint.limits for joint in built_in.joints] == [joint.limits for joint in published.joints]
+
+
+@NEEDS_COPIES
+def test_a_raw_file_with_another_content_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LOCAL_COPIES, str(tmp_path))
+    (tmp_path / "emps").mkdir()
+    (tmp_path / "emps" / "DATA_EMPS.mat").write_bytes(b"something else")
+    assert "is not the registered file" in refusal(raw_file, PUBLIC["emps"], PUBLIC["emps"].files[0])
+
+
+def test_a_missing_local_copy_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(LOCAL_COPIES, str(tmp_path))
+    assert "cannot read" in refusal(fetch_recording, "emps", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_download_without_connection_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pooch = pytest.importorskip("pooch")
+    monkeypatch.delenv(LOCAL_COPIES, raising=False)
+
+    def no_connection(*_: object) -> None:
+        raise OSError("name or service not known")
+
+    monkeypatch.setattr(pooch, "retrieve", no_connection)
+    message = refusal(fetch_recording, "emps", tmp_path / "new")
+    assert "cannot fetch https://" in message
+    assert LOCAL_COPIES in message
+
+
+def test_a_download_is_checked_against_the_registered_hash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pooch = pytest.importorskip("pooch")
+    monkeypatch.delenv(LOCAL_COPIES, raising=False)
+    asked = []
+
+    def retrieve(address: str, known_hash: str, name: str, cache: Path) -> str:
+        asked.append((address, known_hash))
+        raise ValueError(f"SHA256 hash of downloaded file ({name}) does not match the known hash")
+
+    monkeypatch.setattr(pooch, "retrieve", retrieve)
+    assert "does not match" in refusal(fetch_recording, "unisa-panda", tmp_path / "new")
+    (file,) = PUBLIC["unisa-panda"].files
+    assert asked == [(file.address, f"sha256:{file.sha256}")]
+
+
+def test_every_public_recording_has_a_built_in_robot_and_a_command() -> None:
+    assert tuple(PUBLIC) == PUBLIC_NAMES
+    assert [load_arm(name).name for name in PUBLIC] == list(PUBLIC)
+
+
+def test_an_unknown_public_recording_names_the_nearest(tmp_path: Path) -> None:
+    assert "did you mean 'kuka-kr300'?" in refusal(fetch_recording, "kuka-kr30", tmp_path)

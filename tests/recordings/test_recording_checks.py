@@ -1,0 +1,113 @@
+"""Suspicions that are reported and not repaired, and silence about sound recordings."""
+
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, frame
+
+from problem.robot_file import load_arm
+from recordings.check import check_recording
+from recordings.checks.channels import channel_findings
+from recordings.checks.fit import fit_findings
+from recordings.load import load_recording
+from recordings.run import Run
+
+
+def run_of(table: pd.DataFrame) -> Run:
+    columns = (table[names].to_numpy() for names in (POSITION, TORQUE))
+    velocity = table[["v1", "v2", "v3"]].to_numpy() if "v1" in table else None
+    return Run("run.csv", "identify", table["t"].to_numpy(), *columns, velocity=velocity)
+
+
+def said(run: Run) -> list[tuple[str, int | None]]:
+    return [(finding.kind, finding.joint) for finding in channel_findings(run, ARM)]
+
+
+def with_velocity() -> pd.DataFrame:
+    table = frame()
+    table[["v1", "v2", "v3"]] = np.gradient(table[POSITION].to_numpy(), table["t"].to_numpy(), axis=0)
+    return table
+
+
+def test_a_sound_run_gives_no_suspicion() -> None:
+    run = run_of(with_velocity())
+    assert said(run) == []
+    assert fit_findings([run, run_of(frame(1))], ARM) == ()
+
+
+def test_a_dead_torque_channel_is_named() -> None:
+    table = frame()
+    table["tau2"] = 0.0
+    assert said(run_of(table)) == [("dead_channel", 2)]
+
+
+def test_a_joint_that_stands_still_is_named() -> None:
+    table = frame()
+    table["q3"] = 0.25
+    assert said(run_of(table)) == [("still_joint", 3)]
+
+
+def test_a_torque_that_freezes_while_the_joint_moves_is_named() -> None:
+    table = frame()
+    table.loc[400:600, "tau1"] = table["tau1"][400]
+    assert said(run_of(table)) == [("frozen_channel", 1)]
+
+
+def test_positions_in_degrees_that_were_called_radians_pass_the_limits() -> None:
+    table = frame()
+    table["q1"] = np.rad2deg(table["q1"])
+    assert said(run_of(table)) == [("beyond_limits", 1)]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"v1": "v2", "v2": "v1"}, "follows the position of joint 2"),
+        ({"v1": -1.0}, "opposite sign"),
+        ({"v1": 57.3}, "57.3 times"),
+    ],
+)
+def test_a_velocity_channel_at_odds_with_its_position_is_named(change: dict, words: str) -> None:
+    table = with_velocity()
+    for name, source in change.items():
+        original = with_velocity()
+        table[name] = original[source] if isinstance(source, str) else source * original[name]
+    assert words in channel_findings(run_of(table), ARM)[0].text
+
+
+@pytest.mark.parametrize("signal", ["torque", "position"])
+@pytest.mark.parametrize("pair", list(combinations(range(3), 2)))
+def test_swapped_channels_are_named(signal: str, pair: tuple[int, int]) -> None:
+    order = np.arange(3)
+    order[list(pair)] = pair[::-1]
+    runs = [run_of(frame(seed)) for seed in range(2)]
+    swapped = [replace(run, **{signal: getattr(run, signal)[:, order]}) for run in runs]
+    (finding,) = fit_findings(swapped, ARM)
+    assert finding.kind == "swapped_channels"
+    assert f"channels {pair[0] + 1} and {pair[1] + 1}" in finding.text
+    assert signal in finding.text
+
+
+def test_links_of_another_robot_are_reported() -> None:
+    other = load_arm("kuka-kr300").first(3)
+    findings = fit_findings([run_of(frame(seed)) for seed in range(2)], other)
+    assert [finding.kind for finding in findings] == ["another_arm"]
+
+
+def test_a_refused_run_is_reported_beside_the_others(tmp_path: Path) -> None:
+    check = check_recording(folder_with(tmp_path, "t,q1\n"))
+    assert [file for file, _ in check.refused] == ["run.csv"]
+    assert [run.file for run in check.recording.runs] == ["check.csv"]
+    assert check.lines[0].startswith("run.csv: refused: ")
+
+
+def test_checking_changes_no_number(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, frame(), SETTINGS)
+    before = load_recording(folder).runs[0]
+    after = check_recording(folder).recording.runs[0]
+    assert np.array_equal(before.torque, after.torque)
+    assert np.array_equal(before.position, after.position)

@@ -1,0 +1,202 @@
+"""Other formats: what is in them arrives unchanged, under names that a person can choose from."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from recording_folders import POSITION, TORQUE, frame
+from refusals import refusal
+from scipy.io import savemat
+
+from recordings.imports.command import import_files
+from recordings.imports.matlab import read_mat
+from recordings.imports.ros import read_bag
+from recordings.imports.text import read_odd_csv
+from recordings.load import load_recording
+
+OPTIONS = {
+    "robot": "irb120-arm",
+    "time": "t",
+    "position": "q1,q2,q3",
+    "torque": "tau?",
+    "units": ("time=s", "position=rad", "torque=Nm"),
+    "gains": None,
+    "validate": (),
+    "separator": None,
+    "decimal": None,
+    "topic": None,
+}
+
+
+def odd_text(separator: str = ",", decimal: str = ".", header: str | None = "t q1 q2 q3 tau1 tau2 tau3") -> str:
+    table = frame()
+    lines = [separator.join(f"{value:.9g}".replace(".", decimal) for value in row) for row in table.to_numpy()]
+    top = [header.replace(" ", separator)] if header else []
+    return "\n".join([*top, *lines, ""])
+
+
+@pytest.mark.parametrize(
+    ("separator", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), (" ", "."), ("  ", ",")]
+)
+@pytest.mark.parametrize("header", [None, "t q1 q2 q3 tau1 tau2 tau3"])
+def test_separator_and_decimal_sign_are_found_in_the_file(
+    tmp_path: Path, separator: str, decimal: str, header: str | None
+) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text(odd_text(separator, decimal, header))
+    table = read_odd_csv(path).table
+    assert table.names == (tuple(header.split()) if header else tuple(f"c{n}" for n in range(1, 8)))
+    assert_allclose(table.values, frame(), rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "top",
+    [
+        "t;q1;q2;q3;tau1;tau2;tau3\n[s];[deg];[deg];[deg];[Nm];[Nm];[Nm]",
+        "t [s];q1 [deg];q2 [deg];q3 [deg];tau1 (Nm);tau2 (Nm);tau3 (Nm)",
+        "% logged by the controller\n# t [s];q1 [deg];q2 [deg];q3 [deg];tau1 [Nm];tau2 [Nm];tau3 [Nm]",
+    ],
+)
+def test_units_are_read_from_the_header_or_the_row_below(tmp_path: Path, top: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(top + "\n" + odd_text(";", ",", None))
+    import_files([path], tmp_path / "new", {**OPTIONS, "units": ()}, None)
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_allclose(run.position, np.deg2rad(frame()[POSITION]), rtol=1e-8)
+    assert_allclose(run.torque, frame()[TORQUE], rtol=1e-8)
+
+
+def test_numbers_in_a_comment_are_no_measurement(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("# 1,2,3,4,5,6,7\n" + odd_text())
+    assert len(read_odd_csv(path).table.values) == len(frame())
+
+
+def test_a_cut_last_row_of_an_odd_file_is_left_out_and_said_so(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text() + "9.9,0.1")
+    lines = import_files([path], tmp_path / "new", OPTIONS, None)
+    assert "the last row (line 1602) has 2 cells of 7; left out" in lines[0]
+
+
+def test_matlab_matrices_become_columns_whichever_way_they_lie(tmp_path: Path) -> None:
+    table = frame()
+    content = {
+        "rec": {"q": table[POSITION].to_numpy().T, "tau": table[TORQUE].to_numpy()},
+        "t": table["t"].to_numpy()[:, None],
+        "gain": 3.0,
+        "label": "run A",
+    }
+    path = tmp_path / "log.mat"
+    savemat(path, content)
+    found = read_mat(path)
+    assert set(found.names) == {"t", *(f"rec.{name}_{n}" for name in ("q", "tau") for n in (1, 2, 3))}
+    options = {**OPTIONS, "position": "rec.q_*", "torque": "rec.tau_*"}
+    import_files([path], tmp_path / "new", options, None)
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_array_equal(run.position, table[POSITION])
+    assert_array_equal(run.torque, table[TORQUE])
+
+
+def write_bag(path: Path, storage: str) -> Path:
+    """A ROS 2 bag with joint states at 200 Hz; returns the file that holds the messages."""
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    types = store.types
+    plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
+    table = frame()
+    with Writer(path, version=9, storage_plugin=plugin) as writer:
+        link = writer.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
+        for row in table.to_numpy():
+            nanoseconds = 1_700_000_000 * 10**9 + round(row[0] * 1e9)
+            stamp = types["builtin_interfaces/msg/Time"](*divmod(nanoseconds, 10**9))
+            header = types["std_msgs/msg/Header"](stamp, "")
+            order = [2, 0, 1]  # a driver lists the joints as it likes
+            message = types["sensor_msgs/msg/JointState"](
+                header, [f"j{n + 1}" for n in order], row[1:4][order], np.array([]), row[4:7][order]
+            )
+            writer.write(link, nanoseconds, store.serialize_cdr(message, link.msgtype))
+    return next(file for file in path.iterdir() if file.suffix in (".db3", ".mcap"))
+
+
+@pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_bag_of_joint_states_arrives_joint_by_joint(tmp_path: Path, storage: str, whole: bool) -> None:
+    file = write_bag(tmp_path / "bag", storage)
+    options = {**OPTIONS, "position": "position_j1,position_j2,position_j3", "units": ()}
+    options["torque"] = "effort_j1,effort_j2,effort_j3"
+    import_files([file.parent if whole else file], tmp_path / "new", options, None)
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_array_equal(run.position, frame()[POSITION])
+    assert_array_equal(run.torque, frame()[TORQUE])
+    assert_allclose(run.time, frame()["t"], atol=1e-9)
+
+
+@pytest.mark.parametrize("suffix", [".db3", ".mcap", ".bag"])
+@pytest.mark.parametrize(
+    "content", [b"", b"garbage" * 50, b"\x89MCAP0\r\n" + b"x" * 99, b"SQLite format 3\0" + b"y" * 99]
+)
+def test_what_is_no_bag_is_refused_in_one_line(tmp_path: Path, suffix: str, content: bytes) -> None:
+    pytest.importorskip("rosbags")
+    path = tmp_path / f"log{suffix}"
+    path.write_bytes(content)
+    assert "cannot read" in refusal(read_bag, path)
+
+
+def test_a_truncated_mcap_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    file = write_bag(tmp_path / "bag", "mcap")
+    file.write_bytes(file.read_bytes()[:5000])
+    assert "cannot read" in refusal(read_bag, file)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"robot": None}, "which robot? Give --robot"),
+        ({"robot": "irb130"}, "unknown robot"),
+        ({"position": None}, "which columns are position? Give --position; the file holds t, q1"),
+        ({"position": "q1,q2,q4"}, "no column 'q4' for position: known: t, q1, q2"),
+        ({"units": ("time=s", "torque=Nm")}, "no unit is known for position: give --unit position=UNIT"),
+        ({"units": ("position=degre",)}, "unknown unit 'degre' of position: did you mean 'deg'?"),
+        ({"units": ("deg",)}, "should be SIGNAL=UNIT"),
+        ({"gains": "1,x"}, "--gains 1,x should be numbers"),
+        ({"validate": ("b.csv",)}, "--validate b.csv is none of the imported files"),
+        ({"separator": ";", "decimal": ","}, "holds no rows of numbers"),
+    ],
+)
+def test_each_mistake_in_the_options_is_told_in_one_line(tmp_path: Path, change: dict, message: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    assert message in refusal(import_files, [path], tmp_path / "new", {**OPTIONS, **change}, None)
+    assert not (tmp_path / "new").exists()
+
+
+def test_what_is_missing_is_asked_for_with_a_guess_from_the_names(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    asked: list[tuple[str, str | None]] = []
+
+    def ask(question: str, offer: str | None) -> str:
+        asked.append((question.split(" (")[0].split(",")[0], offer))
+        return offer or "irb120-arm"
+
+    nothing = {**dict.fromkeys(OPTIONS), "units": (), "validate": ()}
+    import_files([path], tmp_path / "new", nothing, ask)
+    assert [offer for _, offer in asked] == [None, "t", "q1,q2,q3", "tau1,tau2,tau3", "s", "rad", "N.m"]
+    assert_allclose(load_recording(tmp_path / "new").runs[0].position, frame()[POSITION], rtol=1e-8)
+
+
+def test_a_folder_that_holds_something_is_never_written_over(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    assert "choose a new folder" in refusal(import_files, [path], tmp_path, OPTIONS, None)
+
+
+@pytest.mark.parametrize("name", ["log.xlsx", "absent.csv"])
+def test_a_file_of_no_known_format_is_refused(tmp_path: Path, name: str) -> None:
+    (tmp_path / "log.xlsx").write_text("x")
+    assert name in refusal(import_files, [tmp_path / name], tmp_path / "new", OPTIONS, None)

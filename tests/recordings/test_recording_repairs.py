@@ -1,0 +1,172 @@
+"""Broken data: repaired only where that is safe, and then said so."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from recording_folders import POSITION, RATE_HZ, SETTINGS, folder_with, frame, motion_at
+from refusals import refusal
+
+from recordings.load import load_recording
+from recordings.run import Run
+
+
+def loaded(folder: Path, table: pd.DataFrame | str) -> tuple[Run, ...]:
+    runs = load_recording(folder_with(folder, table)).runs
+    return tuple(run for run in runs if run.file == "run.csv")
+
+
+def kinds(run: Run) -> list[tuple[str, str]]:
+    return [(finding.kind, finding.severity) for finding in run.findings]
+
+
+@pytest.mark.parametrize("cut", ["", "0.1,0.2", "0.1,0.2,0.3,0.4,0.5,0.6,0."])
+def test_a_last_row_that_was_cut_off_is_left_out(tmp_path: Path, cut: str) -> None:
+    text = frame().to_csv(index=False) + cut
+    (run,) = loaded(tmp_path, text)
+    assert run.samples == len(frame())
+    assert kinds(run) == ([("broken_last_row", "repaired")] if cut else [])
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "1e300", "ERR", "", "-1e251"])
+def test_a_row_with_a_value_that_is_no_measurement_is_left_out_and_named(tmp_path: Path, value: str) -> None:
+    lines = frame().to_csv(index=False).splitlines()
+    cells = lines[400].split(",")
+    lines[400] = ",".join([*cells[:2], value, *cells[3:]])
+    (run,) = loaded(tmp_path, "\n".join(lines) + "\n")
+    assert ("bad_value", "repaired") in kinds(run)
+    assert "line 401: q2" in run.findings[0].text
+    assert run.samples == len(frame()) - 1
+    assert frame()["t"][399] not in run.time
+
+
+def test_too_many_bad_rows_are_refused_rather_than_dropped(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[::10, "tau2"] = np.nan
+    assert "too many to repair" in refusal(loaded, tmp_path, table)
+
+
+def test_rows_in_the_wrong_order_are_sorted_by_their_stamps(tmp_path: Path) -> None:
+    table = frame()
+    order = np.arange(len(table))
+    order[[300, 301]] = 301, 300
+    (run,) = loaded(tmp_path, table.iloc[order])
+    assert_array_equal(run.position, table[POSITION])
+    assert kinds(run) == [("time_order", "repaired")]
+
+
+def test_a_row_written_twice_counts_once(tmp_path: Path) -> None:
+    table = frame()
+    (run,) = loaded(tmp_path, table.iloc[np.sort(np.append(np.arange(len(table)), [10, 500]))])
+    assert run.samples == len(table)
+    assert kinds(run) == [("duplicate_row", "repaired")]
+
+
+def test_single_lost_samples_are_reported_and_the_others_keep_their_stamps(tmp_path: Path) -> None:
+    table = frame().drop(index=[100, 700, 701])
+    (run,) = loaded(tmp_path, table)
+    assert kinds(run) == [("time_gap", "repaired")]
+    assert "3 single samples are missing" in run.findings[0].text
+    assert_allclose(run.time, table["t"], atol=1e-9)
+
+
+def test_a_run_is_cut_at_a_long_gap_so_that_no_filter_runs_across_it(tmp_path: Path) -> None:
+    table = frame().drop(index=range(600, 700))
+    first, second = loaded(tmp_path, table)
+    assert (first.samples, second.samples) == (600, len(frame()) - 700)
+    assert (first.name, second.name) == ("run.csv part 1", "run.csv part 2")
+    assert kinds(first) == kinds(second) == [("time_gap", "repaired")]
+
+
+def test_a_gap_hidden_by_a_much_longer_one_is_found_too(tmp_path: Path) -> None:
+    table = frame().drop(index=range(400, 420))
+    table.loc[1000:, "t"] += 1e4
+    assert len(loaded(tmp_path, table)) == 3
+
+
+def test_a_run_is_cut_where_the_clock_steps_back(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[800:, "t"] -= 1.0
+    first, second = loaded(tmp_path, table)
+    assert (first.samples, second.samples) == (800, len(table) - 800)
+    assert kinds(first) == [("time_backwards", "repaired")]
+
+
+def test_stamps_that_were_only_written_late_are_made_even(tmp_path: Path) -> None:
+    table = frame()
+    table["t"] += np.random.default_rng(2).uniform(-0.3, 0.3, len(table)) / RATE_HZ
+    (run,) = loaded(tmp_path, table)
+    assert run.even
+    assert kinds(run) == [("time_jitter", "repaired")]
+    assert np.abs(run.time - frame()["t"]).max() < 0.05 / RATE_HZ
+    assert_array_equal(run.position, table[POSITION])
+
+
+def test_samples_that_were_really_taken_at_uneven_times_keep_their_stamps(tmp_path: Path) -> None:
+    time = frame()["t"].to_numpy() + np.random.default_rng(2).uniform(-0.3, 0.3, len(frame())) / RATE_HZ
+    table = frame()
+    table["t"], table[POSITION] = time, motion_at(time).position
+    (run,) = loaded(tmp_path, table)
+    assert_array_equal(run.time, time)
+    assert kinds(run) == [("time_jitter", "warning")]
+
+
+def test_stamps_of_a_clock_that_is_coarser_than_the_sampling_are_made_even(tmp_path: Path) -> None:
+    table = frame()
+    table["t"] = np.floor(table["t"] * 100) / 100
+    (run,) = loaded(tmp_path, table)
+    assert run.even
+    assert run.rate_hz == pytest.approx(RATE_HZ, rel=1e-4)
+    assert run.samples == len(table)
+
+
+def test_different_values_with_one_stamp_are_refused_where_no_even_grid_explains_them(tmp_path: Path) -> None:
+    table = frame()
+    rng = np.random.default_rng(0)
+    table["t"] = np.cumsum(rng.uniform(0.2, 1.8, len(table))) / RATE_HZ
+    table[POSITION] = motion_at(table["t"].to_numpy()).position
+    table.loc[500, "t"] = table["t"][499]
+    table.loc[500, "q1"] += 1.0
+    assert "which one is right?" in refusal(loaded, tmp_path, table)
+
+
+def test_a_wrapped_encoder_is_unwrapped(tmp_path: Path) -> None:
+    table = frame()
+    table["q2"] = (6 * table["q2"] + np.pi) % (2 * np.pi) - np.pi
+    settings = {"transmission": {"position": [[1, 0, 0], [0, 1 / 6, 0], [0, 0, 1]]}}
+    run = load_recording(folder_with(tmp_path, table, settings)).runs[0]
+    difference = run.position[:, 1] - frame()["q2"]
+    assert_allclose(difference, difference[0], atol=1e-9)
+    assert kinds(run) == [("wrapped_encoder", "repaired")]
+
+
+def test_a_jump_that_is_no_whole_turn_is_left_alone(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[800:, "q2"] += 5.0
+    (run,) = loaded(tmp_path, table)
+    assert_array_equal(run.position, table[POSITION])
+
+
+def test_missing_cells_of_an_optional_signal_are_bridged_and_said_so(tmp_path: Path) -> None:
+    table = frame()
+    table["temp"] = np.linspace(20, 30, len(table))
+    table.loc[table.index % 50 != 0, "temp"] = np.nan
+    change = {"columns": {**SETTINGS["columns"], "temperature": ["temp"]}, "runs": SETTINGS["runs"][:1]}
+    (run,) = load_recording(folder_with(tmp_path, table, change)).runs
+    assert run.temperature is not None
+    assert_allclose(run.temperature[:1500, 0], np.linspace(20, 30, len(table))[:1500])
+    assert ("bad_value", "repaired") in kinds(run)
+
+
+def test_runs_of_different_rate_are_each_kept_at_their_own(tmp_path: Path) -> None:
+    recording = load_recording(folder_with(tmp_path, frame().iloc[::2]))
+    assert [round(run.rate_hz) for run in recording.runs] == [100, 200]
+    assert [finding.kind for finding in recording.findings] == ["different_rates"]
+
+
+def test_the_time_column_decides_against_the_nominal_rate(tmp_path: Path) -> None:
+    run = load_recording(folder_with(tmp_path, frame(), {"sample_rate_hz": 500.0})).runs[0]
+    assert run.rate_hz == pytest.approx(RATE_HZ)
+    assert kinds(run) == [("rate", "warning")]
