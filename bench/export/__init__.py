@@ -1,0 +1,1 @@
+"""A recorded trajectory in the forms that robot controllers read."""

@@ -1,0 +1,181 @@
+"""The records hold what they say, are only ever improved, and every table can ask how far it is from them."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from refusals import refusal
+
+from bench.best_known.command import improve_best_known, point_of
+from bench.best_known.config import build_excitation, read_plan
+from bench.best_known.descent import MARGIN, descend, judge, motion_of
+from bench.best_known.gap import best_known, gap_to_best_known
+from bench.best_known.record import FILE, Record, read_records, write_records
+from bench.best_known.rows import Rows
+from bench.best_known.smooth import smooth_log_condition
+from problem.excitation_problem import ExcitationProblem
+from problem.registry import ProblemSettings, parse_problem
+
+ROOT = Path(__file__).parents[2]
+RECORDS = read_records(ROOT / "results" / FILE)
+TINY = {"preset": "joint-fourier", "joints": 2, "harmonics": 2, "samples": 30}
+PLAN = f"name: tiny\nseed: 3\nproblems:\n  tiny: {json.dumps(TINY)}\n"
+
+
+def settings_of(**settings: object) -> ProblemSettings:
+    return parse_problem(settings, "test")
+
+
+def tiny() -> ExcitationProblem:
+    return build_excitation(settings_of(**TINY), "tiny")
+
+
+@pytest.fixture
+def plan(tmp_path: Path) -> Callable[[str], Path]:
+    def write(text: str) -> Path:
+        path = tmp_path / "plan.yaml"
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_a_record_is_reproduced_and_breaks_no_limit(name: str) -> None:
+    record = RECORDS[name]
+    problem = build_excitation(parse_problem(record.settings, name), name)
+    end = judge(problem, point_of(record))
+    assert end.value == pytest.approx(record.value, rel=1e-9)
+    assert end.violation == 0.0
+    assert tuple(record.coefficients) == problem.trajectory.names
+    assert np.all((problem.lower <= end.point) & (end.point <= problem.upper))
+
+
+def test_every_problem_of_the_plan_has_a_record_of_its_present_settings() -> None:
+    plan = read_plan(ROOT / "configs" / "best_known.yaml")
+    known = best_known(ROOT / "results" / FILE)
+    assert set(RECORDS) == set(plan.problems)
+    for name in plan.problems:
+        assert gap_to_best_known(plan.settings(name), RECORDS[name].value, known) == 0.0
+
+
+def test_no_start_ended_below_the_record() -> None:
+    for record in RECORDS.values():
+        ends = [end for values in record.ends.values() for end in values if end is not None]
+        assert min(ends) == pytest.approx(record.value, rel=1e-5)
+
+
+def test_a_search_goes_on_where_it_stopped_and_never_gets_worse(tmp_path: Path, plan: Callable[[str], Path]) -> None:
+    config = plan(PLAN)
+    values = []
+    for starts in (1, 2, 3):
+        assert len(list(improve_best_known(tmp_path, 0.0, config=config))) == 1
+        record = read_records(tmp_path / FILE)["tiny"]
+        assert record.starts == starts
+        values.append(record.value)
+    assert values == sorted(values, reverse=True)
+
+
+def test_a_problem_that_starts_from_another_record_goes_back_to_it_every_other_time(
+    tmp_path: Path, plan: Callable[[str], Path]
+) -> None:
+    fine = json.dumps(TINY | {"samples": 90})
+    config = plan(PLAN + f"  fine: {fine}\nstart_from: {{fine: tiny}}\n")
+    for _ in range(3):
+        list(improve_best_known(tmp_path, 0.0, config=config))
+    records = read_records(tmp_path / FILE)
+    assert {method: len(ends) for method, ends in records["fine"].ends.items()} == {"from tiny": 2, "kick": 1}
+    assert records["fine"].value == pytest.approx(records["tiny"].value, rel=0.3)
+
+
+def test_a_better_record_is_left_alone(tmp_path: Path, plan: Callable[[str], Path]) -> None:
+    config = plan(PLAN)
+    list(improve_best_known(tmp_path, 0.0, config=config))
+    found = read_records(tmp_path / FILE)["tiny"]
+    write_records(tmp_path / FILE, {"tiny": found.model_copy(update={"value": 1.0})})
+    list(improve_best_known(tmp_path, 0.0, config=config))
+    after = read_records(tmp_path / FILE)["tiny"]
+    assert (after.value, after.coefficients, after.start) == (1.0, found.coefficients, found.start)
+    assert (after.starts, after.agreeing(0.01)) == (2, (0, 2))
+
+
+def test_a_descent_ends_within_all_limits_and_below_its_start() -> None:
+    problem = tiny()
+    start = (problem.lower + problem.upper) / 2 + 0.1 * (problem.upper - problem.lower)
+    before, after = judge(problem, start), descend(problem, start)
+    assert after.feasible
+    assert after.value < 0.5 * before.value
+    assert judge(problem, after.point).value == after.value
+
+
+def test_a_random_step_from_the_end_of_a_descent_is_no_better() -> None:
+    problem = tiny()
+    end = descend(problem, problem.lower + 0.6 * (problem.upper - problem.lower))
+    steps = np.random.default_rng(0).normal(scale=1e-4, size=(300, len(end.point)))
+    near = problem.evaluate(np.clip(end.point + steps, problem.lower, problem.upper))
+    assert np.all(near.value[near.violation == 0] > end.value * (1 - 1e-6))
+
+
+def test_distances_are_negative_exactly_where_a_limit_is_broken() -> None:
+    problem = tiny()
+    points = np.random.default_rng(2).uniform(problem.lower, problem.upper, (60, len(problem.lower)))
+    nearest = [Rows(problem, MARGIN).distances(motion_of(problem, point)).min() for point in points]
+    assert np.array_equal(np.array(nearest) < 0, problem.evaluate(points).violation > 0)
+
+
+def test_the_smoothed_condition_number_of_4_2_1_by_hand_and_its_limit() -> None:
+    values = np.array([4.0, 2.0, 1.0])
+    value, slope = smooth_log_condition(1.0)(values)
+    assert value == pytest.approx(np.log(4 + 2 + 1) + np.log(1 / 4 + 1 / 2 + 1))
+    assert slope == pytest.approx([1 / 7 - 1 / 7 / 4, 1 / 7 - 1 / 7, 1 / 7 - 4 / 7])
+    assert smooth_log_condition(1e6)(values)[0] == pytest.approx(np.log(4.0))
+
+
+def test_the_gap_does_not_depend_on_what_leaves_a_trajectory_as_good_as_it_is(tmp_path: Path) -> None:
+    record = Record(
+        settings=settings_of(preset="joint-fourier").model_dump(mode="json"),
+        value=8.0, coefficients={}, method="", seed=0, start=0, evaluations=0, gradients=0, versions={},
+    )  # fmt: skip
+    write_records(tmp_path / FILE, {"one": record})
+    known = best_known(tmp_path / FILE)
+    same = [
+        settings_of(preset="joint-fourier"),
+        settings_of(preset="joint-fourier", penalty={"step": 7.0}, criterion={"kind": "d_optimality"}),
+        settings_of(preset="random-frame", frame_seed=5),
+    ]
+    assert [gap_to_best_known(settings, 10.0, known) for settings in same] == [0.25] * 3
+    assert gap_to_best_known(settings_of(preset="joint-fourier", rest=True), 10.0, known) is None
+    assert gap_to_best_known(settings_of(preset="sphere"), 10.0, known) is None
+
+
+def test_each_mistake_is_told_in_one_line(tmp_path: Path, plan: Callable[[str], Path]) -> None:
+    def told(text: str, name: str | None = None) -> str:
+        path = plan(text)
+        return refusal(lambda: list(improve_best_known(tmp_path, 0.0, name, path)))
+
+    assert told(PLAN, "tin") == "no problem 'tin': did you mean 'tiny'?"
+    assert "start_from names no problem 'big': known: tiny" in told(PLAN + "start_from: {tiny: big}\n")
+    torque = told("name: t\nseed: 0\nproblems: {t: {preset: joint-fourier, limits: {torque: 5.0}}}\n")
+    assert torque == "t: a best-known record needs limits of position, velocity and acceleration alone"
+    sphere = told("name: t\nseed: 0\nproblems: {t: {preset: sphere}}\n")
+    assert sphere == "t: should be a trajectory of an arm in its own coordinates, not 'sphere'"
+    assert "t starts from the record of 's', which is not there yet" in told(
+        "name: t\nseed: 0\nproblems: {t: {preset: joint-fourier}, s: {preset: joint-fourier}}\nstart_from: {t: s}\n"
+    )
+
+
+def test_a_record_of_other_settings_is_not_overwritten(tmp_path: Path, plan: Callable[[str], Path]) -> None:
+    list(improve_best_known(tmp_path, 0.0, config=plan(PLAN)))
+    other = plan(PLAN.replace('"samples": 30', '"samples": 31'))
+    told = refusal(lambda: list(improve_best_known(tmp_path, 0.0, config=other)))
+    assert told == f"{tmp_path / FILE}: 'tiny' has other settings there: rename the problem or remove it"
+
+
+def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
+    path = tmp_path / FILE
+    path.write_text('{"schema": "other/1", "problems": {}}')
+    assert f"'schema' in {path}: should be 'best-known/1', not 'other/1'" == refusal(read_records, path)
+    path.write_text("{")
+    assert f"cannot read the records {path}" in refusal(read_records, path)
