@@ -4,7 +4,7 @@ BIN := .venv/bin
 KERNEL := problem/kernel.c problem/kernel_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 test lint speed regression lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study best-known test lint speed regression lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -42,6 +42,16 @@ figure2: .venv/run ## best cost and time against swarm size
 
 figure3: .venv/run ## average convergence
 	$(BIN)/armlab figure3
+
+paper: .venv/run ## all tables and figures of the paper, and what of it holds: results/paper/
+	$(BIN)/armlab paper
+	$(BIN)/armlab does-it-help
+
+study: .venv/run ## the comparison where the paper stops: results/study/
+	$(BIN)/armlab study
+
+best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
+	$(BIN)/armlab best-known
 
 speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results/speed.json and .md
 	$(BIN)/armlab speed

@@ -80,12 +80,13 @@ def check_global_randomness(algorithm: AnyAlgorithm) -> None:
 
 
 def check_points(algorithm: AnyAlgorithm, occasion: str, game: Game, steps: list[Step]) -> None:
-    """The first population first, and then points of the same shape, all finite."""
-    shape = (game.points, game.dimensions)
+    """The first population first, and then one point or more in the same dimensions, all finite."""
     for k, step in enumerate(steps):
-        shaped = step.asked.shape == shape and step.asked.dtype == np.float64
+        shaped = step.asked.ndim == 2 and step.asked.shape[1] == game.dimensions and len(step.asked) > 0
         found = f"shape {step.asked.shape} and type {step.asked.dtype}"
-        _demand(shaped, algorithm, f"asks in step {k} for points of {found}, not {shape} and float64, {occasion}")
+        wanted = f"(one or more, {game.dimensions}) and float64"
+        right = shaped and step.asked.dtype == np.float64
+        _demand(right, algorithm, f"asks in step {k} for points of {found}, not {wanted}, {occasion}")
         finite = np.isfinite(step.asked).all()
         _demand(finite, algorithm, f"asks in step {k} for a point that is not finite, {occasion}")
         _demand(not step.changed, algorithm, f"writes into the caller's arrays when told step {k}, {occasion}")

@@ -8,11 +8,11 @@ moved are told where they are. It is finished when the package's own stopping te
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from cmaes import CMA
 
+from algorithms.cma_state import HoldsOptimiser
 from algorithms.contract import Array, Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
 
@@ -25,7 +25,7 @@ class CMAESParams:
 
 
 @dataclass
-class CMAESState:
+class CMAESState(HoldsOptimiser):
     """The package's optimiser holds the random generator, seeded by the one that was given."""
 
     optimiser: CMA
@@ -33,15 +33,6 @@ class CMAESState:
     box: Box
     leaders: Leaders
     started: bool = False
-
-    def __getstate__(self) -> dict[str, Any]:
-        # pickled by itself, the optimiser would lose its random generator and half of its covariance matrix
-        return {**self.__dict__, "optimiser": dict(self.optimiser.__dict__)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        optimiser = CMA.__new__(CMA)
-        optimiser.__dict__.update(state["optimiser"])
-        self.__dict__.update({**state, "optimiser": optimiser})
 
 
 class CMAES:

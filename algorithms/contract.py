@@ -44,12 +44,15 @@ class Algorithm(Protocol[ParamsT, StateT]):
 
     @staticmethod
     def ask(state: StateT) -> tuple[Array, StateT]:
-        """The next population (n, d), possibly outside the box; the caller owns the array."""
+        """The next population (m, d), possibly outside the box; the caller owns the array.
+
+        The first one is the given population; later ones may have any other number of points, at least one.
+        """
         ...
 
     @staticmethod
     def tell(state: StateT, X: Array, fitness: Array) -> StateT:
-        """Learn the fitness (n,) of X (n, d), the asked points as the bound policy moved them.
+        """Learn the fitness (m,) of X (m, d), the asked points as the bound policy moved them.
 
         Neither array is kept or changed. A fitness that is not finite is a loss.
         """

@@ -19,6 +19,8 @@ _BUILT_IN = {
     "de": "algorithms.de:DE",
     "random-search": "algorithms.random_search:RandomSearch",
     "cma-es": "algorithms.cmaes:CMAES",
+    "ipop-cma-es": "algorithms.ipop_cmaes:IPOPCMAES",
+    "l-shade": "algorithms.lshade:LSHADE",
 }
 
 

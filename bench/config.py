@@ -6,11 +6,30 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from problem.settings import Settings, validate
+from problem.suite import instances, suites
 from problem.yaml_input import read_yaml
 
 
 def _as_list(value: Any) -> Any:
     return value if isinstance(value, tuple) else (value,)
+
+
+def _as_problems(value: Any) -> Any:
+    """One problem or many; the name of a suite stands for all its problems, also in `{suite: NAME, penalty: ...}`."""
+    return tuple(problem for item in _as_list(value) for problem in _of_suite(item))
+
+
+def _of_suite(item: Any) -> tuple[Any, ...]:
+    if isinstance(item, str) and item in suites():
+        return tuple(instances(item))
+    if not isinstance(item, dict) or "suite" not in item:
+        return (item,)
+    name, mark = str(item["suite"]), item.get("label")
+    others = {key: value for key, value in item.items() if key not in ("suite", "label")}
+    marked = [f"{problem} {mark}" if mark else problem for problem in instances(name)]
+    return tuple(
+        {"preset": problem, "label": label, **others} for problem, label in zip(instances(name), marked, strict=True)
+    )
 
 
 def _as_choice(value: Any) -> Any:
@@ -60,7 +79,7 @@ class Experiment(Settings):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
     problem: Annotated[
         tuple[Annotated[ProblemChoice, BeforeValidator(_split_label)], ...],
-        BeforeValidator(_as_list),
+        BeforeValidator(_as_problems),
         Field(min_length=1),
     ]
     algorithms: Annotated[tuple[Annotated[AlgorithmChoice, BeforeValidator(_as_choice)], ...], Field(min_length=1)]

@@ -29,20 +29,20 @@ def convergence_table(entries: Sequence[Entry], store: RunStore) -> pd.DataFrame
 
 
 def _average(label: str, curves: Sequence[Curves]) -> pd.DataFrame:
-    length = max(len(curve.evaluations) for curve in curves)
+    moments = np.unique(np.concatenate([curve.evaluations for curve in curves]))
     best, best_share = _feasible_mean(
-        _stack([curve.best_value for curve in curves], length),
-        _stack([curve.best_violation for curve in curves], length),
+        _at(moments, curves, [curve.best_value for curve in curves]),
+        _at(moments, curves, [curve.best_violation for curve in curves]),
     )
     present, present_share = _feasible_mean(
-        _stack([curve.present_value for curve in curves], length),
-        _stack([curve.present_violation for curve in curves], length),
+        _at(moments, curves, [curve.present_value for curve in curves]),
+        _at(moments, curves, [curve.present_violation for curve in curves]),
     )
     return pd.DataFrame(
         {
             "algorithm": label,
-            "iteration": np.arange(length),
-            "evaluations": _stack([curve.evaluations for curve in curves], length).mean(axis=0),
+            "iteration": np.arange(len(moments)),
+            "evaluations": moments,
             "best_so_far": best,
             "best_so_far_feasible_share": best_share,
             "present_best": present,
@@ -51,9 +51,13 @@ def _average(label: str, curves: Sequence[Curves]) -> pd.DataFrame:
     )
 
 
-def _stack(rows: Sequence[Array], length: int) -> Array:
-    """Curves below each other (n, length); one that ended early stays at its end."""
-    return np.stack([np.pad(row, (0, length - len(row)), mode="edge") for row in rows])
+def _at(moments: Array, curves: Sequence[Curves], rows: Sequence[Array]) -> Array:
+    """Rows below each other at common numbers of evaluations (n, moments): populations need not be of one size.
+
+    Before its first population a run has the figure of that; after its end it stays where it ended.
+    """
+    places = [np.searchsorted(curve.evaluations, moments, side="right") - 1 for curve in curves]
+    return np.stack([row[np.maximum(place, 0)] for row, place in zip(rows, places, strict=True)])
 
 
 def _feasible_mean(values: Array, violations: Array) -> tuple[Array, Array]:

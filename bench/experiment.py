@@ -63,7 +63,11 @@ def run_experiment(path: Path, options: Options, bar: ProgressBar) -> list[Path]
     bar: makes a progress bar for the number of all trials and of those already done.
     Raises InputError, StoppedError, TrialsFailedError; finished trials are kept in any case.
     """
-    loaded = load_experiment(path)
+    return run_loaded(load_experiment(path), options, bar)
+
+
+def run_loaded(loaded: Loaded, options: Options, bar: ProgressBar) -> list[Path]:
+    """`run_experiment` for a configuration that is read already."""
     if not options.overwrite:
         check_folder(options.results, loaded.experiment.name, loaded.settings)
     with open_store(options.store) as store:

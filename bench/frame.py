@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from bench.outcome import Outcome
 from bench.plan import Entry
 from bench.store import RunStore
 
@@ -12,11 +13,11 @@ GROUP = ["problem", "swarm_size", "budget", "algorithm"]
 
 def tidy_frame(entries: Sequence[Entry], store: RunStore) -> pd.DataFrame:
     """One row a trial in the order of the entries, which must all be in the store."""
-    return pd.DataFrame([_row(entry, store) for entry in entries])
+    return pd.DataFrame([row_of(entry, store.get(entry.key)) for entry in entries])
 
 
-def _row(entry: Entry, store: RunStore) -> dict[str, object]:
-    outcome = store.get(entry.key)
+def row_of(entry: Entry, outcome: Outcome) -> dict[str, object]:
+    """The facts of one trial by column."""
     return {
         "problem": entry.problem,
         "swarm_size": entry.trial.swarm_size,

@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from bench.config import Experiment
+from bench.page import markdown_table, page
 from bench.printed import display_name, printed
 
 _CONVENTIONS = """\
@@ -36,9 +37,8 @@ def summary_page(table: pd.DataFrame, experiment: Experiment) -> str:
     names = [name for name in table.columns if name not in _HEADINGS]
     headings = [*names, *_HEADINGS.values(), *(["seconds (paper)"] if experiment.printed else [])]
     rows = [_cells(row, names, experiment.printed) for row in table.to_dict("records")]
-    lines = [_line(headings), _line(["---"] * len(headings)), *(_line(row) for row in rows)]
     notes = [_CONVENTIONS, *([_SOURCE.format(name=experiment.name)] if experiment.printed else [])]
-    return "\n\n".join([f"# {experiment.name}", _setting(experiment), "\n".join(lines), *notes]) + "\n"
+    return page(experiment.name, _setting(experiment), markdown_table(headings, rows), *notes)
 
 
 def _setting(experiment: Experiment) -> str:
@@ -62,7 +62,3 @@ def _number(name: str, value: float) -> str:
     if name == "feasible_share":
         return f"{value:.0%}"
     return f"{value:.0f}" if name == "evaluations" else f"{value:.3g}"
-
-
-def _line(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"

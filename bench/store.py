@@ -63,6 +63,13 @@ class RunStore:
         value, violation, fitness = (np.nan if number is None else number for number in row[:3])
         return Outcome(value, violation, fitness, row[3], row[4], best_x, Curves(**arrays))
 
+    def origins(self, keys: Iterable[str]) -> list[str]:
+        """The provenance of the outcomes of these keys, each text once, in the order of their first use."""
+        find = "SELECT facts FROM trials JOIN provenance ON provenance.id = trials.provenance WHERE key = ?"
+        with _plainly(self._path):
+            found = (self._connection.execute(find, (key,)).fetchone() for key in keys)
+            return list(dict.fromkeys(row[0] for row in found if row))
+
     def forget(self, keys: Iterable[str]) -> None:
         """Drop outcomes, so that they are computed again."""
         with _plainly(self._path), _transaction(self._connection) as sql:

@@ -22,9 +22,23 @@ class Penalty:
     step: float
     weight: float
 
-    def cost(self, violation: Array) -> Array:
-        """Cost (points,) of violations (points,)."""
-        return np.where(violation > 0, self.step + self.weight * violation, 0.0)
+    def fitness(self, merit: Array, violation: Array) -> Array:
+        """What is minimised (points,), from merits and violations (points,)."""
+        return merit + np.where(violation > 0, self.step + self.weight * violation, 0.0)
+
+
+@dataclass(frozen=True)
+class FeasibilityRules:
+    """Deb 2000: a feasible point beats an infeasible one, the merit orders the first, the violation the others.
+
+    One number a point says so, since a search that only compares fitness then keeps the rules.
+    """
+
+    floor: float = 1e30  # above every finite merit, and far enough below the largest double for any violation
+
+    def fitness(self, merit: Array, violation: Array) -> Array:
+        """What is minimised (points,), from merits and violations (points,)."""
+        return np.where(violation > 0, self.floor * (1.0 + violation), merit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +53,7 @@ class ExcitationProblem:
     samples: int
     constraints: Constraints
     criterion: Criterion
-    penalty: Penalty
+    penalty: Penalty | FeasibilityRules
     unit_columns: bool = False
 
     @property
@@ -71,7 +85,7 @@ class ExcitationProblem:
         reached = excitation.overreach == 0
         merit, value = np.zeros(len(points)), np.full(len(points), np.inf)
         merit[reached], value[reached] = self._judge(excitation.motion.select(reached))
-        return Evaluation(merit + self.penalty.cost(violation), value, violation)
+        return Evaluation(self.penalty.fitness(merit, violation), value, violation)
 
     def _judge(self, motion: Motion) -> tuple[Array, Array]:
         """Criterion and condition number of motions (points, samples, joints), (points,) each."""

@@ -22,12 +22,13 @@ class LimitSettings(Settings):
     """Limits in place of the robot file's: one number for all joints, or one a joint; rad (m), s, N m (N).
 
     position: `robot` keeps the file's; a list has one [lower, upper] a joint, or null where there is none.
+    torque: `none` drops the file's.
     """
 
     position: Literal["robot"] | tuple[Range | None, ...] = "robot"
     velocity: PerJoint | None = None
     acceleration: PerJoint | None = None
-    torque: PerJoint | None = None
+    torque: PerJoint | Literal["none"] | None = None
 
     def of(self, arm: Arm) -> tuple[Limits, ...]:
         """The limits in force, one a joint. Raises InputError for a wrong number of entries or order."""
@@ -48,6 +49,8 @@ class LimitSettings(Settings):
         given = getattr(self, name)
         if given is None:
             return [getattr(joint.limits, name) for joint in arm.joints]
+        if given == "none":
+            return [np.inf] * len(arm)
         return list(one_a_joint(f"limits.{name}", given, arm))
 
 

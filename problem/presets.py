@@ -10,13 +10,13 @@ from problem.base_parameters import BaseParameters, base_parameters
 from problem.cartesian_fourier import CartesianFourier
 from problem.contract import Problem
 from problem.errors import InputError
-from problem.excitation_problem import ExcitationProblem, Penalty
+from problem.excitation_problem import ExcitationProblem, FeasibilityRules, Penalty
 from problem.fitness import Criterion
-from problem.frame import in_random_frame
+from problem.frame import ShiftedProblem, in_random_frame
 from problem.functions import FUNCTIONS, TestFunction
 from problem.inverse_kinematics import planar_arm
 from problem.joint_fourier import JointFourier
-from problem.limit_settings import LimitSettings, PerJoint, Positive, Vector, WorkspaceSettings, one_a_joint
+from problem.limit_settings import LimitSettings, PerJoint, Positive, Range, Vector, WorkspaceSettings, one_a_joint
 from problem.limits import Constraints
 from problem.robot_file import load_arm
 from problem.settings import Settings
@@ -50,13 +50,17 @@ class PenaltySettings(Settings):
         return Penalty(self.step, self.weight)
 
 
+PenaltyOrRules = PenaltySettings | Literal["feasibility_rules"]
+
+
 class ExcitationSettings(Settings):
     """What all excitation problems share.
 
     arm: a built-in name or a file. joints: how many of its first joints move, all if left out. duration: s.
     samples: instants, both ends included. columns: which columns are kept as base parameters, where there is
     a choice. unit_columns: scale columns to unit length. tool: a point in the last link's frame, m, that the
-    workspace limits too. frame_seed: search in randomly shifted coordinates.
+    workspace limits too. frame_seed: search in randomly shifted coordinates. penalty: or
+    `feasibility_rules` (Deb 2000).
     """
 
     arm: str = "irb120-arm"
@@ -66,7 +70,7 @@ class ExcitationSettings(Settings):
     columns: Literal["later_columns", "earlier_columns"] | tuple[str, ...] = "later_columns"
     unit_columns: bool = False
     criterion: CriterionSettings = CriterionSettings()
-    penalty: PenaltySettings = PenaltySettings()
+    penalty: PenaltyOrRules = PenaltySettings()
     limits: LimitSettings = LimitSettings()
     workspace: WorkspaceSettings = WorkspaceSettings()
     tool: Vector = (0.0, 0.0, 0.0)
@@ -74,13 +78,16 @@ class ExcitationSettings(Settings):
 
     title: ClassVar[str] = ""
 
-    def build(self) -> Problem:
+    def build(self) -> ExcitationProblem | ShiftedProblem:
         """The problem. Raises InputError where the settings do not fit the arm."""
         arm = self._arm()
         trajectory = self.trajectory(arm)
         limits = self.limits.of(arm)
         if any(np.isfinite(limit.torque) for limit in limits) and arm.links is None:
-            raise InputError(f"a torque limit needs the inertial parameters of '{arm.name}': its file has no `links`")
+            raise InputError(
+                f"a torque limit needs the inertial parameters of '{arm.name}', whose file has no `links`; "
+                "`limits: {torque: none}` drops it"
+            )
         problem = ExcitationProblem(
             name=self.title,
             arm=arm,
@@ -90,7 +97,7 @@ class ExcitationSettings(Settings):
             samples=self.samples,
             constraints=Constraints(arm, limits, self.workspace.build(self.tool)),
             criterion=self.criterion.build(),
-            penalty=self.penalty.build(),
+            penalty=FeasibilityRules() if self.penalty == "feasibility_rules" else self.penalty.build(),
             unit_columns=self.unit_columns,
         )
         return problem if self.frame_seed is None else in_random_frame(problem, self.frame_seed)
@@ -118,6 +125,22 @@ class ExcitationSettings(Settings):
         return base
 
 
+class JointLimitSettings(LimitSettings):
+    """Limits with an acceleration that no data sheet of the IRB 120 gives; null leaves the robot file's."""
+
+    acceleration: PerJoint | None = 40.0
+
+
+class PaperLimitSettings(JointLimitSettings):
+    """The same with joint 1 free; `position: robot` limits it like the others."""
+
+    position: Literal["robot"] | tuple[Range | None, ...] = (
+        None,
+        (-1.919862177194, 1.919862177194),
+        (-1.919862177194, 1.221730476396),
+    )
+
+
 class PaperSettings(ExcitationSettings):
     """The paper's problem: eq. 44-48 on the first three joints of the IRB 120.
 
@@ -138,10 +161,7 @@ class PaperSettings(ExcitationSettings):
     radius_limit: Positive = 0.2
     coefficient_limit: Positive = 0.5
     tool: Vector = (0.0, 0.0, 0.374)
-    limits: LimitSettings = LimitSettings(
-        position=(None, (-1.919862177194, 1.919862177194), (-1.919862177194, 1.221730476396)),
-        acceleration=40.0,
-    )
+    limits: PaperLimitSettings = PaperLimitSettings()
 
     title: ClassVar[str] = "paper"
 
@@ -171,7 +191,7 @@ class JointFourierSettings(ExcitationSettings):
     harmonics: Count = 5
     rest: bool = False
     coefficient_limit: PerJoint | None = None
-    limits: LimitSettings = LimitSettings(acceleration=40.0)
+    limits: JointLimitSettings = JointLimitSettings()
 
     title: ClassVar[str] = "joint-fourier"
 

@@ -13,22 +13,24 @@ from problem.presets import (
     RandomFrameSettings,
 )
 from problem.settings import nearest
+from problem.suite import InstanceSettings, instances, suites
 from problem.yaml_input import validate
 
-ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings
+ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings | InstanceSettings
 PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
     {
         "paper": PaperSettings,
         "joint-fourier": JointFourierSettings,
         "random-frame": RandomFrameSettings,
         **dict.fromkeys(FUNCTIONS, FunctionSettings),
+        **{name: InstanceSettings for suite in suites() for name in instances(suite)},
     }
 )
 
 
 def names() -> list[str]:
-    """Names of all presets."""
-    return list(PRESETS)
+    """Names of all presets; beside them stand the problems of suites (see `problem.suite`)."""
+    return [name for name, settings in PRESETS.items() if settings is not InstanceSettings]
 
 
 def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
@@ -40,5 +42,10 @@ def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
     if not isinstance(preset, str):
         raise InputError(f"{where}: should hold `preset: NAME`, one of {', '.join(names())}")
     if preset not in PRESETS:
-        raise InputError(f"{where}: unknown preset '{preset}': {nearest(preset, names())}")
+        raise InputError(f"{where}: unknown preset '{preset}': {_advice(preset)}")
     return validate(PRESETS[preset], dict(data), where)
+
+
+def _advice(preset: str) -> str:
+    """The name that was probably meant: of a suite's problems if it looks like one of them."""
+    return nearest(preset, list(PRESETS) if "/" in preset else names())

@@ -12,7 +12,7 @@ from problem.errors import InputError
 
 T = TypeVar("T")
 _UNKNOWN_KEY = "unknown_key"
-_KEY = re.compile(r"(?!(float|int|str|bool|none)$)[A-Za-z_]\w*")
+_KEY = re.compile(r"(?!(float|int|str|bool|none|\w+Settings)$)[A-Za-z_]\w*")
 
 
 class Settings(BaseModel):

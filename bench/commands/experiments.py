@@ -1,6 +1,7 @@
 """Commands that run experiments."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from bench.commands.progress import trial_bar
 _STORE = Path(".armlab/runs.sqlite")
 
 
-def _run_options(command: Callable[..., None]) -> Callable[..., None]:
+def _run_options(command: Callable[..., None], results: str = "results") -> Callable[..., None]:
     options = (
         click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core]."),
         click.option(
@@ -24,7 +25,7 @@ def _run_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--results",
             type=click.Path(path_type=Path),
-            default=Path("results"),
+            default=Path(results),
             show_default=True,
             help="Folder for tables and figures.",
         ),
@@ -66,14 +67,44 @@ def figure3(**options: Any) -> None:
     _run([Path("configs/figure3.yaml")], **options)
 
 
-def _run(configs: Sequence[Path], workers: int | None, dry_run: bool, **options: Any) -> None:
+@click.command()
+@partial(_run_options, results="results/paper")
+def paper(**options: Any) -> None:
+    """All tables and figures of the paper, and what of it could be reproduced: results/paper/."""
+    from bench.paper.command import describe_paper, make_paper
+
+    _make(make_paper, describe_paper, **options)
+
+
+@click.command()
+@partial(_run_options, results="results/study")
+def study(**options: Any) -> None:
+    """The comparison where the paper stops: six joints, frames, budgets, MuPSO's ingredients: results/study/."""
+    from bench.study.command import describe_study, make_study
+
+    _make(make_study, describe_study, **options)
+
+
+def _make(make: Callable[..., Any], describe: Callable[..., Any], dry_run: bool, **options: Any) -> None:
+    configs, settings = Path("configs"), _settings(**options)
+    records = Path("results/best_known.json")
+    for line in describe(configs, settings) if dry_run else make(configs, settings, records, trial_bar):
+        click.echo(line)
+
+
+def _run(configs: Sequence[Path], dry_run: bool, **options: Any) -> None:
+    from bench.dry_run import describe
+    from bench.experiment import run_experiment
+
+    settings = _settings(**options)
+    for config in configs:
+        for line in describe(config, settings) if dry_run else run_experiment(config, settings, trial_bar):
+            click.echo(line)
+
+
+def _settings(workers: int | None, **options: Any) -> Any:
     from joblib import cpu_count
 
-    from bench.dry_run import describe
-    from bench.experiment import Options, run_experiment
+    from bench.experiment import Options
 
-    settings = Options(workers=workers or cpu_count(), **options)
-    for config in configs:
-        lines = describe(config, settings) if dry_run else run_experiment(config, settings, trial_bar)
-        for line in lines:
-            click.echo(line)
+    return Options(workers=workers or cpu_count(), **options)

@@ -9,9 +9,12 @@ def list_names() -> None:
     from algorithms import registry as algorithms
     from problem import registry as problems
     from problem.robot_file import built_in_arms
+    from problem.suite import instances, suites
 
     click.echo("algorithms: " + ", ".join(algorithms.names()))
     click.echo("problems: " + ", ".join(problems.names()))
+    for suite in suites():
+        click.echo(f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first")
     click.echo("arms: " + ", ".join(built_in_arms()))
 
 

@@ -14,6 +14,7 @@ from bench.does_it_help.identification import (
     TORQUE_SHARE,
 )
 from bench.does_it_help.judgement import CRITERIA, ERRORS, OTHERS
+from bench.page import markdown_table
 
 _SETTING = """\
 {count} feasible trajectories of the problem `joint-fourier` (three joints of the IRB 120, 10 s): {sources}.
@@ -93,27 +94,21 @@ def _correlation_table(frame: pd.DataFrame, table: pd.DataFrame, subset: str, er
         for row in rows.itertuples()
     }
     head = ["noise", *CRITERIA, "ceiling"]
-    lines = [_line(head), _line(["---"] * len(head))]
-    for kind in KINDS:
-        limit = f"{ceiling_of(frame, kind, error):.2f}"
-        lines.append(_line([KIND_NAMES[kind], *(told[kind, criterion] for criterion in CRITERIA), limit]))
-    return "\n".join(lines)
+    lines = [
+        [KIND_NAMES[kind], *(told[kind, name] for name in CRITERIA), f"{ceiling_of(frame, kind, error):.2f}"]
+        for kind in KINDS
+    ]
+    return markdown_table(head, lines)
 
 
 def _best_known(frame: pd.DataFrame, apart: pd.DataFrame) -> str:
     chosen = pd.concat([frame[frame["source"] == "best known"], apart])
     errors = [f"{kind}_prediction" for kind in KINDS]
     head = ["record", "cond", "cond, unit columns", *(f"{KIND_NAMES[kind]}: error (N m)" for kind in KINDS)]
-    lines = [_line(head), _line(["---"] * len(head))]
-    for _, row in chosen.iterrows():
-        figures = [row[name] for name in ("cond", "cond_unit_columns", *errors)]
-        lines.append(_line([str(row["group"]), *(f"{figure:.3g}" for figure in figures)]))
+    columns = ["cond", "cond_unit_columns", *errors]
+    lines = [[row["group"], *(f"{row[name]:.3g}" for name in columns)] for _, row in chosen.iterrows()]
     note = (
         "Scaling the columns takes their size out of the criterion: it does not see how large the motion is, and "
         "so not how far noise is below it. Records for unit columns are in no correlation and no figure."
     )
-    return "\n".join(lines) + "\n\n" + note
-
-
-def _line(cells: list[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+    return markdown_table(head, lines) + "\n\n" + note

@@ -13,12 +13,13 @@ import numpy as np
 from algorithms.contract import Array
 from bench.plan import Entry
 from bench.regression.baseline import Baseline
-from bench.regression.comparison import holm, p_values
+from bench.regression.comparison import p_values
 from bench.regression.defects import DEFECTS
 from bench.regression.guard import Verdict, judge
 from bench.regression.inject import defective_ends
 from bench.regression.sweep import Cell, Ends, Progress, Sample, Sweep, entries_of, run_entries
 from bench.seeds import named_generator
+from bench.statistics.holm import holm
 
 SHIFTS = (-0.15, -0.1, -0.07, -0.05, -0.03, -0.02, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15)  # of log10 cond
 DefectRun = Callable[[str, Sequence[Entry]], Ends]

@@ -12,6 +12,7 @@ from scipy.stats import mannwhitneyu
 
 from algorithms.contract import Array
 from bench.regression.sweep import Cell, Ends
+from bench.statistics.holm import holm
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,16 +79,6 @@ def best_p_value(baseline: Array, now: Array) -> Array:
 def _chance_of_leading(k: Array, size: int, others: int) -> Array:
     return np.asarray(np.exp(gammaln(size + 1) - gammaln(size - k + 1) + gammaln(size + others - k + 1)
                              - gammaln(size + others + 1)))  # fmt: skip
-
-
-def holm(p: Array) -> Array:
-    """P-values (..., k) after Holm's correction (1979), valid however the comparisons depend on each other."""
-    order = np.argsort(p, axis=-1, kind="stable")
-    factors = np.arange(p.shape[-1], 0, -1)
-    adjusted = np.maximum.accumulate(np.take_along_axis(p, order, axis=-1) * factors, axis=-1)
-    result = np.empty_like(adjusted)
-    np.put_along_axis(result, order, np.minimum(adjusted, 1.0), axis=-1)
-    return result
 
 
 def _finite(ends: Array) -> Array:

@@ -23,8 +23,8 @@ def overheads() -> dict[str, dict[str, float]]:
     """Microseconds an evaluation: `{algorithm: {package, way: figure}}`, every rival in turn in each round."""
     tasks: dict[tuple[str, str], tuple[Task, int]] = {}
     for name in ALGORITHMS:
-        tasks[name, "armlab, one"] = _own(name, one_at_a_time=True)
-        tasks[name, "armlab, all"] = _own(name, one_at_a_time=False)
+        tasks[name, "armlab, one"] = own_task(name, one_at_a_time=True)
+        tasks[name, "armlab, all"] = own_task(name, one_at_a_time=False)
     box = peers.SphereBox(DIMENSION, HALF_WIDTH, SWARM_SIZE, ITERATIONS)
     tasks.update(peers.tasks(box))
     seconds = median_seconds({"/".join(key): task for key, (task, _) in tasks.items()}, ROUNDS)
@@ -34,7 +34,8 @@ def overheads() -> dict[str, dict[str, float]]:
     return table
 
 
-def _own(name: str, one_at_a_time: bool) -> tuple[Task, int]:
+def own_task(name: str, one_at_a_time: bool) -> tuple[Task, int]:
+    """One run of an algorithm of ours on the sphere, and its evaluations."""
     algorithm = load(name)
     box = Box(np.full(DIMENSION, -HALF_WIDTH), np.full(DIMENSION, HALF_WIDTH))
     population = np.random.default_rng(0).uniform(*box, (SWARM_SIZE, DIMENSION))

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.files import write_whole
+from bench.page import markdown_table
 from bench.provenance import provenance
 from bench.speed.condition import against_pinocchio
 from bench.speed.evaluations import (
@@ -50,20 +51,20 @@ def page(figures: Mapping[str, Any]) -> str:
             "# Speed\n",
             f"One core of {figures['provenance']['processor']}, one BLAS thread; medians, the rivals taking turns.\n",
             "## From motion to condition number, 3 joints, 100 samples\n",
-            *_table(["pipeline", "us a trajectory"], _condition_rows(condition)),
+            markdown_table(["pipeline", "us a trajectory"], _condition_rows(condition)),
             f"\nRatio to Pinocchio: {condition['ratio_to_pinocchio']:.1f} (a population of 50 at once), "
             f"{condition['ratio_to_pinocchio_one_at_a_time']:.1f} (one trajectory at a time). Largest relative "
             f"difference of the results: {condition['largest_relative_difference']:.1e}.\n",
             "## Whole evaluations a second\n",
-            *_table(["preset", "evaluations a second"], [(name, f"{rate:.0f}") for name, rate in rates.items()]),
+            markdown_table(["preset", "evaluations a second"], [(name, f"{rate:.0f}") for name, rate in rates.items()]),
             "\n## Overhead of the algorithms\n",
             "Microseconds an evaluation on the sphere, 15 dimensions, 50 points, 30 iterations, the objective's time "
             "included; one: one point at a time, all: the population at once.\n",
-            *_table(["algorithm", "package", "us an evaluation"], _overhead_rows(figures["overhead_us"])),
+            markdown_table(["algorithm", "package", "us an evaluation"], _overhead_rows(figures["overhead_us"])),
             "\n## Growth\n",
             "Microseconds a trajectory: from motion to condition number against samples and joints; whole "
             "evaluations of `joint-fourier` against the points evaluated at once.\n",
-            *_table(["against", "size", "us"], _growth_rows(figures["growth_us"])),
+            markdown_table(["against", "size", "us"], _growth_rows(figures["growth_us"])),
             "",
         ]
     )
@@ -83,11 +84,6 @@ def _overhead_rows(overhead: Mapping[str, Mapping[str, float]]) -> list[tuple[st
 
 def _growth_rows(growth: Mapping[str, Mapping[str, float]]) -> list[tuple[str, ...]]:
     return [(variable, size, f"{taken:.1f}") for variable, sizes in growth.items() for size, taken in sizes.items()]
-
-
-def _table(heads: list[str], rows: list[tuple[str, ...]]) -> list[str]:
-    lines = [heads, ["---"] * len(heads), *map(list, rows)]
-    return [f"| {' | '.join(line)} |" for line in lines]
 
 
 def _rounded(value: Any) -> Any:

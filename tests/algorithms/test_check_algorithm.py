@@ -64,14 +64,28 @@ def test_skipping_the_first_population_is_named(complaint):
     assert "does not ask for the first population first" in complaint(Impatient)
 
 
-def test_another_number_of_points_is_named(complaint):
+def test_a_population_that_shrinks_breaks_no_promise():
     class Shrinking(RandomSearch):
         @staticmethod
         def ask(state):
             X, state = RandomSearch.ask(state)
             return (X[1:] if state.started else X), state
 
-    assert "asks in step 1 for points of shape (7, 3)" in complaint(Shrinking)
+    check_algorithm(Shrinking)
+
+
+def test_a_population_of_nobody_is_named(complaint):
+    class Empty(RandomSearch):
+        @staticmethod
+        def ask(state):
+            X, state = RandomSearch.ask(state)
+            return (X[:0] if state.started else X), state
+
+        @staticmethod
+        def tell(state, X, fitness):
+            return RandomSearch.tell(state, X, fitness) if len(X) else state
+
+    assert "asks in step 1 for points of shape (0, 3)" in complaint(Empty)
 
 
 def test_points_that_are_not_finite_are_named(complaint):

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.regression.comparison import best_p_value, compare, holm, location_p_value, p_values
+from bench.regression.comparison import best_p_value, compare, location_p_value, p_values
 from bench.regression.sweep import Cell
+from bench.statistics.holm import holm
 
 INF = np.inf
 finite_ends = st.lists(st.floats(1.0, 1e6), min_size=3, max_size=30).map(np.array)

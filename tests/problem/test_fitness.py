@@ -8,7 +8,7 @@ from random_arms import random_motion
 
 import problem.fitness as fitness
 from problem.base_parameters import base_parameters
-from problem.excitation_problem import ExcitationProblem, Penalty
+from problem.excitation_problem import ExcitationProblem, FeasibilityRules, Penalty
 from problem.fitness import GRAM_LIMIT, Criterion, condition_number, singular_values
 from problem.motion import Motion
 from problem.registry import parse_problem
@@ -91,7 +91,8 @@ def test_a_column_without_any_excitation_has_no_unit_length_but_an_infinite_cond
 
 
 def test_a_penalty_is_a_step_once_and_a_weight_times_the_violation() -> None:
-    assert Penalty(step=5.0, weight=10.0).cost(np.array([0.0, 0.2, 3.0])).tolist() == [0.0, 7.0, 35.0]
+    fitness = Penalty(step=5.0, weight=10.0).fitness(np.ones(3), np.array([0.0, 0.2, 3.0]))
+    assert fitness.tolist() == [1.0, 8.0, 36.0]
 
 
 def problem(**settings: object) -> ExcitationProblem:
@@ -169,3 +170,22 @@ def test_a_motionless_arm_has_an_infinite_condition_number_and_no_crash(weight: 
 def test_an_empty_population_has_an_empty_result(preset: str) -> None:
     built = parse_problem({"preset": preset}, "test").build()
     assert [len(part) for part in built.evaluate(np.empty((0, len(built.lower))))] == [0, 0, 0]
+
+
+def test_feasibility_rules_put_every_feasible_point_first_and_order_the_others_by_violation_alone() -> None:
+    merit = np.array([1e12, 3.0, 1.0, 2.0, np.inf, 9.0])
+    violation = np.array([0.0, 0.0, 1e-9, 1e-12, 2.0, 1.5])
+    fitness = FeasibilityRules().fitness(merit, violation)
+    assert np.argsort(fitness).tolist() == [1, 0, 3, 2, 5, 4]
+    assert np.all(np.isfinite(fitness))
+
+
+def test_a_problem_with_feasibility_rules_judges_feasible_points_by_the_criterion() -> None:
+    ruled, penalised = problem(penalty="feasibility_rules"), problem()
+    for point in (circles(0.35), circles(0.7)):
+        with_rules, with_penalty = ruled.evaluate(point), penalised.evaluate(point)
+        assert with_rules.violation == with_penalty.violation
+        if with_rules.violation[0] == 0:
+            assert with_rules.fitness == with_penalty.fitness
+        else:
+            assert with_rules.fitness[0] == 1e30 * (1 + with_rules.violation[0])

@@ -134,7 +134,10 @@ def test_a_torque_limit_needs_links(tmp_path: Path) -> None:
     path = tmp_path / "bare.urdf"
     path.write_text(BARE_URDF)
     told = refusal(build, "joint-fourier", arm=str(path), coefficient_limit=1.0, limits={"torque": 5.0})
-    assert told == "a torque limit needs the inertial parameters of 'bare': its file has no `links`"
+    assert told == (
+        "a torque limit needs the inertial parameters of 'bare', whose file has no `links`; "
+        "`limits: {torque: none}` drops it"
+    )
     assert build("joint-fourier", arm=str(path), coefficient_limit=1.0)
 
 

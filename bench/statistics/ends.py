@@ -48,10 +48,15 @@ def is_feasible(values: Array, violations: Array) -> NDArray[np.bool_]:
 
 def quantile(values: Array, share: float) -> float:
     """Linear between neighbours, as numpy's default, but right for infinite values, where numpy gives NaN."""
-    ordered = np.sort(values)
-    place = share * (len(ordered) - 1)
+    return float(row_quantiles(values[None], share)[0])
+
+
+def row_quantiles(rows: Array, share: float) -> Array:
+    """`quantile` of each row of (m, n), (m,)."""
+    ordered = np.sort(rows, axis=1)
+    place = share * (rows.shape[1] - 1)
     below = math.floor(place)
     weight = place - below
     if weight == 0:
-        return float(ordered[below])
-    return float((1 - weight) * ordered[below] + weight * ordered[below + 1])
+        return ordered[:, below]
+    return np.asarray((1 - weight) * ordered[:, below] + weight * ordered[:, below + 1])

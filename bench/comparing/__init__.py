@@ -1,0 +1,1 @@
+"""Two result sets beside each other."""

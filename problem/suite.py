@@ -1,0 +1,73 @@
+"""Suites of named problems: `suite-1/irb120-joint-h5-t10-origin` is the same problem for everyone, for good."""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator
+
+from problem.errors import InputError
+from problem.excitation_problem import ExcitationProblem
+from problem.frame import ShiftedProblem
+from problem.presets import JointFourierSettings, PaperSettings, PenaltyOrRules
+from problem.settings import Settings, nearest, validate
+from problem.yaml_input import read_yaml
+
+FOLDER = Path(__file__).parent / "suites"
+Definition = Annotated[PaperSettings | JointFourierSettings, Field(discriminator="preset")]
+
+
+class SuiteFile(Settings):
+    """The problems of one suite by their names in it."""
+
+    instances: dict[str, Definition]
+
+
+class InstanceSettings(Settings):
+    """A problem of a suite by its full name; all that may be chosen is what a broken limit costs."""
+
+    preset: str
+    penalty: PenaltyOrRules | None = None
+
+    @field_validator("preset")
+    @classmethod
+    def _known(cls, name: str) -> str:
+        definition_of(name)
+        return name
+
+    def build(self) -> ExcitationProblem | ShiftedProblem:
+        """The problem, under its full name."""
+        definition = definition_of(self.preset)
+        if self.penalty is not None:
+            definition = definition.model_copy(update={"penalty": self.penalty})
+        problem = definition.build()
+        return dataclasses.replace(problem, name=self.preset)
+
+
+def suites() -> list[str]:
+    """Names of all suites."""
+    return sorted(path.stem for path in FOLDER.glob("*.yaml"))
+
+
+def instances(suite: str) -> list[str]:
+    """Full names of the problems of a suite, in its order. Raises InputError for an unknown suite."""
+    return [f"{suite}/{name}" for name in _definitions(suite)]
+
+
+def definition_of(name: str) -> PaperSettings | JointFourierSettings:
+    """The settings behind a full name. Raises InputError, in one line, if there is no such problem."""
+    suite, _, own_name = name.partition("/")
+    definitions = _definitions(suite)
+    if own_name not in definitions:
+        raise InputError(f"suite '{suite}' has no problem '{own_name}': {nearest(own_name, list(definitions))}")
+    return definitions[own_name]
+
+
+@lru_cache
+def _definitions(suite: str) -> Mapping[str, PaperSettings | JointFourierSettings]:
+    if suite not in suites():
+        raise InputError(f"unknown suite '{suite}': {nearest(suite, suites())}")
+    path = FOLDER / f"{suite}.yaml"
+    return validate(SuiteFile, read_yaml(path), str(path)).instances

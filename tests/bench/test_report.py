@@ -1,0 +1,159 @@
+"""The report: one file without any reference to the outside, whose figures are those of the results."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from small_results import CONFIG, Ran, ran
+
+from bench.report.analysis import Cell, block_losses, cells_of
+from bench.report.command import write_report
+from bench.report.critical_picture import critical_picture
+from bench.report.data import page_data
+from bench.report.looks import look
+from bench.report.page import report_page
+from bench.report.tables import ends_table, number, tally_table
+from bench.sharing.command import read_results, share
+from bench.sharing.result_set import ResultSet
+from bench.statistics.critical import critical_difference
+from bench.statistics.targets import Run
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    return ran(tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture(scope="module")
+def results(small_run: Ran) -> ResultSet:
+    return read_results(*small_run)
+
+
+@pytest.fixture
+def cell() -> Cell:
+    """Two repetitions of two algorithms, one of which finds nothing feasible once."""
+    trials = pd.DataFrame(
+        {"algorithm": ["a", "a", "b", "b"], "repetition": [0, 1, 0, 1], "value": [10.0, 20.0, 5.0, 1.0],
+         "violation": [0.0, 0.0, 0.0, 2.0]}
+    )  # fmt: skip
+    moments = np.array([10.0, 20.0])
+    runs = {
+        "a": [Run(moments, np.array([100.0, 10.0])), Run(moments, np.array([40.0, 20.0]))],
+        "b": [Run(moments, np.array([50.0, 5.0])), Run(moments, np.array([np.inf, np.inf]))],
+    }
+    return Cell("small", trials, runs, 20)
+
+
+def test_the_page_refers_to_nothing_outside_of_itself(small_run: Ran, tmp_path: Path) -> None:
+    text = write_report(*small_run, tmp_path / "page.html").read_text()
+    assert not re.findall(r"""(?:src|href)\s*=\s*["'](?!data:,|#)""", text)
+    assert not re.findall(r"@import|url\(|fetch\(|XMLHttpRequest|import\s", text)
+    addresses = set(re.findall(r"https?://[^\"'\s<]+", text))
+    assert addresses <= {"http://www.w3.org/2000/svg"}  # the name of a vocabulary, which nothing fetches
+    assert len(text) < 300_000
+
+
+def test_a_report_of_shared_tables_is_that_of_the_store(small_run: Ran, results: ResultSet, tmp_path: Path) -> None:
+    share(*small_run, "csv", tmp_path / "tables")
+    shared = read_results(tmp_path / "tables", Path("none"))
+    assert report_page(shared, cells_of(shared), []) == report_page(results, cells_of(results), [])
+
+
+def test_the_page_tells_settings_origin_and_how_to_repeat_it(results: ResultSet) -> None:
+    text = report_page(results, cells_of(results), [])
+    assert "armlab run small.yaml" in text
+    assert results.origins[0]["blas"] in text
+    assert "swarm_size:" in text
+    assert "Seed 1." in text
+
+
+def test_labels_of_a_third_party_cannot_break_out_of_the_page(small_run: Ran, tmp_path: Path) -> None:
+    text = CONFIG.replace("[spso, l-shade, random-search]", "[{name: spso, label: '</script><b>x'}, l-shade]")
+    other = ran(tmp_path, text)
+    results = read_results(*other)
+    page = report_page(results, cells_of(results), [])
+    assert "<b>x" not in page
+    assert page.count("</script>") == 2
+
+
+def test_quartiles_of_convergence_count_an_infeasible_value_as_infinite(cell: Cell) -> None:
+    assert cell.moments.tolist()[0] == 10
+    lower, middle, upper = cell.convergence("b")
+    assert (middle[0], upper[-1]) == (np.inf, np.inf)
+    lower, middle, upper = cell.convergence("a")
+    assert (lower[-1], middle[-1], upper[-1]) == (12.5, 15.0, 17.5)
+
+
+def test_targets_go_from_the_worst_first_feasible_value_to_the_best_of_all(cell: Cell) -> None:
+    assert cell.targets[[0, -1]].tolist() == pytest.approx([100.0, 5.0])
+    assert cell.expected_times("a", np.array([20.0, 5.0])).tolist() == [20.0, np.inf]
+    assert cell.expected_times("b", np.array([20.0, 5.0])).tolist() == [40.0, 40.0]
+
+
+def test_a_problem_on_which_nothing_feasible_was_found_has_no_targets_and_still_a_page(results: ResultSet) -> None:
+    lost = replace(results, trials=results.trials.assign(violation=1.0), curves=results.curves.assign(violation=1.0))
+    cells = cells_of(lost)
+    assert all(len(cell.targets) == 0 for cell in cells)
+    text = report_page(lost, cells, [])
+    assert "∞" in text
+    assert json.loads(page_data(cells, lost.algorithms))["problems"][0]["ends"]["spso"] == [None] * 7
+
+
+def test_the_data_of_the_charts_are_those_of_the_results(results: ResultSet) -> None:
+    cells = cells_of(results)
+    data = json.loads(page_data(cells, results.algorithms))
+    assert [problem["name"] for problem in data["problems"]] == ["sphere", "rastrigin"]
+    problem, cell = data["problems"][0], cells[0]
+    assert problem["ends"]["spso"] == pytest.approx(cell.ends("spso").tolist(), rel=1e-3)
+    assert problem["convergence"]["spso"][1][-1] == pytest.approx(np.median(cell.ends("spso")), rel=1e-3)
+    assert problem["reached"]["l-shade"] == sorted(problem["reached"]["l-shade"])
+    assert data["overall"]["profile"]["spso"][-1] <= 1.0
+    assert sum(shares[0] for shares in data["overall"]["profile"].values()) == pytest.approx(1.0)
+
+
+def test_a_page_of_two_problems_says_that_they_tell_nothing_apart(results: ResultSet) -> None:
+    assert "2 problems are too few to tell any pair apart." in report_page(results, cells_of(results), [])
+
+
+def test_one_problem_alone_is_ranked_by_its_repetitions(results: ResultSet) -> None:
+    cells = cells_of(results)
+    assert block_losses(cells).shape == (2, 3)
+    assert block_losses(cells[:1]).shape == (7, 3)
+
+
+def test_the_picture_has_a_dot_an_algorithm_and_a_bar_a_group_and_says_so_in_words() -> None:
+    rng = np.random.default_rng(0)
+    base = rng.normal(size=20)
+    losses = pd.DataFrame({"b": base + 5, "a": base, "c": base + 5 + rng.normal(scale=0.1, size=20)})
+    found = critical_difference(losses)
+    picture = critical_picture(found, {name: look(k) for k, name in enumerate("abc")})
+    assert picture.count("<circle") == 3
+    assert picture.count('class="group"') == len(found.groups) == 1
+    assert "Average ranks: a 1.00, " in picture
+    assert "Not told apart: b and c" in picture or "Not told apart: c and b" in picture
+
+
+def test_the_tally_counts_problems_won_and_lost_on_both_sides(results: ResultSet) -> None:
+    cells = cells_of(results)
+    text = tally_table(cells, results.algorithms)
+    scores = re.findall(r"(\d) – (\d)", text)
+    assert len(scores) == 6
+    assert sorted(scores) == sorted((lost, won) for won, lost in scores)
+
+
+def test_the_table_of_ends_has_medians_intervals_and_expected_running_times(cell: Cell) -> None:
+    text = ends_table(cell)
+    assert "<td>15 (10 – 20)</td>" in text
+    assert "<td>50%</td>" in text
+    assert text.count("ERT to ") == 3
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(np.inf, "∞"), (np.nan, "–"), (3.14159, "3.14"), (1550.4, "1550"), (2.5e-9, "2.5e-09")]
+)
+def test_numbers_have_three_digits(value: float, text: str) -> None:
+    assert number(value) == text

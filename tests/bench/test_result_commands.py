@@ -1,0 +1,49 @@
+"""The commands on results, as they are called from a shell."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from small_results import Ran, ran
+
+from bench.commands.results import compare, report, share
+from bench.config import read_experiment
+from bench.convergence import convergence_table
+from bench.plan import plan
+from bench.store import open_store
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    return ran(tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture
+def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> CliRunner:
+    monkeypatch.chdir(tmp_path)
+    return CliRunner()
+
+
+def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run: Ran, tmp_path: Path) -> None:
+    arguments = [str(small_run.config), "--store", str(small_run.store)]
+    done = shell.invoke(share, [*arguments, "--out", "tables"], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "tables/trials.csv" in done.output
+    done = shell.invoke(report, ["tables"], catch_exceptions=False)
+    assert done.output == "results/small_report.html\n"
+    assert (tmp_path / "results" / "small_report.html").exists()
+    done = shell.invoke(compare, ["tables", "tables"], catch_exceptions=False)
+    assert "6 not told apart" in done.output
+    assert not (tmp_path / ".armlab").exists()
+
+
+def test_convergence_of_populations_that_shrink_or_restart_is_averaged_at_equal_evaluations(small_run: Ran) -> None:
+    entries = [entry for entry in plan(read_experiment(small_run.config), "test") if entry.problem == "sphere"]
+    with open_store(small_run.store) as store:
+        table = convergence_table(entries, store)
+        ends = [store.get(entry.key).value for entry in entries if entry.algorithm == "l-shade"]
+    rows = table[table["algorithm"] == "l-shade"]
+    assert rows["evaluations"].iloc[[0, -1]].tolist() == [6, 60]
+    assert (np.diff(rows["evaluations"]) < 6).any()
+    assert rows["best_so_far"].iloc[-1] == pytest.approx(np.mean(ends))

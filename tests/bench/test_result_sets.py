@@ -1,0 +1,158 @@
+"""Result sets: collected from the store, written as tidy tables and for IOHprofiler, and read back unchanged."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from refusals import refusal
+from small_results import CONFIG, Ran, ran
+
+from bench.config import read_experiment
+from bench.plan import plan
+from bench.report.analysis import cells_of
+from bench.sharing.command import read_results, share
+from bench.sharing.iohprofiler import NOTHING
+from bench.sharing.result_set import ResultSet, runs_of
+from bench.store import open_store
+
+
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+    return ran(tmp_path_factory.mktemp("run"))
+
+
+@pytest.fixture(scope="module")
+def results(small_run: Ran) -> ResultSet:
+    return read_results(*small_run)
+
+
+def test_a_result_set_has_every_trial_and_the_curve_of_each(small_run: Ran, results: ResultSet) -> None:
+    entries = plan(read_experiment(small_run.config), "test")
+    assert len(results.trials) == len(entries) == 2 * 3 * 7
+    with open_store(small_run.store) as store:
+        outcome = store.get(entries[-1].key)
+    last = results.trials.iloc[-1]
+    assert (last["problem"], last["algorithm"], last["repetition"], last["dimension"]) == (
+        "rastrigin", "random-search", 6, 2,
+    )  # fmt: skip
+    assert last["value"] == outcome.value
+    _, _, curves = list(results.cells())[-1]
+    run = runs_of(curves)["random-search"][6]
+    np.testing.assert_array_equal(run.evaluations, outcome.curves.evaluations)
+    np.testing.assert_array_equal(run.best, outcome.curves.best_value)
+
+
+def test_a_result_set_says_where_it_was_computed(results: ResultSet) -> None:
+    (origin,) = results.origins
+    assert {"python", "numpy", "blas", "processor", "commit", "system"} <= set(origin)
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_tidy_tables_bring_back_the_same_result_set_to_the_bit(
+    small_run: Ran, results: ResultSet, form: str, tmp_path: Path
+) -> None:
+    if form == "parquet":
+        pytest.importorskip("pyarrow", reason="Parquet needs the package pyarrow")
+    written = share(*small_run, form, tmp_path / "tables")
+    assert {path.name for path in written} == {
+        f"trials.{form}",
+        f"curves.{form}",
+        "settings.yaml",
+        "origins.json",
+        "README.md",
+    }
+    back = read_results(tmp_path / "tables", Path("no store is needed"))
+    assert (back.name, back.settings, back.origins) == (results.name, results.settings, results.origins)
+    pd.testing.assert_frame_equal(back.trials, results.trials, check_exact=True)
+    pd.testing.assert_frame_equal(back.curves, results.curves, check_exact=True)
+
+
+def test_infeasible_ends_are_infinite_in_the_curves() -> None:
+    curves = pd.DataFrame(
+        {"algorithm": "de", "repetition": 0, "evaluations": [5, 10], "value": [3.0, 4.0], "violation": [0.5, 0.0]}
+    )
+    assert runs_of(curves)["de"][0].best.tolist() == [np.inf, 4.0]
+
+
+def test_results_that_are_not_there_are_told_in_one_line(small_run: Ran, tmp_path: Path) -> None:
+    nowhere = tmp_path / "nowhere.yaml"
+    assert refusal(read_results, nowhere, small_run.store).startswith(f"there is no {nowhere}")
+    assert "is no folder of results" in refusal(read_results, tmp_path, small_run.store)
+    assert "there is no run store" in refusal(read_results, small_run.config, tmp_path / "none.sqlite")
+    assert not (tmp_path / "none.sqlite").exists()
+    more = tmp_path / "more.yaml"
+    more.write_text(CONFIG.replace("repetitions: 7", "repetitions: 8"))
+    assert refusal(read_results, more, small_run.store).startswith("6 of 48 trials of ")
+
+
+def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: Ran, tmp_path: Path) -> None:
+    share(*small_run, "csv", tmp_path)
+    table = pd.read_csv(tmp_path / "trials.csv")
+    table.drop(columns="value").to_csv(tmp_path / "trials.csv", index=False)
+    assert refusal(read_results, tmp_path, small_run.store) == f"{tmp_path / 'trials.csv'} lacks the columns value"
+    (tmp_path / "trials.csv").write_text('a,b\n1,"2\n3,4,5,6\n')
+    assert refusal(read_results, tmp_path, small_run.store).startswith(f"cannot read {tmp_path / 'trials.csv'}")
+    (tmp_path / "origins.json").write_text("{")
+    assert "is no folder of results" in refusal(read_results, tmp_path, small_run.store)
+
+
+def test_the_iohprofiler_files_hold_every_run_with_its_best(small_run: Ran, results: ResultSet, tmp_path: Path) -> None:
+    written = share(*small_run, "ioh", tmp_path)
+    assert len(written) == 2 * 3
+    described = json.loads((tmp_path / "l-shade" / "IOHprofiler_f2_rastrigin.json").read_text())
+    (scenario,) = described["scenarios"]
+    assert (described["function_name"], scenario["dimension"], len(scenario["runs"])) == ("rastrigin", 2, 7)
+    ends = results.trials.query("problem == 'rastrigin' and algorithm == 'l-shade'")["value"]
+    assert [run["best"]["y"] for run in scenario["runs"]] == ends.tolist()
+    rows = (tmp_path / "l-shade" / scenario["path"]).read_text().splitlines()
+    assert rows[0] == "evaluations raw_y"
+    assert rows[1] == f"1 {NOTHING!r}"
+    assert sum(row.startswith("1 ") for row in rows) == 7
+
+
+@pytest.mark.filterwarnings("ignore")  # of the packages that the reader brings along
+def test_an_independent_reader_finds_the_same_runs_and_expected_running_times(
+    small_run: Ran, results: ResultSet, tmp_path: Path
+) -> None:
+    reader = pytest.importorskip("iohinspector", reason="the independent reader iohinspector is not installed")
+    share(*small_run, "ioh", tmp_path)
+    manager = reader.DataManager()
+    manager.add_folder(str(tmp_path))
+    overview = manager.overview.to_pandas()
+    assert len(overview) == len(results.trials)
+    table = manager.load(True, True).to_pandas()
+    for cell in cells_of(results):
+        for name in cell.algorithms:
+            theirs = table[(table["function_name"] == cell.label) & (table["algorithm_name"] == name)]
+            bests = theirs.groupby("run_id")["raw_y"].min()
+            assert sorted(bests) == pytest.approx(sorted(cell.ends(name)))
+            for target in cell.targets[[0, 20, 35]]:
+                assert _ert(theirs, float(target), cell.budget) == pytest.approx(
+                    cell.expected_times(name, np.array([target]))[0]
+                )
+
+
+def _ert(table: pd.DataFrame, target: float, budget: int) -> float:
+    reached = table[table["raw_y"] <= target].groupby("run_id")["evaluations"].min()
+    failed = table["run_id"].nunique() - len(reached)
+    return (reached.sum() + failed * budget) / len(reached) if len(reached) else np.inf
+
+
+def test_a_suite_stands_for_all_its_problems_in_a_configuration(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(CONFIG.replace(CONFIG.splitlines()[1], "problem: suite-1"))
+    assert len(read_experiment(path).problem) == 24
+    both = "problem: [sphere, held-out-1, {suite: held-out-1, label: rules, penalty: feasibility_rules}]"
+    path.write_text(CONFIG.replace(CONFIG.splitlines()[1], both))
+    problems = read_experiment(path).problem
+    assert len(problems) == 1 + 12 + 12
+    assert problems[-1].label == f"{problems[12].label} rules"
+    assert problems[-1].settings == {**problems[12].settings, "penalty": "feasibility_rules"}
+
+
+def test_an_unknown_suite_is_told_with_the_nearest_name(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(CONFIG.replace(CONFIG.splitlines()[1], "problem: {suite: suite-2}"))
+    assert "unknown suite 'suite-2': did you mean 'suite-1'?" in refusal(read_experiment, path)
