@@ -4,7 +4,7 @@ BIN := .venv/bin
 KERNEL := problem/kernel.c problem/kernel_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study best-known test lint speed regression lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real test lint speed regression lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -52,6 +52,9 @@ study: .venv/run ## the comparison where the paper stops: results/study/
 
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
 	$(BIN)/armlab best-known
+
+real: .venv/dev ## identify the public recordings of real arms: results/real/
+	$(BIN)/armlab real
 
 speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results/speed.json and .md
 	$(BIN)/armlab speed

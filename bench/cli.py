@@ -31,6 +31,11 @@ _COMMANDS = {
     "export": "bench.commands.trajectories:export",
     "does-it-help": "bench.commands.trajectories:does_it_help",
     "recording": "recordings.cli:recording",
+    "identify": "identification.cli:identify",
+    "predict": "identification.cli:predict",
+    "export-model": "identification.cli:export_model",
+    "real": "identification.cli:real",
+    "coverage": "identification.cli:coverage",
     "speed": "bench.commands.speed:speed",
     "regression": "bench.commands.regression:regression",
 }

@@ -1,0 +1,1 @@
+"""From recordings to parameters: model structure, estimators, intervals, validation, export."""

@@ -1,0 +1,106 @@
+"""`armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+import pandas as pd
+
+from identification.groups import candidate_groups, components_of
+from identification.identifier import Identifier
+from identification.model import Model
+from identification.page import write_page
+from identification.priors import FREE, Pull
+from identification.regression import signals_of
+from identification.selection import describe, pulls, select
+from identification.validation import error_table, run_error
+from problem.errors import InputError
+from recordings.load import load_recording
+from recordings.recording import Recording
+from recordings.run import Run
+
+HELD_OUT = "no run validates: judged on the identification runs themselves, so the errors are too small"
+
+
+@dataclass(frozen=True)
+class Options:
+    """method: one of METHODS. tolerance: of a prior about the robot's own links. choose: by cross-validation."""
+
+    method: str = "weighted"
+    cutoff_hz: float | None = None
+    tolerance: float | None = None
+    choose: bool = False
+
+
+def identify_recording(folder: Path, out: Path, options: Options) -> Iterator[str]:
+    """Identifies, writes model.yaml and report.html into `out`, and tells parameters and errors in lines.
+
+    Raises InputError, in one line, for a recording that cannot be used and options that do not fit it.
+    """
+    recording = load_recording(folder)
+    runs = recording.with_role("identify")
+    if not runs:
+        raise InputError(f"{folder} has no run to identify from: give one of its runs the role identify")
+    if options.tolerance and recording.arm.links is None:
+        raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
+    identifier, how = _identifier(recording, options)
+    try:
+        identifier.fit(runs)
+    except ValueError as error:
+        raise InputError(f"{folder}: {error}") from None
+    model = identifier.model_
+    model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
+    errors = tuple(run_error(model, signals_of(run, model.cutoff_hz)) for run in recording.runs)
+    yield from how
+    yield str(model)
+    yield from (f"{part.label}: no motion tells it from the links, left out" for part in identifier.absorbed_)
+    yield f"condition number: {identifier.condition_number_:.4g} (columns at unit length)"
+    yield error_table(errors)
+    if not recording.with_role("validate"):
+        yield HELD_OUT
+    out.mkdir(parents=True, exist_ok=True)
+    yield f"model: {model.save(out / 'model.yaml')}"
+    yield f"page: {write_page(recording, identifier, errors, out / 'report.html')}"
+
+
+def _identifier(recording: Recording, options: Options) -> tuple[Identifier, list[str]]:
+    arm, robot = recording.arm, _robot(recording)
+    pull = Pull("nominal", options.tolerance) if options.tolerance else FREE
+    if not options.choose:
+        return Identifier(arm, None, options.method, pull, options.cutoff_hz, robot), []
+    groups = candidate_groups(len(arm))
+    candidates = (pull,) if options.tolerance else pulls(arm)
+    choice = select(arm, recording.with_role("identify"), groups, candidates).choice
+    line = f"chosen: {describe(choice)}; held-out error {100 * choice.held_out:.2f} % of the torque"
+    method = "alike" if options.method == "weighted" and not choice.by_joint else options.method
+    components = components_of(groups, choice.groups)
+    return Identifier(arm, components, method, choice.pull, choice.cutoff_hz, robot), [line]
+
+
+def _robot(recording: Recording) -> str:
+    """The robot as it can be found from the working folder."""
+    beside = recording.folder / recording.robot
+    return str(beside) if beside.is_file() else recording.robot
+
+
+def predict_recording(path: Path, folder: Path, out: Path | None) -> Iterator[str]:
+    """Errors of a model on each run of a recording, in lines; predicted torques as CSV files into `out`."""
+    model, recording = Model.load(path), load_recording(folder)
+    if len(model.arm) != len(recording.arm):
+        raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
+    yield error_table(tuple(run_error(model, signals_of(run, model.cutoff_hz)) for run in recording.runs))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        yield from (str(_write_torque(model, run, out)) for run in recording.runs)
+
+
+def _write_torque(model: Model, run: Run, out: Path) -> Path:
+    """Writes the predicted torque of a run with its times as a CSV file."""
+    signals = signals_of(run, model.cutoff_hz)
+    names = [f"tau{joint + 1}" for joint in range(len(model.arm))]
+    file = out / f"{run.name.replace('/', '-')}.predicted.csv"
+    table = pd.DataFrame(model.torque(signals.motion), columns=names)
+    table.insert(0, "t", signals.run.time)
+    table.to_csv(file, index=False)
+    return file

@@ -1,0 +1,1 @@
+"""Estimators: from a regression to parameters, each with what its intervals need."""

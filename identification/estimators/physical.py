@@ -1,0 +1,134 @@
+"""Full physical consistency: pseudo-inertias positive semidefinite, friction dissipative; a convex problem.
+
+Sousa and Cortesao 2014; Wensing, Kim and Slotine 2018; the pull to the nominal model is the entropic
+(Bregman log-det) divergence of Lee, Wensing and Park 2020. Solved by Clarabel through CVXPY (extra
+`identify`).
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.dissipation import dissipation_rows
+from identification.estimators.estimate import Estimate, lengths_of, pseudo_inverse
+from identification.estimators.linear import WeightedLeastSquares, joint_weights
+from identification.priors import FREE, Pull, nominal_prior, nominal_rotors, point_mass
+from identification.pseudo_inertia import basis, pseudo_inertias, regular_nominal
+from identification.regression import Regression
+from identification.structure import Structure
+from problem.errors import InputError
+from recordings.run import Array
+
+INSIDE = 1e-9  # of the largest nominal or fitted body: the solver's rounding stays on the physical side
+WEAK = 10.0  # tolerance where none is given: it settles what the data do not tell, and little else
+TYPICAL = (0.3, 0.3, 0.3, 1.0)  # m and sqrt(kg): the body that stands for a link without a nominal one
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalEstimate(Estimate):
+    """An estimate that some bodies can have: inertial parameters (10 * joints,) of the links."""
+
+    inertial: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicalLeastSquares:
+    """Least squares over bodies that can exist and friction that dissipates.
+
+    pull: `nominal` draws links and rotors to the arm's own as far as its tolerance says, with a point mass of
+    free size on the last link where it names a payload; any other leaves them to the data.
+    fastest: (joints,), rad/s, up to where friction has to dissipate. by_joint: weights by the joints' errors.
+    """
+
+    structure: Structure
+    fastest: Array
+    pull: Pull = FREE
+    by_joint: bool = True
+
+    def __call__(self, data: Regression) -> PhysicalEstimate:
+        """The estimate; raises InputError without CVXPY, RuntimeError where the solver finds no solution."""
+        weights = self._weights(data)
+        weighted = data.weighted(weights)
+        inertial, values = self._solve(weighted)
+        gram, information = weighted.matrix.T @ weighted.matrix, None
+        if self.pull.kind == "nominal":
+            information = nominal_prior(self.structure, self.pull.size, self.pull.payload).information
+            gram = gram + information
+        instruments = data.weighted(weights**2).matrix
+        return PhysicalEstimate(values, pseudo_inverse(gram), instruments, information, inertial)
+
+    def _weights(self, data: Regression) -> Array:
+        free = WeightedLeastSquares()(data).values
+        by_joint = joint_weights(data, free)
+        if self.by_joint:
+            return by_joint
+        return np.full(data.joints, 1 / np.sqrt(np.mean(data.residuals(free) ** 2)))
+
+    def _solve(self, data: Regression) -> tuple[Array, Array]:
+        cp = _cvxpy()
+        lengths = lengths_of(data.matrix)
+        triangle = _triangle(np.column_stack([data.matrix / lengths, data.torque]))
+        size, base = self.structure.size, self.structure.base
+        links = [cp.Variable((4, 4), PSD=True) for _ in range(len(self.structure.arm))]
+        scales = self._scales()
+        inertial = cp.hstack([_parameters(cp, link, scale) for link, scale in zip(links, scales, strict=True)])
+        conditions = [link >> INSIDE * np.eye(4) for link in links]
+        if self.pull.payload is not None:
+            mass = cp.Variable(nonneg=True)
+            inertial = inertial + mass * point_mass(len(links), self.pull.payload)
+        parts = [base.grouping @ inertial]
+        others = cp.Variable(size - len(base)) if size > len(base) else None
+        if others is not None:
+            parts.append(cp.multiply(others, 1 / lengths[len(base) :]))
+        values = cp.hstack(parts)
+        fitted = triangle[:, :size] @ cp.multiply(lengths, values)
+        noise = float(np.linalg.norm(triangle[:, size])) or 1.0
+        error = cp.sum_squares((fitted - triangle[:, size]) / noise)
+        pull = self._pull(cp, links, values) / noise**2
+        rows = dissipation_rows(self.structure, self.fastest)
+        if len(rows):
+            conditions.append((rows / np.abs(rows).max(axis=1, keepdims=True)) @ values >= 0)
+        task = cp.Problem(cp.Minimize(error + pull), conditions)
+        task.solve(solver=cp.CLARABEL)
+        if task.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+            raise RuntimeError(f"no physically consistent parameters found: the solver says '{task.status}'")
+        return np.asarray(inertial.value), np.asarray(values.value)
+
+    def _scales(self) -> Array:
+        """Factors (joints, 4, 4) that bring each body near the unit matrix: S with body = S link S'."""
+        if self.structure.arm.links is not None:
+            return np.asarray(np.linalg.cholesky(regular_nominal(self.structure.arm)))
+        return np.tile(np.diag(TYPICAL), (len(self.structure.arm), 1, 1))
+
+    def _pull(self, cp: Any, links: list[Any], values: Any) -> Any:
+        """Twice the divergence to the nominal bodies (the unit matrix here) over the squared tolerance."""
+        nominal = self.pull.kind == "nominal"
+        bodies = sum(2 * (cp.trace(link) - cp.log_det(link) - 4) for link in links)
+        rotors = [values[place] / inertia - 1 for place, inertia in nominal_rotors(self.structure)] if nominal else []
+        return (bodies + sum(cp.square(off) for off in rotors)) / (self.pull.size if nominal else WEAK) ** 2
+
+
+def _triangle(matrix: Array) -> Array:
+    return np.asarray(np.linalg.qr(matrix)[1])
+
+
+def _parameters(cp: Any, link: Any, scale: Array) -> Any:
+    """Ten parameters, linear in the scaled pseudo-inertia."""
+    gram = np.einsum("iab,jab->ij", basis(), basis())
+    dual = np.einsum("ij,jab->iab", np.linalg.inv(gram), basis())
+    turned = np.einsum("ab,iac,cd->ibd", scale, dual, scale)
+    return turned.reshape(10, 16) @ cp.vec(link, order="C")
+
+
+def is_physical(parameters: Array, tolerance: float = 0.0) -> bool:
+    """True if every link (10 * joints,) has a pseudo-inertia without negative eigenvalues."""
+    return bool(np.linalg.eigvalsh(pseudo_inertias(parameters)).min() >= -tolerance)
+
+
+def _cvxpy() -> Any:
+    try:
+        import cvxpy
+    except ImportError:
+        raise InputError("physically consistent parameters need CVXPY: pip install 'armlab[identify]'") from None
+    return cvxpy

@@ -1,0 +1,1 @@
+"""Identified models as files of simulators."""

@@ -1,0 +1,95 @@
+"""Writes `identification.csv` and a page with pictures for the public recordings."""
+
+from collections.abc import Iterator, Sequence
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+
+from identification.pictures import png
+from identification.real.looks import Looks
+from identification.real.published import Comparison, compare_with_published, in_published_structure
+from identification.real.study import Study, summary
+from identification.validation import RunError
+from problem.errors import InputError
+
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222; }
+table { border-collapse: collapse; } th, td { text-align: right; padding: 3px 12px; border-bottom: 1px solid #e4e4e4; }
+th:first-child, td:first-child { text-align: left; } img { max-width: 100%; }
+"""
+BELOW = 2.0  # combined standard errors
+
+
+def write_report(studies: Sequence[Study], looks: Looks, folder: Path) -> tuple[Path, Path]:
+    """Paths of the table and the page; InputError where they cannot be written."""
+    table, page = folder / "identification.csv", folder / "identification.html"
+    body = "".join(_body(studies, looks))
+    head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>Real arms</title><style>{STYLE}</style>'
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        error_frame(studies).to_csv(table, index=False, float_format="%.3f", lineterminator="\n")
+        page.write_text(f"{head}</head><body>{body}</body></html>\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write {folder}: {error.strerror}") from None
+    return table, page
+
+
+def error_frame(studies: Sequence[Study]) -> pd.DataFrame:
+    """recording, model, run, relative_error_percent: one row for each model on each run."""
+    rows = [
+        (found.recipe.name, model.name, error.run, error.relative_percent)
+        for found in studies
+        for model in found.models
+        for error in model.errors
+    ]
+    return pd.DataFrame(rows, columns=["recording", "model", "run", "relative_error_percent"])
+
+
+def _body(studies: Sequence[Study], looks: Looks) -> Iterator[str]:
+    yield "<h1>Real arms</h1><p>Percent of ||tau - tau_hat|| / ||tau|| over all joints. Cut-off, components and prior "
+    yield "are chosen by blocked cross-validation inside the identification data; validation data are looked at "
+    yield "afterwards, and every look is logged.</p>"
+    for found in studies:
+        yield from _section(found, looks)
+
+
+def _section(found: Study, looks: Looks) -> Iterator[str]:
+    yield f"<h2>{escape(found.recipe.name)}</h2><p>{escape(summary(found))}. "
+    yield f"{len(found.selection.tried)} alternatives were compared inside the identification data.</p>"
+    yield "<table><tr><th>model</th><th>run</th><th>role</th><th>percent, filtered</th><th>percent, as recorded</th>"
+    yield "<th>best known</th><th>looks at the run</th></tr>"
+    for model in found.models:
+        for error in model.errors:
+            yield _row(found, model.name, error, looks)
+    yield "</table>"
+    chosen = found.models[-1].identifier
+    yield f"<p>Condition number of the chosen columns at unit length: {chosen.condition_number_:.3g}.</p>"
+    if found.recipe.name == "staubli-tx40":
+        same = in_published_structure(found.recording, found.selection.choice.cutoff_hz)
+        yield from _published(compare_with_published(same))
+    for run in found.recording.with_role("validate"):
+        picture = png(chosen.model_.plot(run))
+        yield f'<img alt="torque and model on {escape(run.name)}" src="{picture}">'
+
+
+def _row(found: Study, name: str, error: RunError, looks: Looks) -> str:
+    judged = error.role == "validate"
+    known = found.recipe.best_known.get(error.run, float("nan")) if judged else float("nan")
+    count = looks.count(found.recording.arm.name, error.run) if judged else 0
+    cells = (
+        name, error.run, error.role, f"{error.relative_percent:.2f}", f"{error.recorded_percent:.2f}",
+        f"{known:.1f}" if known == known else "", str(count) if judged else "",
+    )  # fmt: skip
+    return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
+
+
+def _published(rows: Sequence[Comparison]) -> Iterator[str]:
+    close = sum(row.ratio < BELOW for row in rows)
+    yield f"<p>{close} of {len(rows)} published base parameters ({100 * close / len(rows):.0f} %) lie within "
+    yield f"{BELOW:g} combined standard errors.</p><table><tr><th>parameter</th><th>published</th><th>found</th>"
+    yield "<th>difference / combined standard error</th></tr>"
+    for row in rows:
+        yield f"<tr><td>{escape(row.name)}</td><td>{row.published:.4g} &plusmn; {row.published_error:.2g}</td>"
+        yield f"<td>{row.found:.4g} &plusmn; {row.found_error:.2g}</td><td>{row.ratio:.2f}</td></tr>"
+    yield "</table>"

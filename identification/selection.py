@@ -1,0 +1,153 @@
+"""Chooses cut-off, components and prior by blocked cross-validation inside the identification data."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.estimators.linear import Prior, WeightedLeastSquares
+from identification.groups import USUAL, Groups, components_of, toggled
+from identification.moments import Split, split
+from identification.priors import Pull
+from identification.regression import Regression, regression, signals_of, suggested_cutoff
+from identification.structure import Structure
+from problem.arm import Arm
+from recordings.differentiate import Signals
+from recordings.run import Run
+
+CUTOFFS = (0.35, 0.5, 0.7, 1.0)  # times the suggested one, above which a rigid model explains nothing
+GAIN = 0.99  # a change has to lower the held-out error below this share of it
+SHARES = (1e-4, 1e-3, 1e-2, 1e-1)
+TOLERANCES = (0.03, 0.1, 0.3, 1.0, 3.0)
+Tried = tuple[str, float]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A structure and how to fit it.
+
+    by_joint: joints weighted by their errors. held_out: held-out error against the filtered torque, recorded:
+    against the torque as recorded, by which cut-offs are compared; both ||tau - tau_hat|| / ||tau||.
+    """
+
+    cutoff_hz: float
+    groups: tuple[str, ...]
+    pull: Pull
+    by_joint: bool
+    held_out: float
+    recorded: float
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The choice, and every alternative that was looked at with its held-out error."""
+
+    choice: Choice
+    tried: tuple[Tried, ...]
+
+
+def pulls(arm: Arm, payload: tuple[float, float, float] | None = None) -> tuple[Pull, ...]:
+    """The priors that an arm allows."""
+    free = (Pull(), *(Pull("shrinkage", share) for share in SHARES))
+    return free if arm.links is None else free + tuple(Pull("nominal", size, payload) for size in TOLERANCES)
+
+
+def select(
+    arm: Arm,
+    runs: Sequence[Run],
+    groups: Groups,
+    candidates: Sequence[Pull],
+    starts: Sequence[tuple[str, ...]] = (USUAL,),
+    cutoffs: Sequence[float] = CUTOFFS,
+) -> Selection:
+    """The choice with the least held-out error.
+
+    At one cut-off, structures and priors are compared on the filtered torque, from every start; cut-offs are
+    compared by the torque as recorded, so that none gains by hiding what it cannot explain.
+    """
+    suggested = max(suggested_cutoff(run) for run in runs)
+    best: Choice | None = None
+    tried: list[Tried] = []
+    for factor in cutoffs:
+        search = _Search.prepare(arm, [signals_of(run, factor * suggested) for run in runs], groups, candidates)
+        climbs = [search.climb(start, factor * suggested, tried) for start in starts]
+        choice = min(climbs, key=lambda each: each.held_out)
+        if best is None or choice.recorded < best.recorded:
+            best = choice
+    if best is None:
+        raise ValueError("no cut-off to choose from")
+    return Selection(best, tuple(tried))
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """One cut-off: moments of all candidate columns against the filtered and the recorded torque."""
+
+    groups: Groups
+    columns: dict[str, list[int]]
+    base: list[int]
+    priors: dict[Pull, Prior | None]
+    filtered: Split
+    recorded: Split
+
+    @staticmethod
+    def prepare(arm: Arm, signals: Sequence[Signals], groups: Groups, candidates: Sequence[Pull]) -> "_Search":
+        structure = with_load(Structure(arm, components_of(groups, tuple(groups))), signals)
+        data = regression(structure, signals)
+        columns, index = dict[str, list[int]](), 0
+        for name, parts in groups.items():
+            places = structure.slices[index : index + len(parts)]
+            columns[name] = [column for place in places for column in range(place.start, place.stop)]
+            index += len(parts)
+        priors = {pull: pull.prior(structure, data) for pull in candidates}
+        recorded = split(data, as_recorded(structure, signals, data))
+        return _Search(groups, columns, list(range(len(structure.base))), priors, split(data, data), recorded)
+
+    def error(self, choice: Choice, against: Split) -> float:
+        columns = self.base + [column for name in choice.groups for column in self.columns[name]]
+        return against.held_out_error(sorted(columns), self.priors[choice.pull], choice.by_joint)
+
+    def climb(self, start: tuple[str, ...], cutoff_hz: float, tried: list[Tried]) -> Choice:
+        """Takes the best change until none is worth it."""
+        current = Choice(cutoff_hz, start, next(iter(self.priors)), True, np.inf, np.inf)
+        current = replace(current, held_out=self.error(current, self.filtered))
+        while True:
+            changes = [replace(each, held_out=self.error(each, self.filtered)) for each in self._changes(current)]
+            tried.extend((describe(each), each.held_out) for each in changes)
+            best = min(changes, key=lambda each: each.held_out)
+            if best.held_out > GAIN * current.held_out:
+                return replace(current, recorded=self.error(current, self.recorded))
+            current = best
+
+    def _changes(self, current: Choice) -> Iterator[Choice]:
+        yield from (replace(current, groups=toggled(current.groups, name)) for name in self.groups)
+        for pull in self.priors:
+            yield from (replace(current, pull=pull, by_joint=by_joint) for by_joint in (True, False))
+
+
+def describe(choice: Choice) -> str:
+    """A choice in a line."""
+    weights = "joints weighted" if choice.by_joint else "joints alike"
+    groups = ", ".join(choice.groups) or "rigid only"
+    return f"{choice.cutoff_hz:.3g} Hz; {groups}; prior {choice.pull}; {weights}"
+
+
+def with_load(structure: Structure, signals: Sequence[Signals]) -> Structure:
+    """The structure with inertial parameters that load-dependent friction can follow: those of a first fit."""
+    if not any(part.effect == "load_dependent_friction" for part in structure.components):
+        return structure
+    rest = tuple(part for part in structure.components if part.effect != "load_dependent_friction")
+    first = structure.with_components(rest)
+    values = WeightedLeastSquares()(regression(first, signals)).values
+    return replace(structure, load=first.full(values[: len(first.base)]))
+
+
+def as_recorded(structure: Structure, signals: Sequence[Signals], data: Regression) -> Regression:
+    """The same rows without any filter on the torque: what a prediction has to meet in the end."""
+    matrices, torques = [], []
+    for each in signals:
+        rows = each.filter.rows
+        whole = structure.matrix(each.motion).reshape(each.motion.samples, data.joints, -1)
+        matrices.append(whole[rows].reshape(-1, structure.size))
+        torques.append(each.run.torque[rows].ravel())
+    return replace(data, matrix=np.vstack(matrices), torque=np.concatenate(torques))

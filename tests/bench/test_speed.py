@@ -1,0 +1,62 @@
+"""The speed report measures what it says; no test here asserts a time."""
+
+import numpy as np
+import pytest
+
+from bench.speed.clock import median_seconds
+from bench.speed.condition import in_joint_frames, random_motions
+from bench.speed.report import page
+from problem.regressor import rigid_body_torque
+from problem.robot_file import load_arm
+
+
+def test_rivals_take_turns_after_one_call_each_that_does_not_count() -> None:
+    calls: list[str] = []
+    median_seconds({"a": lambda: calls.append("a"), "b": lambda: calls.append("b")}, rounds=2, calls=2)
+    assert "".join(calls) == "ab" + "aabb" * 2
+
+
+def test_both_pipelines_give_the_same_condition_numbers() -> None:
+    pytest.importorskip("pinocchio", reason="the engine Pinocchio is not installed")
+    from bench.speed.condition import against_pinocchio
+
+    assert against_pinocchio()["largest_relative_difference"] < 1e-10
+
+
+def test_moving_the_links_frames_to_the_joints_moves_nothing_else() -> None:
+    arm = load_arm("irb120-arm")
+    moved = in_joint_frames(arm)
+    motion = random_motions(arm, 1, 20)
+    point_mass = np.zeros(30)
+    point_mass[20] = 1.0  # 1 kg at the origin of the last frame, which is where the tail of joint 3 puts it
+    behind = moved.joints[2]
+    tail = arm.joints[2].after[:3, 3]
+    in_joint = np.zeros(30)
+    in_joint[20:24] = 1.0, *tail
+    square = np.outer(tail, tail)
+    in_joint[24:30] = [*(np.trace(square) - np.diag(square)), -square[0, 1], -square[0, 2], -square[1, 2]]
+    assert np.array_equal(behind.after, np.eye(4))
+    np.testing.assert_allclose(
+        rigid_body_torque(arm, motion, point_mass), rigid_body_torque(moved, motion, in_joint), atol=1e-12
+    )
+
+
+def test_the_page_shows_the_ratio_and_every_rival() -> None:
+    figures = {
+        "condition_number": {
+            "armlab_us": 10.0,
+            "armlab_one_at_a_time_us": 40.0,
+            "pinocchio_us": 200.0,
+            "ratio_to_pinocchio": 20.0,
+            "ratio_to_pinocchio_one_at_a_time": 5.0,
+            "largest_relative_difference": 1e-14,
+        },
+        "evaluations_per_second": {"paper": 1e5},
+        "overhead_us": {"spso": {"armlab, one": 1.2, "pygmo, one": 1.6}},
+        "growth_us": {"samples": {"50": 5.0}},
+        "provenance": {"processor": "a processor"},
+    }
+    text = page(figures)
+    assert "Ratio to Pinocchio: 20.0" in text
+    assert "| spso | pygmo, one | 1.60 |" in text
+    assert "| samples | 50 | 5.0 |" in text

@@ -1,0 +1,116 @@
+"""Exported files, read by MuJoCo and Pinocchio, which share no code with this project."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from identification.components import usual_components
+from identification.export.command import export_model
+from identification.export.mjcf import mjcf
+from identification.export.urdf import urdf
+from identification.model import Model
+from identification.pseudo_inertia import parameters_of, regular_nominal
+from identification.structure import Structure
+from problem.errors import InputError
+from problem.motion import Motion
+from problem.robot_file import load_arm
+from recordings.run import Array
+
+ARMS = ("irb120-arm", "irb120", "staubli-tx40")
+SMOOTH = ("viscous_friction", "rotor_inertia")
+
+
+def model_of(name: str, effects: tuple[str, ...] = SMOOTH) -> Model:
+    arm = load_arm(name)
+    chosen = tuple(part for part in usual_components(len(arm)) if part.effect in effects)
+    structure = Structure(arm, chosen)
+    own = np.random.default_rng(3).uniform(0.1, 1.0, len(chosen))
+    inertial = parameters_of(regular_nominal(arm))
+    values = np.concatenate([structure.base.values(inertial), own])
+    return Model(name, structure, values, inertial=inertial)
+
+
+def states(joints: int) -> Motion:
+    return Motion(*np.random.default_rng(4).uniform(-2, 2, (3, 20, joints)))
+
+
+def mujoco_torque(document: str, motion: Motion) -> Array:
+    mujoco = pytest.importorskip("mujoco")
+    simulated = mujoco.MjModel.from_xml_string(document)
+    simulated.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    data, out = mujoco.MjData(simulated), []
+    for position, velocity, acceleration in zip(motion.position, motion.velocity, motion.acceleration, strict=True):
+        data.qpos[:], data.qvel[:], data.qacc[:] = position, velocity, acceleration
+        mujoco.mj_inverse(simulated, data)
+        out.append(data.qfrc_inverse.copy())
+    return np.array(out)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_mujoco_reproduces_rigid_armature_and_viscous_torque_of_the_mjcf(name: str) -> None:
+    model = model_of(name)
+    motion = states(len(model.arm))
+    assert_allclose(mujoco_torque(mjcf(model), motion), model.torque(motion), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ARMS)
+def test_mujoco_reproduces_rigid_and_viscous_torque_of_the_urdf(name: str) -> None:
+    model = model_of(name, ("viscous_friction",))
+    motion = states(len(model.arm))
+    assert_allclose(mujoco_torque(urdf(model), motion), model.torque(motion), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("form", ["mjcf", "urdf"])
+def test_pinocchio_reproduces_the_exported_torque(name: str, form: str, tmp_path: Path) -> None:
+    pin = pytest.importorskip("pinocchio")
+    model = model_of(name, SMOOTH if form == "mjcf" else ("viscous_friction",))
+    motion = states(len(model.arm))
+    path = tmp_path / f"arm.{form}.xml"
+    path.write_text(mjcf(model) if form == "mjcf" else urdf(model))
+    read = pin.buildModelFromMJCF(str(path)) if form == "mjcf" else pin.buildModelFromXML(path.read_text())
+    read.gravity.linear[:] = model.arm.gravity
+    data, out = read.createData(), []
+    for position, velocity, acceleration in zip(motion.position, motion.velocity, motion.acceleration, strict=True):
+        torque = pin.rnea(read, data, _configuration(read, position), velocity, acceleration)
+        out.append(torque + _damping(read, velocity))
+    assert_allclose(np.array(out), model.torque(motion), atol=1e-9)
+
+
+def _configuration(read: object, position: Array) -> Array:
+    """Pinocchio writes a joint without limits as a cosine and a sine."""
+    if read.nq == len(position):  # type: ignore[attr-defined]
+        return position
+    return np.column_stack([np.cos(position), np.sin(position)]).ravel()
+
+
+def _damping(read: object, velocity: Array) -> Array:
+    return np.asarray(read.damping) * velocity  # type: ignore[attr-defined]
+
+
+def test_gravity_along_any_direction_survives_the_urdf() -> None:
+    arm = load_arm("kuka-kr300")  # gravity along +z of its base
+    structure = Structure(arm, ())
+    inertial = np.concatenate([[10, 1, 2, 0.5, 2.0, 2.0, 2.0, 0, 0, 0] for _ in range(6)]).astype(float)
+    model = Model("kuka-kr300", structure, structure.base.values(inertial), inertial=inertial)
+    motion = states(6)
+    assert_allclose(mujoco_torque(urdf(model), motion), model.torque(motion), atol=1e-7)
+
+
+def test_a_model_without_links_cannot_be_exported(tmp_path: Path) -> None:
+    model = model_of("irb120-arm")
+    bare = Model(model.robot, model.structure, model.values)
+    path = bare.save(tmp_path / "model.yaml")
+    with pytest.raises(InputError, match="--method physical"):
+        list(export_model(path, tmp_path / "arm.urdf"))
+    with pytest.raises(InputError, match=r"should end in \.urdf or \.xml"):
+        list(export_model(path, tmp_path / "arm.step"))
+
+
+def test_export_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
+    path = model_of("irb120-arm", (*SMOOTH, "torque_offset")).save(tmp_path / "model.yaml")
+    lines = list(export_model(path, tmp_path / "arm.urdf"))
+    assert "rotor inertias" in lines[1]
+    assert "torque_offset, joint 1" in lines[1]

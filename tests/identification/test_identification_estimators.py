@@ -1,0 +1,129 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from simulated_arm import arm, run, structure, truth
+
+from identification.components import every_joint
+from identification.estimators.linear import BayesianLeastSquares, OrdinaryLeastSquares, Prior, WeightedLeastSquares
+from identification.estimators.robust import RobustLeastSquares
+from identification.identifier import METHODS, Identifier
+from identification.priors import Pull, nominal_prior, point_mass
+from identification.pseudo_inertia import least_eigenvalues, parameters_of, regular_nominal
+from identification.regression import Regression, regression, signals_of
+from recordings.run import Array, Run
+
+MODEL = structure()
+TRUTH = truth(MODEL)
+
+
+def line(noise: Array) -> Regression:
+    """torque = 2 x + noise, one joint."""
+    x = np.linspace(-1, 1, len(noise))[:, None]
+    return Regression(x, 2 * x[:, 0] + noise, 1, (len(noise),), 100.0, 0.05)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_method_finds_the_truth_in_clean_data(method: str) -> None:
+    pytest.importorskip("cvxpy")
+    clean = run(MODEL, TRUTH, seconds=20.0)
+    clean = replace(clean, reference_position=clean.position)
+    identifier = Identifier(arm(), method=method, cutoff_hz=10.0).fit([clean])
+    assert_allclose(identifier.model_.values, TRUTH, rtol=0.05, atol=0.03)
+    assert identifier.score(clean) > 0.9999
+
+
+def test_weights_are_one_over_the_deviation_of_each_joint() -> None:
+    rng = np.random.default_rng(0)
+    matrix = np.ones((4000, 1))
+    noise = rng.standard_normal((2000, 2)) * [0.1, 10.0]
+    data = Regression(matrix, (3 + noise).ravel(), 2, (2000,), 100.0, 0.01)
+    loud, quiet = OrdinaryLeastSquares()(data).values[0], WeightedLeastSquares()(data).values[0]
+    assert abs(quiet - 3) < 0.01 < abs(loud - 3)
+
+
+@pytest.mark.parametrize("loss", ["huber", "tukey"])
+def test_a_push_during_a_tenth_of_the_time_does_not_move_robust_estimates(loss: str) -> None:
+    noise = 0.01 * np.random.default_rng(1).standard_normal(1000)
+    noise[-100:] += 5.0
+    data = line(noise)
+    assert abs(OrdinaryLeastSquares()(data).values[0] - 2) > 0.5
+    assert abs(RobustLeastSquares(loss)(data).values[0] - 2) < 0.05  # type: ignore[arg-type]
+
+
+def test_a_prior_weighs_like_the_data_that_it_stands_for() -> None:
+    noise = np.random.default_rng(2).standard_normal(1000)
+    data = line(noise)
+    free = OrdinaryLeastSquares()(data)
+    variance = float(np.mean(data.residuals(free.values) ** 2))
+    information = data.matrix.T @ data.matrix / variance
+    drawn = BayesianLeastSquares(Prior(np.array([2.2]), information))(data)
+    assert_allclose(drawn.values, (free.values + 2.2) / 2, rtol=0.01)
+
+
+def noisy_runs(count: int) -> list[Run]:
+    """Coarse encoders and a reference that is exactly what was done."""
+    out = []
+    for seed in range(count):
+        clean = run(MODEL, TRUTH, seed, noise=0.02, seconds=10.0)
+        noise = 2e-3 * np.random.default_rng(50 + seed).standard_normal(clean.position.shape)
+        out.append(replace(clean, position=clean.position + noise, reference_position=clean.position))
+    return out
+
+
+@pytest.mark.parametrize("method", ["instrumental", "total", "likelihood"])
+def test_methods_for_noisy_columns_have_less_bias_than_least_squares(method: str) -> None:
+    runs = noisy_runs(3)
+    distance = {}
+    for name in ("ordinary", method):
+        found = Identifier(arm(), method=name, cutoff_hz=12.0).fit(runs).model_
+        distance[name] = np.linalg.norm(found.torque(signals_of(runs[0]).motion) - _torque(runs[0]))
+    assert distance[method] < 0.8 * distance["ordinary"]
+
+
+def _torque(noisy: Run) -> Array:
+    return (MODEL.matrix(signals_of(noisy).motion) @ TRUTH).reshape(-1, 3)
+
+
+def test_physical_estimates_are_bodies_that_can_exist_and_friction_that_brakes() -> None:
+    pytest.importorskip("cvxpy")
+    short = run(MODEL, TRUTH * np.where(np.arange(MODEL.size) < len(MODEL.base), 1, -0.2), noise=3.0, seconds=3.0)
+    free = Identifier(arm(), method="weighted").fit([short]).model_
+    physical = Identifier(arm(), method="physical").fit([short]).model_
+    viscous = [
+        place.start
+        for part, place in zip(MODEL.components, MODEL.slices, strict=True)
+        if part.effect == "viscous_friction"
+    ]
+    assert free.values[viscous].min() < -0.1
+    assert physical.inertial is not None
+    assert least_eigenvalues(physical.inertial).min() > 0
+    assert_allclose(MODEL.base.values(physical.inertial), physical.base_values, atol=1e-9)
+    signals = signals_of(short)
+    assert physical.values[viscous].min() > -0.2 * np.abs(signals.motion.velocity).max()
+
+
+def test_a_tight_nominal_prior_gives_back_the_nominal_links() -> None:
+    pytest.importorskip("cvxpy")
+    noisy = run(MODEL, 1.5 * TRUTH, noise=0.5)
+    nominal = MODEL.base.values(parameters_of(regular_nominal(arm())))
+    for method in ("weighted", "physical"):
+        tight = Identifier(arm(), method=method, pull=Pull("nominal", 1e-4)).fit([noisy]).model_
+        assert_allclose(tight.base_values, nominal, rtol=0.01, atol=0.003)
+
+
+def test_a_payload_of_any_mass_costs_the_prior_nothing() -> None:
+    model = structure(every_joint("viscous_friction", 3))
+    prior = nominal_prior(model, 0.1, (0.0, 0.0, 0.1))
+    load = np.zeros(model.size)
+    load[: len(model.base)] = model.base.values(point_mass(3, (0.0, 0.0, 0.1)))
+    free = nominal_prior(model, 0.1)
+    assert load @ prior.information @ load < 1e-6 * (load @ free.information @ load)
+
+
+def test_runs_of_another_arm_are_refused() -> None:
+    wrong = run(MODEL, TRUTH)
+    wrong = replace(wrong, position=wrong.position[:, :2], torque=wrong.torque[:, :2])
+    with pytest.raises(ValueError, match="does not have the 3 joints"):
+        regression(MODEL, [signals_of(wrong)])

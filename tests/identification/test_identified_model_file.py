@@ -1,0 +1,107 @@
+import json
+from functools import lru_cache
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_allclose
+from simulated_arm import arm, motion, run, structure, truth
+
+from identification.components import Component, every_joint, neighbour_couplings
+from identification.identifier import Identifier
+from identification.model import Model
+from problem.errors import InputError
+
+PARTS = (
+    *every_joint("viscous_friction", 3),
+    *every_joint("asymmetric_friction", 3, 0.0),
+    *every_joint("nonlinear_viscous_friction", 3, 0.5),
+    *neighbour_couplings(3),
+    Component("rotor_inertia", 3),
+    Component("gravity_compensator", 2),
+    Component("torque_ripple", 1, held=7.0),
+    Component("load_dependent_friction", 2),
+)
+
+
+@lru_cache
+def model(method: str = "weighted") -> Model:
+    plain = structure()
+    recorded = run(plain, truth(plain), noise=0.05)
+    return Identifier(arm(), PARTS, method, robot="irb120-arm").fit([recorded]).model_
+
+
+@pytest.mark.parametrize("method", ["weighted", "physical"])
+def test_a_model_predicts_the_same_after_a_round_trip(tmp_path: Path, method: str) -> None:
+    if method == "physical":
+        pytest.importorskip("cvxpy")
+    saved = model(method)
+    loaded = Model.load(saved.save(tmp_path / "model.yaml"))
+    moved = motion(9)[1]
+    assert_allclose(loaded.torque(moved), saved.torque(moved), rtol=1e-6, atol=1e-6)
+    assert loaded.cutoff_hz == saved.cutoff_hz
+    assert (loaded.inertial is None) == (saved.inertial is None)
+
+
+def test_a_model_file_follows_the_schema(tmp_path: Path) -> None:
+    schema = json.loads((Path(__file__).parents[1] / "schemas" / "model.schema.json").read_text())
+    content = yaml.safe_load(model().save(tmp_path / "model.yaml").read_text())
+    jsonschema.validate(content, schema)
+    viscous = content["components"][0]
+    assert viscous["effect"] == "viscous_friction"
+    low, high = viscous["parameters"]["coefficient"]["ci95"]
+    assert low < viscous["parameters"]["coefficient"]["value"] < high
+    assert viscous["parameters"]["coefficient"]["unit"] == "N.m.s/rad"
+
+
+def test_a_coupling_names_where_the_torque_is_and_where_the_motion_is(tmp_path: Path) -> None:
+    content = yaml.safe_load(model().save(tmp_path / "model.yaml").read_text())
+    couplings = [entry["joints"] for entry in content["components"] if entry["effect"] == "joint_coupling"]
+    assert couplings == [[2, 3], [3, 2]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"joint": 7}, "joint 7 should be one from 1 to 3"),
+        ({"parameters": {"level": {"value": 1.0, "ci95": None, "unit": "N.m"}}}, "should be coefficient"),
+        ({"effect": "stribeck_friction"}, "no effect that a model can compute"),
+    ],
+)
+def test_a_wrong_component_is_told_in_one_line(tmp_path: Path, change: dict[str, object], message: str) -> None:
+    path = model().save(tmp_path / "model.yaml")
+    content = yaml.safe_load(path.read_text())
+    content["components"][0] |= change
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match=message):
+        Model.load(path)
+
+
+def test_base_parameters_of_another_arm_are_refused(tmp_path: Path) -> None:
+    path = model().save(tmp_path / "model.yaml")
+    path.write_text(path.read_text().replace("robot: irb120-arm", "robot: irb120"))
+    with pytest.raises(InputError, match="base_parameters are not those of irb120"):
+        Model.load(path)
+
+
+def test_links_alone_are_enough_for_a_model(tmp_path: Path) -> None:
+    links = [
+        {"mass": link.mass, "first_moment": list(link.first_moment), "inertia": list(link.inertia)}
+        for link in arm().links or ()
+    ]
+    content = {"schema": "model/1", "robot": "irb120-arm", "links": links, "components": []}
+    path = tmp_path / "model.yaml"
+    path.write_text(yaml.safe_dump(content))
+    moved = motion(3)[1]
+    loaded = Model.load(path)
+    expected = structure(()).matrix(moved) @ loaded.structure.base.values(arm().parameters)
+    assert_allclose(loaded.torque(moved).ravel(), expected)
+
+
+def test_a_printed_model_tells_intervals_and_units() -> None:
+    text = str(model())
+    assert "viscous_friction, joint 2: coefficient = " in text
+    assert "N.m.s/rad" in text
+    assert np.char.count(text, "[") > 10

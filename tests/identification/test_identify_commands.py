@@ -1,0 +1,89 @@
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from click.testing import CliRunner
+from simulated_arm import RATE_HZ, arm, run, structure, truth
+
+from identification.cli import coverage, export_model, identify, predict, real
+from identification.model import Model
+from problem.errors import InputError
+from recordings.write import Draft, DraftRun, write_recording
+
+COLUMNS = {"time": "t", "position": ("q1", "q2", "q3"), "torque": ("tau1", "tau2", "tau3")}
+NAMES = ("t", "q1", "q2", "q3", "tau1", "tau2", "tau3")
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    model = structure()
+    values = truth(model)
+    runs = []
+    for seed, role in ((0, "identify"), (1, "validate")):
+        made = run(model, values, seed, noise=0.05, role=role)  # type: ignore[arg-type]
+        table = np.column_stack([made.time, made.position, made.torque])
+        runs.append(DraftRun(f"run-{seed}.csv", made.role, NAMES, table))
+    units = {"time": "s", "position": "rad", "torque": "N.m"}
+    return write_recording(Draft("irb120-arm", COLUMNS, units, tuple(runs)), tmp_path / "recording")
+
+
+def invoke(command: object, *arguments: object) -> str:
+    result = CliRunner().invoke(command, [str(each) for each in arguments], catch_exceptions=False)  # type: ignore[arg-type]
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_identify_tells_parameters_condition_number_and_errors_and_writes_model_and_page(
+    recording: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    text = invoke(identify, recording, "--out", out)
+    assert "viscous_friction, joint 1: coefficient = " in text
+    assert "rotor_inertia, joint 1: no motion tells it from the links" in text
+    assert "condition number" in text
+    assert "run-1.csv             validate" in text
+    model = Model.load(out / "model.yaml")
+    assert model.provenance["runs"] == ("run-0.csv",)
+    assert "data:image/png" in (out / "report.html").read_text()
+
+
+def test_predict_meets_the_recorded_torque_and_writes_what_it_predicts(recording: Path, tmp_path: Path) -> None:
+    invoke(identify, recording, "--out", tmp_path / "out")
+    text = invoke(predict, tmp_path / "out" / "model.yaml", recording, "--out", tmp_path / "torques")
+    assert "run-1.csv: 0." in text
+    predicted = pd.read_csv(tmp_path / "torques" / "run-1.csv.predicted.csv")
+    recorded = pd.read_csv(recording / "run-1.csv")
+    inner = slice(int(RATE_HZ), -int(RATE_HZ))
+    left = (predicted[["tau2"]] - recorded[["tau2"]]).to_numpy()[inner]
+    assert np.std(left) < 0.5
+
+
+def test_physical_links_go_all_the_way_to_a_simulator_file(recording: Path, tmp_path: Path) -> None:
+    pytest.importorskip("cvxpy")
+    invoke(identify, recording, "--out", tmp_path / "out", "--method", "physical", "--tolerance", "0.5")
+    text = invoke(export_model, tmp_path / "out" / "model.yaml", tmp_path / "arm.xml")
+    assert "torque_offset" in text
+    assert "<mujoco" in (tmp_path / "arm.xml").read_text()
+
+
+def test_a_tolerance_without_nominal_links_is_refused(recording: Path, tmp_path: Path) -> None:
+    settings = yaml.safe_load((recording / "recording.yaml").read_text())
+    robot = tmp_path / "recording" / "bare.yaml"
+    rows = [{"name": f"j{i}", "type": "revolute", "a": 0.1, "d": 0.0, "alpha": 1.0} for i in range(len(arm()))]
+    robot.write_text(yaml.safe_dump({"name": "bare", "dh_convention": "standard", "joints": rows}))
+    (recording / "recording.yaml").write_text(yaml.safe_dump(settings | {"robot": "bare.yaml"}))
+    with pytest.raises(InputError, match="--tolerance needs nominal `links`"):
+        invoke(identify, recording, "--tolerance", "0.1")
+
+
+def test_an_unknown_public_recording_names_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="did you mean 'unisa-ur10'"):
+        invoke(real, "--only", "unisa-ur1", "--results", tmp_path, "--recordings", tmp_path)
+
+
+def test_coverage_writes_what_it_measured(tmp_path: Path) -> None:
+    text = invoke(coverage, "--experiments", 10, "--results", tmp_path)
+    assert "in 10 experiments" in text
+    assert (tmp_path / "coverage.json").is_file()
