@@ -48,12 +48,8 @@ def check_algorithm(algorithm: AnyAlgorithm) -> None:
     """Raises BrokenPromiseError, whose message is a sentence about the promise that is broken."""
     check_parameters(algorithm)
     check_global_randomness(algorithm)
-    for occasion, game in OCCASIONS.items():
-        with _crashes_named(algorithm, occasion):
-            steps = play(algorithm, game)
-        check_points(algorithm, occasion, game, steps)
-        for told in range(1, len(steps) + 1):
-            check_incumbent(algorithm, occasion, steps[:told])
+    for occasion in OCCASIONS:
+        check_occasion(algorithm, occasion)
     for occasion in ("on a bowl", "on a constant objective"):  # with and without progress
         check_randomness(algorithm, OCCASIONS[occasion])
         check_sharing(algorithm, OCCASIONS[occasion])
@@ -77,6 +73,16 @@ def check_global_randomness(algorithm: AnyAlgorithm) -> None:
     with _crashes_named(algorithm, "on a bowl"):
         play(algorithm, Game(bowl))
     _demand(_global_randomness() == before, algorithm, "draws from the global random state of numpy or Python")
+
+
+def check_occasion(algorithm: AnyAlgorithm, occasion: str) -> None:
+    """What it asks for and which best it reports, in one of OCCASIONS."""
+    game = OCCASIONS[occasion]
+    with _crashes_named(algorithm, occasion):
+        steps = play(algorithm, game)
+    check_points(algorithm, occasion, game, steps)
+    for told in range(1, len(steps) + 1):
+        check_incumbent(algorithm, occasion, steps[:told])
 
 
 def check_points(algorithm: AnyAlgorithm, occasion: str, game: Game, steps: list[Step]) -> None:

@@ -63,7 +63,7 @@ class CMAES:
         loss = as_loss(fitness)
         promote(state.leaders, X, loss)
         U = (X - state.box.lower) / (state.box.upper - state.box.lower)
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):  # a diverging step size: should_stop sees it
             state.optimiser.tell(list(zip(U, loss.tolist(), strict=True)))
         state.started = True
         return state

@@ -73,7 +73,7 @@ class IPOPCMAES:
             state.started = True
             return state
         U = np.where(_from_unit(state.asked, state.box) == X, state.asked, U)
-        with np.errstate(invalid="ignore"):  # a generation of nothing but losses: inf - inf
+        with np.errstate(invalid="ignore", over="ignore"):  # inf - inf; a diverging step size: should_stop sees it
             state.optimiser.tell(list(zip(U, loss.tolist(), strict=True)))
             if state.optimiser.should_stop():
                 _restart(state)

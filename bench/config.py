@@ -89,7 +89,7 @@ class Experiment(Settings):
     repetitions: PositiveInt
     seed: Annotated[int, Field(ge=0)]
     bounds: Literal["clip", "reflect", "wrap"] = "clip"
-    output: Literal["table", "convergence", "swarm_sizes"] = "table"
+    output: Literal["table", "convergence", "swarm_sizes", "rivals"] = "table"
     printed: bool = False
 
     @model_validator(mode="after")
@@ -117,7 +117,7 @@ class Experiment(Settings):
     @model_validator(mode="after")
     def _fits_output(self) -> Self:
         sweeps = len(self.problem) > 1 or len(self.iterations or self.evaluations or ()) > 1
-        if self.output != "table" and sweeps:
+        if self.output in ("convergence", "swarm_sizes") and sweeps:
             raise ValueError(f"output '{self.output}' should have one problem and one budget")
         if self.output == "convergence" and len(self.swarm_size) > 1:
             raise ValueError("output 'convergence' should have one 'swarm_size'")

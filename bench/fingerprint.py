@@ -10,6 +10,7 @@ import algorithms
 import problem
 from algorithms.contract import AnyAlgorithm
 from bench import execute, seeds
+from problem.registry import plug_ins
 
 _SUFFIXES = {".py", ".c", ".yaml", ".urdf"}
 
@@ -17,9 +18,12 @@ _SUFFIXES = {".py", ".c", ".yaml", ".urdf"}
 def fingerprint(algorithm: AnyAlgorithm, problem_settings: dict[str, Any]) -> str:
     """SHA-256 over the sources of problems, algorithms and seeds, and the files that only this trial needs.
 
-    Those are the file of a third party's algorithm, and every file that the settings name, e.g. a robot.
+    Those are the files of a third party's algorithm and problem, and every file that the settings name, e.g. a
+    robot.
     """
     paths = {Path(str(inspect.getsourcefile(code))) for code in (execute, seeds, algorithm)}
+    preset = problem_settings.get("preset")
+    paths |= {Path(str(inspect.getsourcefile(entry.load()))) for entry in plug_ins() if entry.name == preset}
     for package in (problem, algorithms):
         paths |= {path for path in Path(package.__path__[0]).rglob("*") if path.suffix in _SUFFIXES}
     paths |= {path for path in map(Path, _texts(problem_settings)) if path.is_file()}

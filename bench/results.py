@@ -22,7 +22,9 @@ def write_results(
 
     The settings come last, so that results cut off half-way are not taken for whole ones.
     """
-    make = {"table": _table, "swarm_sizes": _swarm_sizes, "convergence": _convergence}[experiment.output]
+    make = {"table": _table, "swarm_sizes": _swarm_sizes, "convergence": _convergence, "rivals": _rivals}[
+        experiment.output
+    ]
     files = make(experiment, entries, store) | {settings_path(folder, experiment.name).name: settings}
     for name, content in files.items():
         write_whole(folder / name, content)
@@ -37,6 +39,14 @@ def _table(experiment: Experiment, entries: Sequence[Entry], store: RunStore) ->
         f"{experiment.name}.md": summary_page(table, experiment),
         f"{experiment.name}_times.csv": as_csv(times_table(frame)),
     }
+
+
+def _rivals(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+    from bench.rivals import rivals_page, rivals_table  # scipy's statistics take longer to import than a small run
+
+    table = rivals_table(tidy_frame(entries, store), entries)
+    pages = {f"{experiment.name}_rivals.csv": as_csv(table), f"{experiment.name}_rivals.md": rivals_page(table)}
+    return _table(experiment, entries, store) | pages
 
 
 def _swarm_sizes(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:

@@ -1,6 +1,10 @@
-"""Problems by the name of their preset."""
+"""Problems by the name of their preset: built-in ones, and third parties' of the entry-point group `armlab.problems`.
+
+Names are found without importing anything, so a broken plug-in troubles only those who ask for it.
+"""
 
 from collections.abc import Mapping
+from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
@@ -12,9 +16,11 @@ from problem.presets import (
     PaperSettings,
     RandomFrameSettings,
 )
-from problem.settings import nearest
+from problem.settings import Settings, nearest
 from problem.suite import InstanceSettings, instances, suites
 from problem.yaml_input import validate
+
+GROUP = "armlab.problems"
 
 ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings | InstanceSettings
 PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
@@ -29,21 +35,51 @@ PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
 
 
 def names() -> list[str]:
-    """Names of all presets; beside them stand the problems of suites (see `problem.suite`)."""
-    return [name for name, settings in PRESETS.items() if settings is not InstanceSettings]
+    """Names of all presets, the plug-ins' last; beside them stand the problems of suites (see `problem.suite`)."""
+    built_in = [name for name, settings in PRESETS.items() if settings is not InstanceSettings]
+    return list(dict.fromkeys([*built_in, *sorted(entry.name for entry in plug_ins())]))
+
+
+def plug_ins() -> list[EntryPoint]:
+    """The problems that other packages registered, each a class of settings with `build`."""
+    return list(entry_points(group=GROUP))
 
 
 def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
     """Checked settings of `{preset: NAME, ...}`; where: what the data is, for the reader of an error.
 
-    Raises InputError, in one line, for an unknown preset or key, or a value of the wrong type.
+    Raises InputError, in one line, for an unknown preset or key, a value of the wrong type, or a plug-in that
+    cannot be used.
     """
     preset = data.get("preset") if isinstance(data, Mapping) else None
     if not isinstance(preset, str):
         raise InputError(f"{where}: should hold `preset: NAME`, one of {', '.join(names())}")
+    return validate(settings_type(preset, where), dict(data), where)
+
+
+def settings_type(preset: str, where: str) -> type[ProblemSettings]:
+    """The class of settings behind a preset; raises InputError as `parse_problem` does."""
+    entries = [entry for entry in plug_ins() if entry.name == preset]
+    if len(entries) + (preset in PRESETS) > 1:
+        places = " and ".join(entry.value for entry in entries)
+        ours = "; it is built in" if preset in PRESETS else ""
+        raise InputError(f"{where}: preset '{preset}' is registered more than once: {places}{ours}")
+    if entries:
+        return _import(entries[0], where)
     if preset not in PRESETS:
         raise InputError(f"{where}: unknown preset '{preset}': {_advice(preset)}")
-    return validate(PRESETS[preset], dict(data), where)
+    return PRESETS[preset]
+
+
+def _import(entry: EntryPoint, where: str) -> type[ProblemSettings]:
+    place = f"{where}: problem '{entry.name}' ({entry.value})"
+    try:
+        settings: type[ProblemSettings] = entry.load()
+    except (ImportError, AttributeError, SyntaxError) as error:
+        raise InputError(f"{place} cannot be imported: {error}") from error
+    if not (isinstance(settings, type) and issubclass(settings, Settings) and hasattr(settings, "build")):
+        raise InputError(f"{place} should be a class of problem.settings.Settings with a method `build`")
+    return settings
 
 
 def _advice(preset: str) -> str:

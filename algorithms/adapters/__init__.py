@@ -1,0 +1,1 @@
+"""Other packages' algorithms behind the contract of `algorithms.contract`; each is imported only when asked for."""

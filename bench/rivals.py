@@ -1,0 +1,92 @@
+"""Our algorithms against other packages' of the same kind: result and time of both, pair by pair."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, cast
+
+import numpy as np
+import pandas as pd
+
+from algorithms.adapters.peer import Peer
+from algorithms.registry import load, peer_names
+from bench.frame import GROUP
+from bench.page import markdown_table, page
+from bench.plan import Entry
+from bench.statistics import is_feasible, quantile
+from bench.statistics.paired import duels
+from problem.errors import InputError
+
+_CELL = [name for name in GROUP if name != "algorithm"]
+_NOTES = """\
+Median: of the ends, for an arm the condition number; an infeasible end counts as infinite. Ours better: chance
+that an end of ours is better than one of theirs (A12), ties counting half. p: Wilcoxon's signed-rank test, paired by
+repetition (equal first populations), after Holm over the pairs of one problem. us: microseconds of processor time an
+evaluation, median of the runs, everything included. Most peers take one point at a time, for which a problem costs
+more than for a population at once, and the loop of every peer runs in a thread of its own and waits there for each
+answer: the figure is what a comparison here takes, not the peer's own overhead."""
+
+
+def rivals_table(frame: pd.DataFrame, entries: Sequence[Entry]) -> pd.DataFrame:
+    """One row a problem and pair, in the order of the configuration; frame: tidy, as `tidy_frame` gives it.
+
+    Raises InputError if no peer stands beside the algorithm that it is a rival of.
+    """
+    pairs = rival_pairs(entries)
+    if not pairs:
+        raise InputError("output 'rivals' should have a peer and, in 'algorithms', the one that it stands beside")
+    return pd.DataFrame([row for _, cell in frame.groupby(_CELL, sort=False) for row in _rows(cell, pairs)])
+
+
+def rival_pairs(entries: Sequence[Entry]) -> list[tuple[str, str]]:
+    """Labels of ours and theirs, for every peer whose rival takes part."""
+    labels = dict.fromkeys((entry.algorithm, entry.trial.algorithm) for entry in entries)
+    ours = {name: label for label, name in reversed(labels)}
+    peers = [(label, _rival(name)) for label, name in labels if name in peer_names()]
+    return [(ours[rival], label) for label, rival in peers if rival in ours]
+
+
+def rivals_page(table: pd.DataFrame) -> str:
+    """Markdown text of the table."""
+    headings = ["problem", "ours", "median", "us", "theirs", "median", "us", "ours better", "p"]
+    rows = [
+        (
+            *(row["problem"], row["ours"], f"{row['our_median']:.3g}", f"{row['our_microseconds']:.0f}"),
+            *(row["theirs"], f"{row['their_median']:.3g}", f"{row['their_microseconds']:.0f}"),
+            f"{row['ours_better']:.2f} [{row['low']:.2f}, {row['high']:.2f}]",
+            f"{row['p']:.2g}",
+        )
+        for row in table.to_dict("records")
+    ]
+    return page("Ours against theirs", markdown_table(headings, rows), _NOTES)
+
+
+def _rival(name: str) -> str:
+    return cast(type[Peer], load(name)).rival
+
+
+def _rows(cell: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> Iterator[dict[str, Any]]:
+    by_label = {str(label): rows for label, rows in cell.groupby("algorithm", sort=False)}
+    place = {name: cell[name].iloc[0] for name in _CELL}
+    for duel in duels(cell, pairs):
+        ours, theirs = by_label[duel.subject], by_label[duel.rival]
+        yield {
+            **place,
+            "ours": duel.subject,
+            "our_median": _median(ours),
+            "our_microseconds": _microseconds(ours),
+            "theirs": duel.rival,
+            "their_median": _median(theirs),
+            "their_microseconds": _microseconds(theirs),
+            "ours_better": duel.superiority,
+            "low": duel.low,
+            "high": duel.high,
+            "p": duel.p,
+        }
+
+
+def _median(rows: pd.DataFrame) -> float:
+    values = rows["value"].to_numpy()
+    return quantile(np.where(is_feasible(values, rows["violation"].to_numpy()), values, np.inf), 0.5)
+
+
+def _microseconds(rows: pd.DataFrame) -> float:
+    return float((1e6 * rows["seconds"] / rows["evaluations"]).median())
