@@ -57,12 +57,19 @@ def _stopped_after_three(
 ) -> tuple[str, int]:
     """What the command says, and its exit code, after a signal when three trials are in the store."""
     command = [sys.executable, "-m", "bench.cli", "run", str(config), "--workers", workers]
-    running = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    running = subprocess.Popen(
+        command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear_ctrl_c
+    )
     while len(_kept(folder)) < 3 and running.poll() is None:
         time.sleep(0.02)
     os.killpg(running.pid, how)  # a terminal, too, sends it to the workers as well
     said = running.communicate(timeout=30)[1]
     return said, running.returncode
+
+
+def _hear_ctrl_c() -> None:
+    """In the child: a test run in the background passes on that Ctrl-C is ignored."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _kept(folder: Path) -> dict[str, float]:
