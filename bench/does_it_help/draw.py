@@ -1,6 +1,7 @@
 """The two figures: errors against criteria, and the rank correlations with their intervals."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -41,10 +42,16 @@ def draw_errors(frame: pd.DataFrame) -> dict[str, bytes]:
             promised = -1 / frame[criterion] if criterion == "e_optimality" else frame[criterion]
             for kind in DRAWN_KINDS:
                 drawn, error = look(list(KINDS).index(kind)), frame[f"{kind}_prediction"]
+                style: dict[str, Any] = {
+                    "linestyle": "",
+                    "markeredgewidth": 0,
+                    "color": drawn.color,
+                    "marker": drawn.marker,
+                }
+                axis.plot(promised, error, markersize=3, alpha=0.5, **style)
                 axis.plot(
-                    promised, error, linestyle="", markersize=3, markeredgewidth=0, alpha=0.5,
-                    label=KIND_NAMES[kind], color=drawn.color, marker=drawn.marker,
-                )  # fmt: skip
+                    [], [], markersize=7, label=KIND_NAMES[kind], **style
+                )  # the points are too small for a legend
             axis.set(xlabel=name, yscale="log", xscale="linear" if criterion == "d_optimality" else "log")
         axes[0].set_ylabel("error of the predicted torque,\nroot mean square (N m)")
 

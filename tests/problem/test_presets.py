@@ -225,3 +225,12 @@ def test_a_test_function_has_its_minimum_zero_at_the_optimum_and_nowhere_else(pr
 )
 def test_a_test_function_at_1_2_3_is_as_its_definition_gives_by_hand(preset: str, value: float) -> None:
     assert build(preset, dimension=3).evaluate(np.array([[1.0, 2.0, 3.0]])).value == pytest.approx([value])
+
+
+@pytest.mark.parametrize(("limits", "least", "most"), [({}, 0.012, 0.015), ({"position": "robot"}, 0.0015, 0.0025)])
+def test_share_of_feasible_points_of_the_paper_is_the_one_that_the_documentation_names(
+    limits: dict[str, str], least: float, most: float
+) -> None:
+    problem = parse_problem({"preset": "paper", "limits": limits}, "test").build()
+    points = np.random.default_rng(0).uniform(problem.lower, problem.upper, (50_000, len(problem.lower)))
+    assert least < np.mean(problem.evaluate(points).violation == 0) < most
