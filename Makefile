@@ -4,7 +4,7 @@ BIN := .venv/bin
 KERNEL := problem/kernel.c problem/kernel_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real test lint speed regression lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real test lint speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -53,8 +53,14 @@ study: .venv/run ## the comparison where the paper stops: results/study/
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
 	$(BIN)/armlab best-known
 
-real: .venv/dev ## identify the public recordings of real arms: results/real/
+real: .venv/dev ## identify and diagnose the public recordings of real arms: results/real/
 	$(BIN)/armlab real
+
+prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
+	$(BIN)/armlab prove
+
+prove-quick: .venv/dev ## the same with 24 cases of a development seed, not logged
+	$(BIN)/armlab prove --quick --results .armlab/proof-quick
 
 speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results/speed.json and .md
 	$(BIN)/armlab speed
@@ -72,6 +78,10 @@ lint: .venv/dev ## style, types and import contracts
 
 regression: .venv/dev ## the best condition numbers against the committed baseline
 	$(BIN)/armlab regression
+
+fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in all
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]' --no-build-isolation
+	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
 
 clean: ## everything that was made here, the environment included
 	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
+from bench.engines.contract import Executor
 from problem.settings import Settings, validate
 from problem.suite import instances, suites
 from problem.yaml_input import read_yaml
@@ -73,7 +74,8 @@ class Experiment(Settings):
 
     iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or
     evaluations: the budget itself. output: what is made of the outcomes beside the table.
-    printed: show the paper's Table 3 beside ours.
+    printed: show the paper's Table 3 beside ours. executor, trial_timeout_s: on what the trials are run, and after how
+    long one of them is ended; they change no outcome.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -91,6 +93,8 @@ class Experiment(Settings):
     bounds: Literal["clip", "reflect", "wrap"] = "clip"
     output: Literal["table", "convergence", "swarm_sizes", "rivals"] = "table"
     printed: bool = False
+    executor: Executor | None = None
+    trial_timeout_s: Annotated[float, Field(gt=0)] | None = None
 
     @model_validator(mode="after")
     def _one_budget(self) -> Self:

@@ -11,10 +11,13 @@ from typing import Protocol
 import yaml
 
 from bench.config import Experiment, read_experiment
+from bench.engines.contract import Executor
 from bench.files import check_folder
-from bench.plan import Entry, plan
-from bench.runner import missing, run_missing
+from bench.plan import Plan, plan
+from bench.rival_pairs import rival_pairs
+from bench.runner import count_missing, run_missing
 from bench.store import open_store
+from problem.errors import InputError
 
 
 class Progress(Protocol):
@@ -31,7 +34,7 @@ class Options:
     """How an experiment is run; nothing here changes a result.
 
     fresh: forget the outcomes that are kept and compute them again.
-    overwrite: replace results of another configuration.
+    overwrite: replace results of another configuration. executor: instead of the configuration's.
     """
 
     store: Path
@@ -39,6 +42,7 @@ class Options:
     workers: int
     fresh: bool = False
     overwrite: bool = False
+    executor: Executor | None = None
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Loaded:
     """A configuration, its trials, and its full settings with every default, as YAML text."""
 
     experiment: Experiment
-    entries: list[Entry]
+    entries: Plan
     settings: str
 
 
@@ -54,6 +58,10 @@ def load_experiment(path: Path) -> Loaded:
     """Read and check a configuration; raises InputError, in one line, for any mistake in it."""
     experiment = read_experiment(path)
     entries = plan(experiment, str(path))
+    if experiment.output == "rivals" and not rival_pairs(entries.firsts()):
+        raise InputError(
+            f"output 'rivals' of {path} should have a peer and, in 'algorithms', the one that it stands beside"
+        )
     return Loaded(experiment, entries, _full_settings(experiment, entries))
 
 
@@ -73,9 +81,11 @@ def run_loaded(loaded: Loaded, options: Options, bar: ProgressBar) -> list[Path]
     with open_store(options.store) as store:
         if options.fresh:
             store.forget(entry.key for entry in loaded.entries)
-        left = len(missing(loaded.entries, store))
+        left = count_missing(loaded.entries, store)
         with bar(len(loaded.entries), len(loaded.entries) - left) as progress:
-            run_missing(loaded.entries, store, options.workers, progress.update)
+            executor = options.executor or loaded.experiment.executor
+            limit = loaded.experiment.trial_timeout_s
+            run_missing(loaded.entries, store, options.workers, progress.update, executor, limit)
         from bench.results import (
             write_results,
         )  # pandas and matplotlib take longer to import than a small run
@@ -83,13 +93,15 @@ def run_loaded(loaded: Loaded, options: Options, bar: ProgressBar) -> list[Path]
         return write_results(loaded.experiment, loaded.entries, loaded.settings, store, options.results)
 
 
-def _full_settings(experiment: Experiment, entries: list[Entry]) -> str:
-    problems = {entry.problem: entry.trial.problem.model_dump(mode="json") for entry in entries}
+def _full_settings(experiment: Experiment, entries: Plan) -> str:
+    """Without what changes no outcome: results of a cluster and of a laptop are the same."""
+    firsts = entries.firsts()
+    problems = {entry.problem: entry.trial.problem.model_dump(mode="json") for entry in firsts}
     algorithms = {
         entry.algorithm: {"name": entry.trial.algorithm, "params": dataclasses.asdict(entry.trial.params)}
-        for entry in entries
+        for entry in firsts
     }
-    settings = experiment.model_dump(mode="json", exclude_none=True)
+    settings = experiment.model_dump(mode="json", exclude_none=True, exclude={"executor", "trial_timeout_s"})
     settings |= {"problem": problems, "algorithms": algorithms}
     text: str = yaml.safe_dump(json.loads(json.dumps(settings)), sort_keys=False, allow_unicode=True)
     return text

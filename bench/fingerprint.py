@@ -3,14 +3,15 @@
 import hashlib
 import inspect
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import algorithms
-import problem
+from algorithms import registry as algorithm_registry
 from algorithms.contract import AnyAlgorithm
 from bench import execute, seeds
-from problem.registry import plug_ins
+from problem import registry as problem_registry
+from problem.registry import PRESETS, plug_ins
 
 _SUFFIXES = {".py", ".c", ".yaml", ".urdf"}
 
@@ -23,12 +24,26 @@ def fingerprint(algorithm: AnyAlgorithm, problem_settings: dict[str, Any]) -> st
     """
     paths = {Path(str(inspect.getsourcefile(code))) for code in (execute, seeds, algorithm)}
     preset = problem_settings.get("preset")
-    paths |= {Path(str(inspect.getsourcefile(entry.load()))) for entry in plug_ins() if entry.name == preset}
-    for package in (problem, algorithms):
-        paths |= {path for path in Path(package.__path__[0]).rglob("*") if path.suffix in _SUFFIXES}
+    if preset not in PRESETS:  # to look for plug-ins takes longer than all else here
+        paths |= {Path(str(inspect.getsourcefile(entry.load()))) for entry in plug_ins() if entry.name == preset}
+    for module in (problem_registry, algorithm_registry):  # a package's own path may be a namespace of other folders
+        folder = Path(str(inspect.getsourcefile(module))).parent
+        paths |= {path for path in folder.rglob("*") if path.suffix in _SUFFIXES}
     paths |= {path for path in map(Path, _texts(problem_settings)) if path.is_file()}
-    contents = sorted(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}" for path in paths)
+    contents = sorted(f"{path.name} {_digest(path, *_state(path))}" for path in paths)
     return hashlib.sha256("\n".join(contents).encode()).hexdigest()  # the same wherever the files stand
+
+
+def _state(path: Path) -> tuple[int, int, int]:
+    """What tells that a file was written to."""
+    found = path.stat()
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
+@lru_cache(maxsize=4096)
+def _digest(path: Path, *state: int) -> str:
+    """SHA-256 of a file in a state: most files decide all trials, and need to be read once."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _texts(content: Any) -> Iterator[str]:

@@ -1,6 +1,5 @@
 """From the run store to the files of an experiment: tables, figures, and the settings that made them."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from bench.config import Experiment
@@ -8,16 +7,15 @@ from bench.convergence import convergence_table
 from bench.files import settings_path, write_whole
 from bench.frame import tidy_frame
 from bench.markdown import summary_page
-from bench.plan import Entry
+from bench.plan import Plan
+from bench.rival_pairs import rival_pairs
 from bench.store import RunStore
 from bench.table import as_csv, summary_table, times_table
 
 Files = dict[str, str | bytes]
 
 
-def write_results(
-    experiment: Experiment, entries: Sequence[Entry], settings: str, store: RunStore, folder: Path
-) -> list[Path]:
+def write_results(experiment: Experiment, entries: Plan, settings: str, store: RunStore, folder: Path) -> list[Path]:
     """Write what the experiment's `output` names; returns the files.
 
     The settings come last, so that results cut off half-way are not taken for whole ones.
@@ -31,7 +29,7 @@ def write_results(
     return [folder / name for name in files]
 
 
-def _table(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+def _table(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     frame = tidy_frame(entries, store)
     table = summary_table(frame)
     return {
@@ -41,15 +39,15 @@ def _table(experiment: Experiment, entries: Sequence[Entry], store: RunStore) ->
     }
 
 
-def _rivals(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+def _rivals(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     from bench.rivals import rivals_page, rivals_table  # scipy's statistics take longer to import than a small run
 
-    table = rivals_table(tidy_frame(entries, store), entries)
+    table = rivals_table(tidy_frame(entries, store), rival_pairs(entries.firsts()))
     pages = {f"{experiment.name}_rivals.csv": as_csv(table), f"{experiment.name}_rivals.md": rivals_page(table)}
     return _table(experiment, entries, store) | pages
 
 
-def _swarm_sizes(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+def _swarm_sizes(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     from bench.figure2 import draw_cost, draw_times  # matplotlib takes longer to import than a small run
 
     frame = tidy_frame(entries, store)
@@ -58,7 +56,7 @@ def _swarm_sizes(experiment: Experiment, entries: Sequence[Entry], store: RunSto
     return _table(experiment, entries, store) | figures
 
 
-def _convergence(experiment: Experiment, entries: Sequence[Entry], store: RunStore) -> Files:
+def _convergence(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     from bench.figure3 import draw_convergence  # matplotlib takes longer to import than a small run
 
     table = convergence_table(entries, store)

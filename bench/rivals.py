@@ -1,19 +1,15 @@
 """Our algorithms against other packages' of the same kind: result and time of both, pair by pair."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from algorithms.adapters.peer import Peer
-from algorithms.registry import load, peer_names
 from bench.frame import GROUP
 from bench.page import markdown_table, page
-from bench.plan import Entry
 from bench.statistics import is_feasible, quantile
 from bench.statistics.paired import duels
-from problem.errors import InputError
 
 _CELL = [name for name in GROUP if name != "algorithm"]
 _NOTES = """\
@@ -25,23 +21,9 @@ more than for a population at once, and the loop of every peer runs in a thread 
 answer: the figure is what a comparison here takes, not the peer's own overhead."""
 
 
-def rivals_table(frame: pd.DataFrame, entries: Sequence[Entry]) -> pd.DataFrame:
-    """One row a problem and pair, in the order of the configuration; frame: tidy, as `tidy_frame` gives it.
-
-    Raises InputError if no peer stands beside the algorithm that it is a rival of.
-    """
-    pairs = rival_pairs(entries)
-    if not pairs:
-        raise InputError("output 'rivals' should have a peer and, in 'algorithms', the one that it stands beside")
+def rivals_table(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
+    """One row a problem and pair, ours and theirs by their labels; frame: tidy, as `tidy_frame` gives it."""
     return pd.DataFrame([row for _, cell in frame.groupby(_CELL, sort=False) for row in _rows(cell, pairs)])
-
-
-def rival_pairs(entries: Sequence[Entry]) -> list[tuple[str, str]]:
-    """Labels of ours and theirs, for every peer whose rival takes part."""
-    labels = dict.fromkeys((entry.algorithm, entry.trial.algorithm) for entry in entries)
-    ours = {name: label for label, name in reversed(labels)}
-    peers = [(label, _rival(name)) for label, name in labels if name in peer_names()]
-    return [(ours[rival], label) for label, rival in peers if rival in ours]
 
 
 def rivals_page(table: pd.DataFrame) -> str:
@@ -57,10 +39,6 @@ def rivals_page(table: pd.DataFrame) -> str:
         for row in table.to_dict("records")
     ]
     return page("Ours against theirs", markdown_table(headings, rows), _NOTES)
-
-
-def _rival(name: str) -> str:
-    return cast(type[Peer], load(name)).rival
 
 
 def _rows(cell: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> Iterator[dict[str, Any]]:

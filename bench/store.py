@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +26,19 @@ CREATE TABLE arrays (
 CREATE TABLE provenance (id INTEGER PRIMARY KEY, facts TEXT NOT NULL UNIQUE);
 """
 _BEST_X = "best_x"
+_BYTES_A_NUMBER = 8
 _LOCK_SECONDS = 60.0
+
+
+class Figures(NamedTuple):
+    """The figures of an `Outcome`; dimension: how many numbers were searched."""
+
+    value: float
+    violation: float
+    fitness: float
+    evaluations: int
+    seconds: float
+    dimension: int
 
 
 class RunStore:
@@ -33,17 +46,17 @@ class RunStore:
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self._connection = connection
-        self._path = path
+        self.path = path
 
-    def done(self, keys: Iterable[str]) -> set[str]:
-        """Those of the keys whose outcome is there."""
-        with _plainly(self._path):
+    def has(self, key: str) -> bool:
+        """Whether the outcome of a key is there."""
+        with _plainly(self.path):
             find = "SELECT 1 FROM trials WHERE key = ?"
-            return {key for key in keys if self._connection.execute(find, (key,)).fetchone()}
+            return self._connection.execute(find, (key,)).fetchone() is not None
 
     def add(self, outcomes: Sequence[tuple[str, Outcome]], provenance: str) -> None:
         """Write outcomes by key in one durable transaction; keys that another runner has written stay."""
-        with _plainly(self._path), _transaction(self._connection) as sql:
+        with _plainly(self.path), _transaction(self._connection) as sql:
             sql.execute("INSERT INTO provenance (facts) VALUES (?) ON CONFLICT DO NOTHING", (provenance,))
             (source,) = sql.execute("SELECT id FROM provenance WHERE facts = ?", (provenance,)).fetchone()
             for key, outcome in outcomes:
@@ -51,28 +64,43 @@ class RunStore:
 
     def get(self, key: str) -> Outcome:
         """The outcome of a key; raises KeyError if it is not there."""
-        with _plainly(self._path):
-            find = "SELECT value, violation, fitness, evaluations, seconds FROM trials WHERE key = ?"
-            row = self._connection.execute(find, (key,)).fetchone()
-            if row is None:
-                raise KeyError(key)
+        figures = self.figures(key)
+        with _plainly(self.path):
             find = "SELECT name, dtype, data FROM arrays WHERE key = ?"
             blobs = self._connection.execute(find, (key,)).fetchall()
         arrays = {name: np.frombuffer(data, dtype) for name, dtype, data in blobs}
         best_x = arrays.pop(_BEST_X)
+        return Outcome(*figures[:-1], best_x, Curves(**arrays))
+
+    def figures(self, key: str) -> Figures:
+        """The figures of an outcome without its arrays; raises KeyError if it is not there."""
+        find = (
+            "SELECT value, violation, fitness, evaluations, seconds, length(data) FROM trials "
+            f"JOIN arrays ON arrays.key = trials.key AND name = '{_BEST_X}' WHERE trials.key = ?"
+        )
+        with _plainly(self.path):
+            row = self._connection.execute(find, (key,)).fetchone()
+        if row is None:
+            raise KeyError(key)
         value, violation, fitness = (np.nan if number is None else number for number in row[:3])
-        return Outcome(value, violation, fitness, row[3], row[4], best_x, Curves(**arrays))
+        return Figures(value, violation, fitness, row[3], row[4], row[5] // _BYTES_A_NUMBER)
 
     def origins(self, keys: Iterable[str]) -> list[str]:
         """The provenance of the outcomes of these keys, each text once, in the order of their first use."""
         find = "SELECT facts FROM trials JOIN provenance ON provenance.id = trials.provenance WHERE key = ?"
-        with _plainly(self._path):
+        with _plainly(self.path):
             found = (self._connection.execute(find, (key,)).fetchone() for key in keys)
             return list(dict.fromkeys(row[0] for row in found if row))
 
+    def keys(self, prefix: str) -> list[str]:
+        """The keys that begin with these hexadecimal digits."""
+        find = "SELECT key FROM trials WHERE key >= ? AND key < ?"
+        with _plainly(self.path):
+            return [key for (key,) in self._connection.execute(find, (prefix, f"{prefix}g")).fetchall()]
+
     def forget(self, keys: Iterable[str]) -> None:
         """Drop outcomes, so that they are computed again."""
-        with _plainly(self._path), _transaction(self._connection) as sql:
+        with _plainly(self.path), _transaction(self._connection) as sql:
             for key in keys:
                 sql.execute("DELETE FROM arrays WHERE key = ?", (key,))
                 sql.execute("DELETE FROM trials WHERE key = ?", (key,))
@@ -154,4 +182,14 @@ def _plainly(path: Path) -> Iterator[None]:
     except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
         raise
     except sqlite3.DatabaseError as error:
-        raise InputError(f"cannot use the run store {path}: {error}") from None
+        raise InputError(f"cannot use the run store {path}: {error}{_advice(error, path)}") from None
+
+
+def _advice(error: sqlite3.DatabaseError, path: Path) -> str:
+    """What to do about it, and that nothing is lost."""
+    code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the rest says more than anyone wants to know
+    if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
+        return "; all that was kept before is still there: make room, and the same command goes on"
+    if code == sqlite3.SQLITE_CORRUPT:
+        return f"; `armlab salvage {path} --out NEW` takes what is readable into a new store"
+    return ""

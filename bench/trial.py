@@ -4,7 +4,7 @@ import dataclasses
 import hashlib
 import json
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Any
 
 from problem.registry import ProblemSettings
@@ -26,10 +26,10 @@ class Trial:
     seed: int
     repetition: int
 
-    @cached_property
+    @property
     def problem_text(self) -> str:
         """The problem's settings as canonical text."""
-        return canonical(self.problem.model_dump(mode="json"))
+        return _problem_text(self.problem)
 
     @property
     def params_text(self) -> str:
@@ -52,3 +52,8 @@ class Trial:
 def canonical(content: Any) -> str:
     """JSON with sorted keys and no spaces: equal content gives equal text."""
     return json.dumps(content, sort_keys=True, separators=(",", ":"))
+
+
+@lru_cache(maxsize=64)
+def _problem_text(problem: ProblemSettings) -> str:
+    return canonical(problem.model_dump(mode="json"))  # once for all trials on it

@@ -1,5 +1,6 @@
 """The commands of identification, without any logic of their own."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -46,11 +47,14 @@ def predict(model: Path, recording: Path, out: Path | None) -> None:
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
-def real(results: Path, recordings: Path, only: tuple[str, ...]) -> None:
+@click.option(
+    "--peers", type=click.Path(path_type=Path), help="Python that has figaroh and mujoco[sysid]: adds peers.md."
+)
+def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None) -> None:
     """Identify the public recordings of real arms: identification.csv and a page with pictures."""
     from identification.real.command import identify_public
 
-    for line in identify_public(results, recordings, only):
+    for line in identify_public(results, recordings, only, peers):
         click.echo(line)
 
 
@@ -66,12 +70,59 @@ def coverage(experiments: int, seed: int, results: Path) -> None:
         click.echo(line)
 
 
-@click.command("export-model")
-@click.argument("model", type=click.Path(path_type=Path))
-@click.argument("out", type=click.Path(path_type=Path))
-def export_model(model: Path, out: Path) -> None:
-    """Write MODEL, a model.yaml with links, as OUT: a .urdf or an MJCF .xml file."""
-    from identification.export.command import export_model as write
+def _load_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of the commands about loads."""
+    options = (
+        click.option("--link", type=click.IntRange(min=1), help="Link that carries the load [default: the last]."),
+        click.option(
+            "--counterbalance", type=click.IntRange(min=1), help="Joint that has a counterbalance (a spring)."
+        ),
+        click.option("--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="[default: from the data]"),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
 
-    for line in write(model, out):
+
+@click.command()
+@click.argument("loaded", type=click.Path(path_type=Path))
+@click.option("--without", type=click.Path(path_type=Path), help="Recording without the load [default: the CAD links].")
+@click.option("--centre", type=float, nargs=3, help="Where the load sits in the link's frame, m: seek its mass alone.")
+@_load_options
+def payload(
+    loaded: Path,
+    without: Path | None,
+    centre: tuple[float, float, float] | None,
+    link: int | None,
+    counterbalance: int | None,
+    cutoff_hz: float | None,
+) -> None:
+    """Identify the load that the arm carries in LOADED, a recording folder."""
+    from identification.payload import Place
+    from identification.payload_command import Setting, payload_lines
+
+    for line in payload_lines(loaded, without, Setting(Place(link, centre), counterbalance, cutoff_hz)):
+        click.echo(line)
+
+
+@click.command()
+@click.argument("loaded", type=click.Path(path_type=Path))
+@click.option("--without", type=click.Path(path_type=Path), required=True, help="Recording without the load.")
+@click.option("--mass", type=click.FloatRange(min=0, min_open=True), required=True, help="Of the load, kg.")
+@click.option("--centre", type=float, nargs=3, required=True, help="Its centre of mass in the link's frame, m.")
+@_load_options
+def gains(
+    loaded: Path,
+    without: Path,
+    mass: float,
+    centre: tuple[float, float, float],
+    link: int | None,
+    counterbalance: int | None,
+    cutoff_hz: float | None,
+) -> None:
+    """Find how much each joint's torque reading is too large, from the known load that the arm carries in LOADED."""
+    from identification.payload import Place
+    from identification.payload_command import Setting, gains_lines
+
+    for line in gains_lines(loaded, without, mass, Setting(Place(link, centre), counterbalance, cutoff_hz)):
         click.echo(line)

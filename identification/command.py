@@ -12,7 +12,6 @@ from identification.identifier import Identifier
 from identification.model import Model
 from identification.page import write_page
 from identification.priors import FREE, Pull
-from identification.regression import signals_of
 from identification.selection import describe, pulls, select
 from identification.validation import error_table, run_error
 from problem.errors import InputError
@@ -51,7 +50,7 @@ def identify_recording(folder: Path, out: Path, options: Options) -> Iterator[st
         raise InputError(f"{folder}: {error}") from None
     model = identifier.model_
     model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
-    errors = tuple(run_error(model, signals_of(run, model.cutoff_hz)) for run in recording.runs)
+    errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     yield from how
     yield str(model)
     yield from (f"{part.label}: no motion tells it from the links, left out" for part in identifier.absorbed_)
@@ -75,7 +74,8 @@ def _identifier(recording: Recording, options: Options) -> tuple[Identifier, lis
     line = f"chosen: {describe(choice)}; held-out error {100 * choice.held_out:.2f} % of the torque"
     method = "alike" if options.method == "weighted" and not choice.by_joint else options.method
     components = components_of(groups, choice.groups)
-    return Identifier(arm, components, method, choice.pull, choice.cutoff_hz, robot), [line]
+    filters = choice.cutoff_hz, robot, choice.position_factor
+    return Identifier(arm, components, method, choice.pull, *filters), [line]
 
 
 def _robot(recording: Recording) -> str:
@@ -89,7 +89,7 @@ def predict_recording(path: Path, folder: Path, out: Path | None) -> Iterator[st
     model, recording = Model.load(path), load_recording(folder)
     if len(model.arm) != len(recording.arm):
         raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
-    yield error_table(tuple(run_error(model, signals_of(run, model.cutoff_hz)) for run in recording.runs))
+    yield error_table(tuple(run_error(model, model.signals(run)) for run in recording.runs))
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         yield from (str(_write_torque(model, run, out)) for run in recording.runs)
@@ -97,10 +97,10 @@ def predict_recording(path: Path, folder: Path, out: Path | None) -> Iterator[st
 
 def _write_torque(model: Model, run: Run, out: Path) -> Path:
     """Writes the predicted torque of a run with its times as a CSV file."""
-    signals = signals_of(run, model.cutoff_hz)
+    signals = model.signals(run)
     names = [f"tau{joint + 1}" for joint in range(len(model.arm))]
     file = out / f"{run.name.replace('/', '-')}.predicted.csv"
-    table = pd.DataFrame(model.torque(signals.motion), columns=names)
+    table = pd.DataFrame(model.torque(signals.motion, signals.run), columns=names)
     table.insert(0, "t", signals.run.time)
     table.to_csv(file, index=False)
     return file

@@ -68,7 +68,7 @@ class Identifier:
 
     components: viscous and Coulomb friction, rotor inertia and offset at each joint if left out. method: one of
     METHODS. pull: the prior of `weighted` (joints weighted by their errors), `alike` (not) and `physical`.
-    cutoff_hz: chosen from the positions if left out.
+    cutoff_hz: chosen from the positions if left out. position_factor: see `signals_of`.
     After `fit`: model_, condition_number_ (columns at unit length), absorbed_ (components that no motion tells
     from the others and that were left out), estimate_.
     """
@@ -79,6 +79,7 @@ class Identifier:
     pull: Pull = FREE
     cutoff_hz: float | None = None
     robot: str | None = None
+    position_factor: float = 1.0
     model_: Model = field(init=False)
     condition_number_: float = field(init=False)
     absorbed_: tuple[Component, ...] = field(init=False, default=())
@@ -103,7 +104,7 @@ class Identifier:
     def prepare(self, runs: Sequence[Run]) -> Fitted:
         """The structure, signals and regression from which `fit` starts."""
         cutoff = self.cutoff_hz or max(suggested_cutoff(run) for run in runs)
-        signals = [signals_of(run, cutoff) for run in runs]
+        signals = [signals_of(run, cutoff, self.position_factor) for run in runs]
         structure = with_load(self._structure(), signals)
         return structure, signals, regression(structure, signals)
 
@@ -128,7 +129,7 @@ class Identifier:
         self.condition_number_ = _condition(data)
         self.model_ = Model(
             self.robot or self.arm.name, structure, estimate.values, found.covariance, found.factor, inertial,
-            cutoff, {"settings": settings},
+            cutoff, self.position_factor, {"settings": settings},
         )  # fmt: skip
 
     def predict(self, run: Run) -> Array:
@@ -137,7 +138,7 @@ class Identifier:
 
     def score(self, run: Run) -> float:
         """Coefficient of determination of the filtered torque over all joints; 1 is perfect."""
-        signals = signals_of(run, self.model_.cutoff_hz)
+        signals = self.model_.signals(run)
         left = signals.torque - self.model_.filtered_torque(signals)
         spread = signals.torque - signals.torque.mean(axis=0)
         return float(1 - np.sum(left**2) / np.sum(spread**2))

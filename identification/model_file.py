@@ -2,16 +2,20 @@
 
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
+from annotated_types import Gt
 from pydantic import Field
+from scipy.linalg import block_diag
+from scipy.stats import norm
 
 from identification.components import FORMS, Component
-from identification.model import Model, Parameter
+from identification.extras import Extra, registered, restored
 from identification.pseudo_inertia import links_of
 from identification.structure import Structure
+from identification.torque_model import Parameter, TorqueModel, jacobian
 from problem.arm import Arm
 from problem.errors import InputError
 from problem.robot_file import LinkEntry, built_in_arms, load_arm
@@ -20,22 +24,24 @@ from problem.yaml_input import read_yaml
 from recordings.run import Array
 
 SCHEMA = "model/1"
+NORMAL = float(norm.ppf(0.975))
 
 
 class ParameterEntry(Settings):
     """One parameter."""
 
     value: float | tuple[float, ...]
-    ci95: tuple[float, ...] | None = None
+    ci95: tuple[float | tuple[float, ...], ...] | None = None
     unit: str
 
 
 class ComponentEntry(Settings):
-    """One component."""
+    """One component; form: which of an effect's laws, where its parameters do not tell."""
 
     effect: str
     joint: int | None
     joints: tuple[int, ...] = ()
+    form: str = ""
     parameters: dict[str, ParameterEntry]
 
 
@@ -58,7 +64,18 @@ class ModelFile(Settings):
     provenance: dict[str, Any] = Field(default_factory=dict)
 
 
-def write_model(model: Model, path: Path) -> Path:
+class Numbers(Settings):
+    """What the provenance tells of the model itself: its filters, and the factor from standard errors to intervals."""
+
+    cutoff_hz: Annotated[float, Gt(0)] | None = None
+    position_factor: Annotated[float, Gt(0)] = 1.0
+    interval_factor: Annotated[float, Gt(0)] = NORMAL
+
+
+NUMBERS = tuple(Numbers.model_fields)
+
+
+def write_model(model: TorqueModel, path: Path) -> Path:
     """Writes a model and returns the path; InputError where it cannot be written."""
     content: dict[str, Any] = {"schema": SCHEMA, "robot": _robot_from(model.robot, path.parent)}
     if model.inertial is not None:
@@ -68,7 +85,9 @@ def write_model(model: Model, path: Path) -> Path:
         count = len(model.structure.base)
         base["covariance"] = model.covariance[:count, :count].tolist()
     content |= {"base_parameters": base, "components": _components(model)}
-    provenance = {**model.provenance, "cutoff_hz": model.cutoff_hz}
+    filters = {"cutoff_hz": model.cutoff_hz, "position_factor": model.position_factor}
+    factor = {"interval_factor": None if model.covariance is None else model.factor}
+    provenance = {**model.provenance, **filters, **factor}
     content["provenance"] = {key: value for key, value in provenance.items() if value is not None}
     try:
         path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110), encoding="utf-8")
@@ -86,8 +105,8 @@ def _link(ten: Array) -> dict[str, Any]:
     return {"mass": float(ten[0]), "first_moment": ten[1:4].tolist(), "inertia": ten[4:].tolist()}
 
 
-def _components(model: Model) -> list[dict[str, Any]]:
-    return [
+def _components(model: TorqueModel) -> list[dict[str, Any]]:
+    linear = [
         {
             "effect": part.effect,
             "joint": part.joint,
@@ -96,6 +115,7 @@ def _components(model: Model) -> list[dict[str, Any]]:
         }
         for index, part in enumerate(model.structure.components)
     ]
+    return linear + [dict(each.told) for each in model.extras]
 
 
 def _entry(parameter: Parameter) -> dict[str, Any]:
@@ -103,23 +123,59 @@ def _entry(parameter: Parameter) -> dict[str, Any]:
     return {"value": parameter.value, "ci95": interval, "unit": parameter.unit}
 
 
-def read_model(path: Path) -> Model:
-    """The model of a file; InputError, in one line, for what is wrong in it."""
-    file = validate(ModelFile, read_yaml(path), str(path))
+def read_model(path: Path) -> TorqueModel:
+    """The model of a file; InputError, in one line, for what is wrong in it.
+
+    Its covariance is that of the base parameters and, component by component, what the intervals tell: the file
+    holds no ties between components.
+    """
+    return model_of(read_model_file(path), path)
+
+
+def read_model_file(path: Path) -> ModelFile:
+    """The checked content of a `model.yaml`; InputError, in one line, where it is wrong."""
+    return validate(ModelFile, read_yaml(path), str(path))
+
+
+def model_of(file: ModelFile, path: Path) -> TorqueModel:
+    """The model that the content of a file describes; path: where it stands, for its robot and for messages."""
     arm = load_arm(file.robot, path.parent)
     robot = file.robot if file.robot in built_in_arms() else str(path.parent / file.robot)
-    parts = [_component(entry, index, len(arm), path) for index, entry in enumerate(file.components)]
+    places = [f"{path}, components[{index}] ({entry.effect})" for index, entry in enumerate(file.components)]
+    linear = [_linear(entry) for entry in file.components]
+    rows = list(zip(file.components, places, linear, strict=True))
+    parts = [_component(entry, where, len(arm)) for entry, where, own in rows if own]
+    extras = tuple(_extra(entry, where, arm) for entry, where, own in rows if not own)
     inertial = _inertial(file, arm, path)
     structure = Structure(arm, tuple(part for part, _ in parts))
     base = _base_values(file, structure, inertial, path)
     structure = Structure(arm, structure.components, structure.full(base))
     values = np.concatenate([base, *(part.coefficients(named) for part, named in parts)])
-    cutoff = file.provenance.get("cutoff_hz")
-    return Model(robot, structure, values, None, inertial=inertial, cutoff_hz=cutoff, provenance=dict(file.provenance))
+    numbers = validate(Numbers, {key: file.provenance[key] for key in NUMBERS if key in file.provenance}, str(path))
+    file = file.model_copy(update={"components": tuple(entry for entry, _, own in rows if own)})
+    covariance = _covariance(file, structure, values, numbers.interval_factor, path)
+    others = {key: value for key, value in file.provenance.items() if key not in NUMBERS}
+    return TorqueModel(robot, structure, values, covariance, numbers.interval_factor, inertial, numbers.cutoff_hz,
+                       numbers.position_factor, others, extras)  # fmt: skip
 
 
-def _component(entry: ComponentEntry, index: int, joints: int, path: Path) -> tuple[Component, dict[str, float]]:
-    where = f"{path}, components[{index}] ({entry.effect})"
+def _linear(entry: ComponentEntry) -> bool:
+    """Whether a component has exactly these parameters, or no plug-in could have the effect."""
+    names, forms = set(entry.parameters), FORMS.get(entry.effect, ())
+    if any(names in ({*form.names}, {*form.names, form.held}) for form in forms):
+        return True
+    return bool(forms) and entry.effect not in {each.effect for _, each in registered()}
+
+
+def _extra(entry: ComponentEntry, where: str, arm: Arm) -> Extra:
+    told = entry.model_dump(mode="json")
+    try:
+        return restored(arm, told, {name: each.value for name, each in entry.parameters.items()})
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _component(entry: ComponentEntry, where: str, joints: int) -> tuple[Component, dict[str, float]]:
     named = {name: each.value for name, each in entry.parameters.items() if isinstance(each.value, float)}
     if entry.joint is None or not 1 <= entry.joint <= joints:
         raise InputError(f"{where}: joint {entry.joint} should be one from 1 to {joints}")
@@ -155,7 +211,29 @@ def _base_values(file: ModelFile, structure: Structure, inertial: Array | None, 
     return np.array(file.base_parameters.values)
 
 
-def links_of_model(model: Model) -> Arm:
+def _covariance(file: ModelFile, structure: Structure, values: Array, factor: float, path: Path) -> Array | None:
+    """Covariance (columns, columns), NaN where the file gives no interval; None where it gives none at all."""
+    count = len(structure.base)
+    blocks = [np.full((count, count), np.nan)]
+    if file.base_parameters is not None and file.base_parameters.covariance is not None:
+        given = file.base_parameters.covariance
+        if len(given) != count or any(len(row) != count for row in given):
+            raise InputError(f"{path}: base_parameters.covariance should be {count} x {count}")
+        blocks = [np.array(given)]
+    for entry, part, place in zip(file.components, structure.components, structure.slices, strict=True):
+        half = np.array([_half_width(entry.parameters[name]) for name in part.names])
+        inverse = np.linalg.pinv(jacobian(part, values[place]))
+        blocks.append(inverse @ np.diag((half / factor) ** 2) @ inverse.T)
+    known = any(np.isfinite(block).any() for block in blocks)
+    return np.asarray(block_diag(*blocks)) if known else None
+
+
+def _half_width(entry: ParameterEntry) -> float:
+    low, high = entry.ci95 if entry.ci95 and len(entry.ci95) == 2 else (np.nan, np.nan)
+    return (high - low) / 2 if isinstance(low, float) and isinstance(high, float) else np.nan
+
+
+def links_of_model(model: TorqueModel) -> Arm:
     """The model's arm with its identified links and rotors; ValueError for a model without physical links."""
     if model.inertial is None:
         raise ValueError("the model has base parameters only: identify it with physically consistent links")

@@ -5,13 +5,13 @@ from io import BytesIO
 
 from matplotlib.figure import Figure
 
-from identification.model import Model
+from identification.torque_model import TorqueModel
 from recordings.differentiate import Signals
 
 WIDTH, ROW_HEIGHT = 11.0, 1.5  # inches
 
 
-def residual_figure(model: Model, signals: Signals) -> Figure:
+def residual_figure(model: TorqueModel, signals: Signals) -> Figure:
     """Recorded and predicted torque, and what is left, joint by joint."""
     predicted, joints = model.filtered_torque(signals), len(model.arm)
     figure = Figure((WIDTH, ROW_HEIGHT * joints + 0.6), layout="constrained")

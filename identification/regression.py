@@ -13,6 +13,7 @@ from recordings.filters import Butterworth, LowPass
 from recordings.resample import evened
 from recordings.run import Array, Run
 
+HIGHEST = 0.45  # of the sampling rate: cut-offs
 ROWS_PER_CUTOFF = 4  # rows kept in a period of the cut-off: what the filter leaves holds no more
 
 
@@ -62,11 +63,29 @@ class Regression:
         return replace(self, matrix=self.matrix * every[:, None], torque=self.torque * every)
 
 
-def signals_of(run: Run, cutoff_hz: float | None = None) -> Signals:
-    """The run ready for identification; the cut-off is chosen from its positions if left out."""
+def signals_of(run: Run, cutoff_hz: float | None = None, position_factor: float = 1.0) -> Signals:
+    """The run ready for identification.
+
+    cutoff_hz: of the filter that torque and columns share; chosen from the positions if left out.
+    position_factor: the cut-off of the positions over it. Columns pass both filters, the torque only one: with a
+    factor of 1 they lose more than the torque near the cut-off, with a larger one they carry more encoder noise.
+    """
     chosen = cutoff_hz or suggested_cutoff(run)
     step = max(int(run.rate_hz / (ROWS_PER_CUTOFF * chosen)), 1)
-    return differentiate(run, cutoff_hz=min(chosen, 0.45 * run.rate_hz), step=step)
+    most = HIGHEST * run.rate_hz
+    positions = min(position_factor * chosen, most)
+    return differentiate(run, cutoff_hz=positions, torque_cutoff_hz=min(chosen, most), step=step)
+
+
+def once_more(signals: Signals, run: Run) -> Signals:
+    """Another version of the run of these signals through the same filters.
+
+    Raises ValueError for signals that did not pass a low-pass.
+    """
+    shared = signals.filter
+    if not isinstance(shared, LowPass):
+        raise ValueError(f"{signals.run.name} did not pass a low-pass")
+    return differentiate(run, type(shared), signals.position_cutoff_hz, shared.cutoff_hz, shared.step)
 
 
 def cutoff_of(signals: Signals) -> float:

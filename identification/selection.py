@@ -15,6 +15,7 @@ from problem.arm import Arm
 from recordings.differentiate import Signals
 from recordings.run import Run
 
+POSITION_FACTORS = (1.0, 2.0)
 CUTOFFS = (0.35, 0.5, 0.7, 1.0)  # times the suggested one, above which a rigid model explains nothing
 GAIN = 0.99  # a change has to lower the held-out error below this share of it
 SHARES = (1e-4, 1e-3, 1e-2, 1e-1)
@@ -26,8 +27,9 @@ Tried = tuple[str, float]
 class Choice:
     """A structure and how to fit it.
 
-    by_joint: joints weighted by their errors. held_out: held-out error against the filtered torque, recorded:
-    against the torque as recorded, by which cut-offs are compared; both ||tau - tau_hat|| / ||tau||.
+    cutoff_hz, position_factor: of the filters, see `signals_of`. by_joint: joints weighted by their errors.
+    held_out: held-out error against the filtered torque, recorded: against the torque as recorded, by which
+    cut-offs are compared; both ||tau - tau_hat|| / ||tau||.
     """
 
     cutoff_hz: float
@@ -36,6 +38,7 @@ class Choice:
     by_joint: bool
     held_out: float
     recorded: float
+    position_factor: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,21 +65,21 @@ def select(
 ) -> Selection:
     """The choice with the least held-out error.
 
-    At one cut-off, structures and priors are compared on the filtered torque, from every start; cut-offs are
-    compared by the torque as recorded, so that none gains by hiding what it cannot explain.
+    At one cut-off, structures, priors and the smoothing of positions are compared on the filtered torque, from
+    every start; cut-offs are compared by the torque as recorded, so that none gains by hiding what it cannot
+    explain. Raises ValueError where there is no cut-off to choose from.
     """
     suggested = max(suggested_cutoff(run) for run in runs)
-    best: Choice | None = None
     tried: list[Tried] = []
-    for factor in cutoffs:
-        search = _Search.prepare(arm, [signals_of(run, factor * suggested) for run in runs], groups, candidates)
-        climbs = [search.climb(start, factor * suggested, tried) for start in starts]
-        choice = min(climbs, key=lambda each: each.held_out)
-        if best is None or choice.recorded < best.recorded:
-            best = choice
-    if best is None:
-        raise ValueError("no cut-off to choose from")
-    return Selection(best, tuple(tried))
+    bests = []
+    for cutoff in (share * suggested for share in cutoffs):
+        climbs = []
+        for factor in POSITION_FACTORS:
+            search = _Search.prepare(arm, [signals_of(run, cutoff, factor) for run in runs], groups, candidates)
+            first = Choice(cutoff, USUAL, candidates[0], True, np.inf, np.inf, factor)
+            climbs += [search.climb(replace(first, groups=start), tried) for start in starts]
+        bests.append(min(climbs, key=lambda each: each.held_out))
+    return Selection(min(bests, key=lambda each: each.recorded), tuple(tried))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,10 +110,9 @@ class _Search:
         columns = self.base + [column for name in choice.groups for column in self.columns[name]]
         return against.held_out_error(sorted(columns), self.priors[choice.pull], choice.by_joint)
 
-    def climb(self, start: tuple[str, ...], cutoff_hz: float, tried: list[Tried]) -> Choice:
+    def climb(self, start: Choice, tried: list[Tried]) -> Choice:
         """Takes the best change until none is worth it."""
-        current = Choice(cutoff_hz, start, next(iter(self.priors)), True, np.inf, np.inf)
-        current = replace(current, held_out=self.error(current, self.filtered))
+        current = replace(start, held_out=self.error(start, self.filtered))
         while True:
             changes = [replace(each, held_out=self.error(each, self.filtered)) for each in self._changes(current)]
             tried.extend((describe(each), each.held_out) for each in changes)
@@ -129,7 +131,8 @@ def describe(choice: Choice) -> str:
     """A choice in a line."""
     weights = "joints weighted" if choice.by_joint else "joints alike"
     groups = ", ".join(choice.groups) or "rigid only"
-    return f"{choice.cutoff_hz:.3g} Hz; {groups}; prior {choice.pull}; {weights}"
+    filters = f"{choice.cutoff_hz:.3g} Hz, positions {choice.position_factor * choice.cutoff_hz:.3g} Hz"
+    return f"{filters}; {groups}; prior {choice.pull}; {weights}"
 
 
 def with_load(structure: Structure, signals: Sequence[Signals]) -> Structure:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.model import Model
+from identification.torque_model import TorqueModel
 from recordings.differentiate import Signals
 from recordings.run import Array
 
@@ -33,12 +33,12 @@ class RunError:
     joints: tuple[JointError, ...]
 
 
-def run_error(model: Model, signals: Signals) -> RunError:
+def run_error(model: TorqueModel, signals: Signals) -> RunError:
     """The errors of a model on a run."""
     left = signals.torque - model.filtered_torque(signals)
     rows = signals.filter.rows
     recorded = signals.run.torque[rows]
-    raw = recorded - model.torque(signals.motion)[rows]
+    raw = recorded - model.torque(signals.motion, signals.run)[rows]
     each = range(len(model.arm))
     joints = tuple(_joint_error(model, joint, left[:, joint], signals.torque[:, joint]) for joint in each)
     percent = relative_percent(left, signals.torque)
@@ -50,7 +50,7 @@ def relative_percent(error: Array, torque: Array) -> float:
     return float(100 * np.linalg.norm(error) / max(float(np.linalg.norm(torque)), 1e-300))
 
 
-def _joint_error(model: Model, joint: int, left: Array, torque: Array) -> JointError:
+def _joint_error(model: TorqueModel, joint: int, left: Array, torque: Array) -> JointError:
     rms = float(np.sqrt(np.mean(left**2)))
     rated = model.arm.joints[joint].limits.torque
     return JointError(joint + 1, rms, relative_percent(left, torque), 100 * rms / rated if np.isfinite(rated) else None)

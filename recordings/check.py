@@ -6,7 +6,8 @@ from pathlib import Path
 
 from problem.errors import InputError
 from recordings.checks.channels import channel_findings
-from recordings.checks.fit import fit_findings
+from recordings.checks.fit import fit_findings, thin
+from recordings.checks.zeros import turned_zero
 from recordings.load import load_runs, open_recording, with_runs
 from recordings.recording import Recording
 from recordings.run import Finding, Run
@@ -56,5 +57,14 @@ def _findings(recording: Recording) -> Iterator[tuple[str, Finding]]:
         yield from ((run.name, finding) for finding in channel_findings(run, recording.arm))
     whole = recording.findings
     if recording.runs:
-        whole = (*whole, *fit_findings(recording.runs, recording.arm))
+        whole = (*whole, *_geometry(recording))
     yield from (("all runs", finding) for finding in whole)
+
+
+def _geometry(recording: Recording) -> tuple[Finding, ...]:
+    """What the torques say of channels, robot and zeros."""
+    found = fit_findings(recording.runs, recording.arm)
+    if any(finding.kind == "swapped_channels" for finding in found):
+        return found
+    zero = turned_zero(recording.arm, thin(recording.runs))
+    return (*found, zero) if zero else found

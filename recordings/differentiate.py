@@ -18,7 +18,8 @@ class Signals:
 
     run: even in time, unfiltered. motion: (samples, joints), all rows. torque: (kept, joints), filtered.
     torque_covariance: (joints, joints) of the noise of one row of torque, where repetitions have shown it.
-    cutoff: how the cut-off was chosen, None where it was given.
+    cutoff: how the cut-off was chosen, None where it was given. position_cutoff_hz: of the positions, None where
+    they passed no low-pass.
     """
 
     run: Run
@@ -27,6 +28,7 @@ class Signals:
     filter: Filter
     cutoff: CutoffChoice | None = None
     torque_covariance: Array | None = None
+    position_cutoff_hz: float | None = None
 
     @property
     def time(self) -> Array:
@@ -62,7 +64,7 @@ def differentiate(
     cutoff = cutoff_hz or (choice.cutoff_hz if choice else 0.0)
     smooth = low_pass(run.rate_hz, cutoff, run.samples).smooth(run.position)
     both = low_pass(run.rate_hz, torque_cutoff_hz or cutoff, run.samples, step)
-    return Signals(run, _motion(run.time, smooth), both(run.torque), both, choice)
+    return Signals(run, _motion(run.time, smooth), both(run.torque), both, choice, None, cutoff)
 
 
 def _motion(time: Array, position: Array) -> Motion:

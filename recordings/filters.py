@@ -6,6 +6,7 @@ torque differs from it there, and a fit calls the difference physics; so one obj
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -69,7 +70,7 @@ class Butterworth(LowPass):
 
     def smooth(self, signal: Array) -> Array:
         """The smoothed signal, (samples, ...)."""
-        sections = butter(ORDER, self.cutoff_hz, fs=self.rate_hz, output="sos")
+        sections = _sections(self.cutoff_hz, self.rate_hz)
         padding = min(int(np.ceil(3 * self.rate_hz / self.cutoff_hz)), len(signal) - 1)
         moved = np.ascontiguousarray(np.moveaxis(signal, 0, -1))
         return np.moveaxis(sosfiltfilt(sections, moved, padlen=padding), -1, 0)
@@ -78,6 +79,12 @@ class Butterworth(LowPass):
         """Gain at each frequency: the squared one of a single pass, by the bilinear transform."""
         ratio = np.tan(np.pi * frequency_hz / self.rate_hz) / np.tan(np.pi * self.cutoff_hz / self.rate_hz)
         return np.asarray(1 / (1 + ratio ** (2 * ORDER)))
+
+
+@lru_cache(maxsize=64)
+def _sections(cutoff_hz: float, rate_hz: float) -> Array:
+    """Second-order sections; kept, for a diagnosis filters thousands of columns alike."""
+    return np.asarray(butter(ORDER, cutoff_hz, fs=rate_hz, output="sos"))
 
 
 @dataclass(frozen=True)

@@ -42,8 +42,18 @@ def pinocchio_regressor(arm: Arm, motion: Motion) -> Array:
 
 def mujoco_torque(arm: Arm, motion: Motion) -> Array:
     """Torques (samples, joints) of MuJoCo's inverse dynamics."""
+    return inverse_dynamics(mujoco_model(arm), motion)
+
+
+def mujoco_model(arm: Arm) -> Any:
+    """The arm in MuJoCo: one body and one joint for each of its own."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
-    model = mujoco.MjModel.from_xml_string(_mujoco_xml(arm))
+    return mujoco.MjModel.from_xml_string(_mujoco_xml(arm))
+
+
+def inverse_dynamics(model: Any, motion: Motion) -> Array:
+    """Torques (samples, joints) that a MuJoCo model needs for a motion."""
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     data = mujoco.MjData(model)
     torques = []
     for data.qpos[:], data.qvel[:], data.qacc[:] in zip(

@@ -29,6 +29,12 @@ def _run_options(command: Callable[..., None], results: str = "results") -> Call
             show_default=True,
             help="Folder for tables and figures.",
         ),
+        click.option(
+            "--executor",
+            type=click.Choice(["loky", "dask", "ray"]),
+            help="Engine [default: that of the configuration, else loky: processes on this machine].",
+        ),
+        click.option("--address", help="Of a running Dask or Ray cluster [default: processes on this machine]."),
         click.option("--dry-run", is_flag=True, help="List the trials and estimate the time; run nothing."),
         click.option("--fresh", is_flag=True, help="Compute again what is already kept."),
         click.option("--overwrite", is_flag=True, help="Replace results of another configuration."),
@@ -102,9 +108,14 @@ def _run(configs: Sequence[Path], dry_run: bool, **options: Any) -> None:
             click.echo(line)
 
 
-def _settings(workers: int | None, **options: Any) -> Any:
+def _settings(workers: int | None, executor: str | None, address: str | None, **options: Any) -> Any:
     from joblib import cpu_count
 
+    from bench.engines.contract import Executor
     from bench.experiment import Options
+    from problem.settings import validate
 
-    return Options(workers=workers or cpu_count(), **options)
+    if address and not executor:
+        raise click.UsageError("--address should stand beside --executor dask or --executor ray")
+    chosen = validate(Executor, {"backend": executor, "address": address}, "--executor") if executor else None
+    return Options(workers=workers or cpu_count(), executor=chosen, **options)

@@ -1,4 +1,4 @@
-"""Commands on results that are there: report, compare, share.
+"""Commands on results that are there: report, compare, share, salvage.
 
 RESULTS is a configuration file, whose outcomes are in the run store, or a folder of tidy tables as `share` writes it.
 """
@@ -47,3 +47,13 @@ def share(results: Path, store: Path, form: str, out: Path) -> None:
 
     for path in share_results(results, store, form, out):
         click.echo(path)
+
+
+@click.command()
+@click.argument("damaged", type=_PATH)
+@click.option("--out", type=_PATH, required=True, help="File of the new store.")
+def salvage(damaged: Path, out: Path) -> None:
+    """Take what is readable of a DAMAGED run store into a new one; the rest is computed again by the next run."""
+    from bench.salvage import salvage as save
+
+    click.echo(f"{save(damaged, out)} outcomes of {damaged} are in {out}")

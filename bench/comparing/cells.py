@@ -63,7 +63,7 @@ def compare(first: ResultSet, second: ResultSet) -> pd.DataFrame:
 def _shared(first: ResultSet, second: ResultSet) -> Iterator[tuple[str, str, pd.DataFrame, pd.DataFrame]]:
     """Problem, algorithm and the trials of both sets, for what stands in both under the same labels and budget."""
     theirs = dict(list(second.trials.groupby([*CELL, "algorithm"], sort=False)))
-    for label, trials, _ in first.cells():
+    for label, trials in first.ends():
         for key, rows in trials.groupby([*CELL, "algorithm"], sort=False):
             if key in theirs:
                 yield label, str(rows["algorithm"].iloc[0]), rows, theirs[key]

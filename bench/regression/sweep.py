@@ -92,7 +92,7 @@ def read_sweep(path: Path) -> Sweep:
     return validate(Sweep, read_yaml(path), str(path))
 
 
-def entries_of(sweep: Sweep, sample: Sample | None = None) -> list[Entry]:
+def entries_of(sweep: Sweep, sample: Sample | None = None) -> Sequence[Entry]:
     """The trials of the fixed run itself, or of another sample of the same cells."""
     other = {} if sample is None else {"seed": sample.seed, "repetitions": sample.repetitions}
     return plan(sweep.model_copy(update=other), f"configuration '{sweep.name}'")

@@ -1,5 +1,6 @@
 """Everything that the page says of one problem, computed once."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,31 +14,57 @@ from bench.statistics.anytime import area_under_curve
 from bench.statistics.bootstrap import quantile_interval
 from bench.statistics.ends import row_quantiles
 from bench.statistics.paired import Duel, duels, log_losses
-from bench.statistics.targets import Run, expected_running_time, running_times, targets_between
+from bench.statistics.targets import (
+    Hits,
+    Run,
+    expected_running_time,
+    hits,
+    running_times,
+    share_reached,
+    targets_between,
+)
 
 MOMENTS = 60  # at which convergence is drawn
 QUARTILES = (0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True, eq=False)
+class Progress:
+    """The runs of one algorithm, condensed: what is left of them takes no more memory for more repetitions.
+
+    quartiles: of the best so far at the moments (3, moments). hits: running times to the targets. expected: running
+    time to each target (targets,). area: median of that under the curve, NaN if nothing feasible was found by anyone.
+    """
+
+    quartiles: Array
+    hits: Hits
+    expected: Array
+    area: float
+
+
+@dataclass(frozen=True, eq=False)
 class Cell:
-    """One problem, swarm size and budget: its trials, and its runs by algorithm (in the order of their repetitions)."""
+    """One problem, swarm size and budget: its trials, and what became of its runs by algorithm.
+
+    moments: numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget.
+    targets: from the worst of the first feasible values to the best of all; empty if nothing feasible was found.
+    """
 
     label: str
     trials: pd.DataFrame
-    runs: dict[str, list[Run]]
-    budget: int
+    moments: Array
+    targets: Array
+    progress: Mapping[str, Progress]
 
     @property
     def algorithms(self) -> list[str]:
         """Labels in the order of the configuration."""
-        return list(self.runs)
+        return list(self.progress)
 
-    @cached_property
-    def moments(self) -> Array:
-        """Numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget."""
-        first = min(run.evaluations[0] for runs in self.runs.values() for run in runs)
-        return np.unique(np.geomspace(first, max(self.budget, first), MOMENTS).round())
+    @property
+    def repetitions(self) -> int:
+        """The least number of runs of an algorithm."""
+        return int(self.trials["algorithm"].value_counts().min())
 
     def ends(self, algorithm: str) -> Array:
         """Values at the end (repetitions,), infinite where infeasible."""
@@ -54,40 +81,6 @@ class Cell:
         """95 % bootstrap interval of its median."""
         return quantile_interval(self.ends(algorithm))
 
-    def convergence(self, algorithm: str) -> tuple[Array, Array, Array]:
-        """Lower quartile, median and upper quartile of the best so far at the moments, (moments,) each."""
-        best = np.stack([_at(run, self.moments) for run in self.runs[algorithm]], axis=1)
-        lower, middle, upper = (row_quantiles(best, share) for share in QUARTILES)
-        return lower, middle, upper
-
-    @cached_property
-    def targets(self) -> Array:
-        """From the worst of the first feasible values to the best of all; empty if nothing feasible was found."""
-        firsts = [run.best[np.isfinite(run.best)][:1] for runs in self.runs.values() for run in runs]
-        found = np.concatenate(firsts)
-        if not len(found):
-            return np.zeros(0)
-        hard = min(run.best.min() for runs in self.runs.values() for run in runs)
-        return targets_between(found.max(), hard) if hard > 0 else np.zeros(0)
-
-    def times(self, algorithm: str, targets: Array) -> Array:
-        """Running times (repetitions, targets)."""
-        return np.stack([running_times(run, targets) for run in self.runs[algorithm]])
-
-    def expected_times(self, algorithm: str, targets: Array) -> Array:
-        """Expected running time to each target (targets,)."""
-        spent = np.array([run.evaluations[-1] for run in self.runs[algorithm]])
-        return expected_running_time(self.times(algorithm, targets), spent)
-
-    def area(self, algorithm: str) -> float:
-        """Median of the area under the convergence curve; NaN if nothing feasible was found by anyone."""
-        if not len(self.targets):
-            return float("nan")
-        worst, best = self.targets[0], self.targets[-1]
-        return quantile(
-            np.array([area_under_curve(run, best, worst, self.budget) for run in self.runs[algorithm]]), 0.5
-        )
-
     @cached_property
     def losses(self) -> dict[str, Array]:
         """log10 of the ends by algorithm, an infeasible one worse than all others."""
@@ -101,13 +94,47 @@ class Cell:
 
 
 def cells_of(results: ResultSet) -> list[Cell]:
-    """All cells in the order of the configuration."""
-    return [_cell(*parts) for parts in results.cells()]
+    """All cells in the order of the configuration; the runs of one at a time are in memory."""
+    return [cell_of(label, trials, _ordered(runs_of(curves))) for label, trials, curves in results.cells()]
 
 
-def _cell(label: str, trials: pd.DataFrame, curves: pd.DataFrame) -> Cell:
-    runs = {name: [by_number[k] for k in sorted(by_number)] for name, by_number in runs_of(curves).items()}
-    return Cell(label, trials, runs, int(trials["budget"].iloc[0]))
+def cell_of(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[Run]]) -> Cell:
+    """The cell of runs by algorithm; trials: tidy, of one budget."""
+    budget = int(trials["budget"].iloc[0])
+    first = min(run.evaluations[0] for some in runs.values() for run in some)
+    moments = np.unique(np.geomspace(first, max(budget, first), MOMENTS).round())
+    targets = _targets([run for some in runs.values() for run in some])
+    progress = {name: _progress(some, moments, targets, budget) for name, some in runs.items()}
+    return Cell(label, trials, moments, targets, progress)
+
+
+def reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
+    """Share of targets reached at moments (moments,), over all runs and cells that have any."""
+    found = [cell.progress[algorithm].hits for cell in cells if len(cell.targets)]
+    return share_reached(found, moments) if found else np.zeros(len(moments))
+
+
+def _ordered(runs: Mapping[str, Mapping[int, Run]]) -> dict[str, list[Run]]:
+    return {name: [by_number[k] for k in sorted(by_number)] for name, by_number in runs.items()}
+
+
+def _targets(runs: Sequence[Run]) -> Array:
+    found = np.concatenate([run.best[np.isfinite(run.best)][:1] for run in runs])
+    hard = min(run.best.min() for run in runs)
+    return targets_between(found.max(), hard) if len(found) and hard > 0 else np.zeros(0)
+
+
+def _progress(runs: Sequence[Run], moments: Array, targets: Array, budget: int) -> Progress:
+    best = np.stack([_at(run, moments) for run in runs], axis=1)
+    times = np.stack([running_times(run, targets) for run in runs])
+    spent = np.array([run.evaluations[-1] for run in runs])
+    areas = [area_under_curve(run, targets[-1], targets[0], budget) for run in runs] if len(targets) else [np.nan]
+    return Progress(
+        quartiles=np.stack([row_quantiles(best, share) for share in QUARTILES]),
+        hits=hits(times),
+        expected=expected_running_time(times, spent),
+        area=quantile(np.array(areas), 0.5),
+    )
 
 
 def block_losses(cells: list[Cell]) -> pd.DataFrame:

@@ -8,6 +8,7 @@ from bench.statistics.critical import CriticalDifference
 
 _WIDTH, _ROW, _TOP, _NAME = 420, 26, 34, 130
 _BAR = 9  # between group bars
+_LABEL = 24  # the least from one number of the axis to the next
 
 
 def critical_picture(found: CriticalDifference, looks: Mapping[str, Look]) -> str:
@@ -29,10 +30,12 @@ def _in_words(found: CriticalDifference) -> str:
 
 
 def _axis(count: int, plot: int, height: int) -> Iterator[str]:
+    step = -(-_LABEL * (count - 1) // plot) or 1
     for rank in range(1, count + 1):
         x = _x(rank, count, plot)
         yield f'<line class="grid" x1="{x:.1f}" x2="{x:.1f}" y1="{_TOP - 8}" y2="{height - 8}"/>'
-        yield f'<text x="{x:.1f}" y="{_TOP - 14}" text-anchor="middle">{rank}</text>'
+        if (rank - 1) % step == 0:
+            yield f'<text x="{x:.1f}" y="{_TOP - 14}" text-anchor="middle">{rank}</text>'
 
 
 def _dots(found: CriticalDifference, looks: Mapping[str, Look], plot: int) -> Iterator[str]:

@@ -8,9 +8,8 @@ import numpy as np
 import pandas as pd
 
 from algorithms.contract import Array
-from bench.report.analysis import Cell
+from bench.report.analysis import Cell, reached
 from bench.statistics.profiles import performance_profile
-from bench.statistics.targets import share_reached
 
 _FACTORS = np.geomspace(1.0, 10.0, 60)
 _MOMENTS = 60
@@ -27,12 +26,12 @@ def page_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> str:
 
 
 def _problem(cell: Cell) -> dict[str, Any]:
-    curves = {name: cell.convergence(name) for name in cell.algorithms}
+    curves = {name: cell.progress[name].quartiles for name in cell.algorithms}
     return {
         "name": cell.label,
         "evaluations": _numbers(cell.moments),
         "convergence": {name: [_numbers(part) for part in parts] for name, parts in curves.items()},
-        "reached": {name: _numbers(_reached([cell], name, cell.moments)) for name in cell.algorithms},
+        "reached": {name: _numbers(reached([cell], name, cell.moments)) for name in cell.algorithms},
         "ends": {name: _numbers(cell.ends(name)) for name in cell.algorithms},
         "boxes": {name: _numbers(_box(cell, name)) for name in cell.algorithms},
     }
@@ -45,15 +44,10 @@ def _overall(cells: Sequence[Cell], algorithms: Sequence[str]) -> dict[str, Any]
     profile = performance_profile(pd.DataFrame(medians)[list(algorithms)], _FACTORS)
     return {
         "evaluations": _numbers(moments),
-        "reached": {name: _numbers(_reached(cells, name, moments)) for name in algorithms},
+        "reached": {name: _numbers(reached(cells, name, moments)) for name in algorithms},
         "factors": _numbers(_FACTORS),
         "profile": {name: _numbers(profile[name].to_numpy()) for name in algorithms},
     }
-
-
-def _reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
-    times = [cell.times(algorithm, cell.targets).ravel() for cell in cells if len(cell.targets)]
-    return share_reached(np.concatenate(times), moments) if times else np.zeros(len(moments))
 
 
 def _box(cell: Cell, algorithm: str) -> Array:

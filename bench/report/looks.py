@@ -16,5 +16,6 @@ class Look(NamedTuple):
 
 
 def look(index: int) -> Look:
-    """The look of the index-th algorithm."""
-    return Look(_COLORS[index % len(_COLORS)], _DASHES[index % len(_DASHES)])
+    """The look of the index-th algorithm; where colours begin anew, each has another dash than before."""
+    turn, place = divmod(index, len(_COLORS))
+    return Look(_COLORS[place], _DASHES[(place + turn) % len(_DASHES)])

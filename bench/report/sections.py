@@ -100,7 +100,7 @@ def problem(cells: Sequence[Cell]) -> str:
 
 def power(cells: Sequence[Cell]) -> str:
     """What the paired test can see with this number of repetitions."""
-    repetitions = min(len(runs) for cell in cells for runs in cell.runs.values())
+    repetitions = min(cell.repetitions for cell in cells)
     count = len(cells[0].all_duels)
     shown = power_table(powers(repetitions, max(count, 1)), repetitions, max(count, 1))
     text = (

@@ -22,14 +22,14 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def ends_table(cell: Cell) -> str:
     """Medians with intervals, quartiles, feasible share, area and expected running times on one problem."""
-    targets = [cell.targets[round(share * (len(cell.targets) - 1))] for share in _SHARES] if len(cell.targets) else []
+    places = [round(share * (len(cell.targets) - 1)) for share in _SHARES] if len(cell.targets) else []
     headings = ["algorithm", "median (95 %)", "quartiles", "minimum", "feasible", "area"]
-    headings += [f"ERT to {target:.3g}" for target in targets]
-    return table(headings, [_ends(cell, name, np.array(targets)) for name in cell.algorithms])
+    headings += [f"ERT to {cell.targets[place]:.3g}" for place in places]
+    return table(headings, [_ends(cell, name, places) for name in cell.algorithms])
 
 
-def _ends(cell: Cell, name: str, targets: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[str]:
-    summary = cell.summary(name)
+def _ends(cell: Cell, name: str, places: Sequence[int]) -> list[str]:
+    summary, progress = cell.summary(name), cell.progress[name]
     low, high = cell.median_interval(name)
     return [
         name,
@@ -37,8 +37,8 @@ def _ends(cell: Cell, name: str, targets: np.ndarray[tuple[int], np.dtype[np.flo
         f"{number(summary.lower_quartile)} – {number(summary.upper_quartile)}",
         number(summary.minimum),
         f"{summary.feasible_share:.0%}",
-        "–" if np.isnan(cell.area(name)) else f"{cell.area(name):.2f}",
-        *(number(time) for time in cell.expected_times(name, targets)),
+        "–" if np.isnan(progress.area) else f"{progress.area:.2f}",
+        *(number(progress.expected[place]) for place in places),
     ]
 
 

@@ -4,17 +4,17 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
 import yaml
 
+from bench import outcome
 from bench.experiment import load_experiment
-from bench.frame import row_of
-from bench.outcome import Outcome
-from bench.plan import Entry
-from bench.runner import missing
+from bench.frame import names_of, tidy_frame
+from bench.plan import Entry, Plan
+from bench.runner import count_missing
 from bench.statistics import is_feasible
 from bench.statistics.targets import Run
 from bench.store import open_store
@@ -22,19 +22,56 @@ from problem.errors import InputError
 
 CELL = ["problem", "swarm_size", "budget"]
 TRIAL = [*CELL, "algorithm", "repetition"]
+Cell = tuple[Any, ...]
+"""Problem, swarm size and budget."""
+
+
+class Curves(Protocol):
+    """Where the curves are: one row a trial and population, TRIAL, evaluations, value and violation of the best so far.
+
+    They take most of the space, so that no more than those of one cell are asked for at a time.
+    """
+
+    def of(self, cell: Cell) -> pd.DataFrame:
+        """Those of one problem, swarm size and budget, in the order of the trials."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class TableOfCurves:
+    """Curves in a table that was read from a file."""
+
+    table: pd.DataFrame
+
+    def of(self, cell: Cell) -> pd.DataFrame:
+        """Those rows."""
+        wanted = np.logical_and.reduce([self.table[name] == value for name, value in zip(CELL, cell, strict=True)])
+        return self.table[wanted]
+
+
+@dataclass(frozen=True, eq=False)
+class StoredCurves:
+    """Curves that stay in the run store."""
+
+    store: Path
+    plan: Plan
+
+    def of(self, cell: Cell) -> pd.DataFrame:
+        """Read now."""
+        entries = self.plan.of(*cell)
+        with open_store(self.store) as store:
+            return _table(entries, [store.get(entry.key).curves for entry in entries])
 
 
 @dataclass(frozen=True, eq=False)
 class ResultSet:
-    """trials: one row a trial, as `bench.frame` has it, and its dimension. curves: one row a trial and population:
-    TRIAL, evaluations, value and violation of the best so far. settings: YAML text. origins: who computed them.
-    """
+    """trials: one row a trial, as `bench.frame` has it. settings: YAML text. origins: who computed them."""
 
     name: str
     settings: str
     origins: tuple[dict[str, Any], ...]
     trials: pd.DataFrame
-    curves: pd.DataFrame
+    curves: Curves
 
     @property
     def seed(self) -> int:
@@ -54,11 +91,15 @@ class ResultSet:
 
     def cells(self) -> Iterator[tuple[str, pd.DataFrame, pd.DataFrame]]:
         """Label, trials and curves of each problem, swarm size and budget."""
-        curves = dict(list(self.curves.groupby(CELL, sort=False)))
-        for cell, trials in self.trials.groupby(CELL, sort=False):
-            yield self._label(cell), trials, curves[cell]
+        for label, trials in self.ends():
+            yield label, trials, self.curves.of(tuple(trials[CELL].iloc[0]))
 
-    def _label(self, cell: tuple[Any, ...]) -> str:
+    def ends(self) -> Iterator[tuple[str, pd.DataFrame]]:
+        """Label and trials of each problem, swarm size and budget."""
+        for cell, trials in self.trials.groupby(CELL, sort=False):
+            yield self._label(cell), trials
+
+    def _label(self, cell: Cell) -> str:
         problem, swarm_size, budget = cell
         parts = [str(problem)]
         parts += [f"{swarm_size} points"] if self.trials["swarm_size"].nunique() > 1 else []
@@ -86,26 +127,20 @@ def from_store(config: Path, path: Path) -> ResultSet:
     if not path.exists():
         raise InputError(f"there is no run store {path}: `armlab run {config}` makes it")
     with open_store(path) as store:
-        left = len(missing(loaded.entries, store))
+        left = count_missing(loaded.entries, store)
         if left:
             raise InputError(
                 f"{left} of {len(loaded.entries)} trials of {config} are not in {path}: `armlab run {config}` first"
             )
-        outcomes = [store.get(entry.key) for entry in loaded.entries]
+        trials = tidy_frame(loaded.entries, store)
         origins = tuple(json.loads(facts) for facts in store.origins(entry.key for entry in loaded.entries))
-    trials = _trials(loaded.entries, outcomes)
-    return ResultSet(loaded.experiment.name, loaded.settings, origins, trials, _curves(trials, outcomes))
+    return ResultSet(loaded.experiment.name, loaded.settings, origins, trials, StoredCurves(path, loaded.entries))
 
 
-def _trials(entries: Sequence[Entry], outcomes: Sequence[Outcome]) -> pd.DataFrame:
-    rows = [row_of(entry, outcome) for entry, outcome in zip(entries, outcomes, strict=True)]
-    return pd.DataFrame(rows).assign(dimension=[len(outcome.best_x) for outcome in outcomes])
-
-
-def _curves(trials: pd.DataFrame, outcomes: Sequence[Outcome]) -> pd.DataFrame:
-    curves = [outcome.curves for outcome in outcomes]
-    table = trials[TRIAL].loc[np.repeat(trials.index, [len(curve.evaluations) for curve in curves])]
-    return table.reset_index(drop=True).assign(
+def _table(entries: Sequence[Entry], curves: Sequence[outcome.Curves]) -> pd.DataFrame:
+    names = pd.DataFrame([names_of(entry) for entry in entries])
+    table = names.loc[names.index.repeat([len(curve.evaluations) for curve in curves])].reset_index(drop=True)
+    return table.assign(
         evaluations=np.concatenate([curve.evaluations for curve in curves]).astype(int),
         value=np.concatenate([curve.best_value for curve in curves]),
         violation=np.concatenate([curve.best_violation for curve in curves]),

@@ -1,7 +1,8 @@
 """A result set as a folder of tidy tables that anyone can read, and back."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pandas as pd
 import yaml
 
 from bench.files import write_whole
-from bench.sharing.result_set import TRIAL, ResultSet
+from bench.sharing.result_set import TRIAL, ResultSet, TableOfCurves
 from problem.errors import InputError
 
 SETTINGS, ORIGINS, TABLES = "settings.yaml", "origins.json", ("trials", "curves")
@@ -29,7 +30,10 @@ evaluations: used. seconds: of processor time. dimension: numbers that were sear
 
 def write_tidy(results: ResultSet, folder: Path, form: str) -> list[Path]:
     """Write a result set into a folder, its tables as `csv` or `parquet`; returns the files."""
-    files: dict[str, str | bytes] = {f"{name}.{form}": _WRITERS[form](getattr(results, name)) for name in TABLES}
+    tables = {"trials": iter([results.trials]), "curves": (curves for _, _, curves in results.cells())}
+    files: dict[str, str | bytes | Iterable[bytes]] = {
+        f"{name}.{form}": _WRITERS[form](tables[name]) for name in TABLES
+    }
     files |= {
         ORIGINS: json.dumps(results.origins, indent=1) + "\n",
         "README.md": _READ_ME.format(name=results.name, settings=SETTINGS, origins=ORIGINS),
@@ -49,7 +53,8 @@ def read_tidy(folder: Path) -> ResultSet:
         name = str(yaml.safe_load(settings)["name"])
     except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
         raise InputError(f"{folder} is no folder of results: {error!s}".splitlines()[0]) from None
-    return ResultSet(name, settings, tuple(origins), *(_read(folder, table) for table in TABLES))
+    trials, curves = (_read(folder, table) for table in TABLES)
+    return ResultSet(name, settings, tuple(origins), trials, TableOfCurves(curves))
 
 
 def _read(folder: Path, name: str) -> pd.DataFrame:
@@ -79,17 +84,26 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"cannot make the folder {folder}: {error.strerror}") from None
 
 
-def _as_csv(table: pd.DataFrame) -> str:
-    return table.to_csv(index=False, lineterminator="\n")  # every digit, so that nothing changes on the way
+def _as_csv(pieces: Iterator[pd.DataFrame]) -> Iterator[bytes]:
+    for place, piece in enumerate(pieces):  # every digit, so that nothing changes on the way
+        yield piece.to_csv(index=False, header=place == 0, lineterminator="\n").encode()
 
 
-def _as_parquet(table: pd.DataFrame) -> bytes:
+def _as_parquet(pieces: Iterator[pd.DataFrame]) -> bytes:
+    """A row group a piece; compressed, the whole is small enough for the memory."""
     try:
-        data: bytes = table.to_parquet(None, index=False)
+        from pyarrow import Table
+        from pyarrow.parquet import ParquetWriter
     except ImportError:
         raise InputError("Parquet needs the package `pyarrow`: install it, or write CSV") from None
-    return data
+    first = Table.from_pandas(next(pieces), preserve_index=False)
+    buffer = BytesIO()
+    with ParquetWriter(buffer, first.schema) as writer:
+        writer.write_table(first)
+        for piece in pieces:
+            writer.write_table(Table.from_pandas(piece, schema=first.schema, preserve_index=False))
+    return buffer.getvalue()
 
 
-_WRITERS: dict[str, Callable[[pd.DataFrame], Any]] = {"csv": _as_csv, "parquet": _as_parquet}
+_WRITERS: dict[str, Callable[[Iterator[pd.DataFrame]], Any]] = {"csv": _as_csv, "parquet": _as_parquet}
 _READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": pd.read_csv, "parquet": pd.read_parquet}

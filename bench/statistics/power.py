@@ -17,6 +17,7 @@ from algorithms.contract import Array
 from bench.seeds import named_generator
 
 SIMULATIONS = 4000
+_NUMBERS = 1_000_000  # drawn at most, so that thousands of repetitions are simulated less often
 EFFECTS = (0.56, 0.64, 0.71)  # small, medium, large (Vargha and Delaney 2000)
 
 
@@ -56,7 +57,8 @@ def smallest_seen(repetitions: int, level: float, power: float = 0.8) -> float |
 
 @lru_cache(maxsize=128)
 def _p_values(repetitions: int, superiority: float) -> Array:
-    """P-values (SIMULATIONS,) for one true effect; the same chance for every effect, so that power grows with it."""
-    noise = named_generator("power", repetitions).standard_normal((SIMULATIONS, repetitions))
+    """P-values for one true effect, one a simulation; the same chance for every effect, so that power grows with it."""
+    simulations = max(min(SIMULATIONS, _NUMBERS // repetitions), 100)
+    noise = named_generator("power", repetitions).standard_normal((simulations, repetitions))
     p: Array = wilcoxon(noise + ndtri(superiority), axis=1).pvalue
     return p

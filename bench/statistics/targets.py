@@ -4,9 +4,11 @@ Hansen, Auger, Brockhoff, Tušar, Tušar 2016, arXiv 1605.03560. Runs are known 
 is that of the first population whose best point reaches the target, so it is late by less than one population.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from algorithms.contract import Array
 
@@ -42,7 +44,25 @@ def expected_running_time(times: Array, spent: Array) -> Array:
     return np.asarray(np.divide(used, count, out=np.full(len(count), np.inf), where=count > 0))
 
 
-def share_reached(times: Array, evaluations: Array) -> Array:
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """Running times of many runs and targets, condensed: as short for a thousand runs as for ten.
+
+    times: the finite ones in ascending order, each once (k,); counts: how many are no later (k,); of: all of them.
+    """
+
+    times: Array
+    counts: NDArray[np.intp]
+    of: int
+
+
+def hits(times: Array) -> Hits:
+    """Condensed running times, of any shape."""
+    once, counts = np.unique(times[np.isfinite(times)], return_counts=True)
+    return Hits(once, counts.cumsum(), times.size)
+
+
+def share_reached(found: Sequence[Hits], evaluations: Array) -> Array:
     """The share of all times, of whatever runs, problems and targets, within each number of evaluations (k,)."""
-    ordered = np.sort(times, axis=None)
-    return np.asarray(np.searchsorted(ordered, evaluations, side="right") / ordered.size)
+    reached = [np.append(0, one.counts)[np.searchsorted(one.times, evaluations, side="right")] for one in found]
+    return np.asarray(np.sum(reached, axis=0) / sum(one.of for one in found))

@@ -11,7 +11,7 @@ from bench.experiment import Loaded, Options, ProgressBar, load_experiment, run_
 from bench.files import write_whole
 from bench.frame import tidy_frame
 from bench.known_values import known_values
-from bench.plan import Entry
+from bench.plan import Plan
 from bench.store import open_store
 from bench.study.mutation_table import mutation_table
 from bench.study.page import Part, study_page
@@ -34,7 +34,7 @@ Files = dict[str, str | bytes]
 @dataclass(frozen=True, eq=False)
 class _Outcomes:
     frames: Mapping[str, pd.DataFrame]
-    entries: Mapping[str, list[Entry]]
+    entries: Mapping[str, Plan]
 
 
 def make_study(configs: Path, options: Options, records: Path, bar: ProgressBar) -> Iterator[Path]:

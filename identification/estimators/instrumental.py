@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimators.estimate import Estimate, lengths_of
-from identification.regression import Regression
+from identification.regression import Regression, once_more
 from identification.structure import Structure
-from recordings.differentiate import Signals, differentiate
-from recordings.filters import LowPass
+from recordings.differentiate import Signals
 from recordings.run import Array
 
 
@@ -20,11 +19,10 @@ def reference_instruments(structure: Structure, signals: Signals) -> Array:
 
     Raises ValueError for a run without `reference_position`.
     """
-    run, low_pass = signals.run, signals.filter
-    if run.reference_position is None or not isinstance(low_pass, LowPass):
+    run = signals.run
+    if run.reference_position is None:
         raise ValueError(f"{run.name} has no reference_position: instruments need a motion that noise did not touch")
-    smooth = replace(run, position=run.reference_position)
-    return structure.filtered(differentiate(smooth, type(low_pass), low_pass.cutoff_hz, step=low_pass.step))
+    return structure.filtered(once_more(signals, replace(run, position=run.reference_position)))
 
 
 @dataclass(frozen=True, eq=False)

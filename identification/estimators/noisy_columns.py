@@ -10,11 +10,10 @@ import numpy as np
 from scipy.linalg import eigh
 
 from identification.estimators.estimate import Estimate, least_squares, pseudo_inverse
-from identification.regression import Regression
+from identification.regression import Regression, once_more
 from identification.structure import Structure
 from recordings.cutoff import acceleration_spectrum, noise_level
-from recordings.differentiate import Signals, differentiate
-from recordings.filters import LowPass
+from recordings.differentiate import Signals
 from recordings.run import Array, Run
 
 
@@ -30,16 +29,12 @@ def column_noise(structure: Structure, signals: Signals, rng: np.random.Generato
 
     Raises ValueError for signals that did not pass a low-pass.
     """
-    low_pass = signals.filter
-    if not isinstance(low_pass, LowPass):
-        raise ValueError("column noise is known for low-pass filters only")
     deviation, clean = encoder_deviation(signals.run), structure.filtered(signals)
 
     def disturbed() -> Array:
         noise = deviation * rng.standard_normal(signals.run.position.shape)
         run = replace(signals.run, position=signals.run.position + noise)
-        again = differentiate(run, type(low_pass), low_pass.cutoff_hz, step=low_pass.step)
-        return structure.filtered(again)
+        return structure.filtered(once_more(signals, run))
 
     return np.stack([disturbed() - clean for _ in range(draws)])
 

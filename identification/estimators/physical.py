@@ -66,7 +66,7 @@ class PhysicalLeastSquares:
         return np.full(data.joints, 1 / np.sqrt(np.mean(data.residuals(free) ** 2)))
 
     def _solve(self, data: Regression) -> tuple[Array, Array]:
-        cp = _cvxpy()
+        cp = solver()
         lengths = lengths_of(data.matrix)
         triangle = _triangle(np.column_stack([data.matrix / lengths, data.torque]))
         size, base = self.structure.size, self.structure.base
@@ -126,7 +126,8 @@ def is_physical(parameters: Array, tolerance: float = 0.0) -> bool:
     return bool(np.linalg.eigvalsh(pseudo_inertias(parameters)).min() >= -tolerance)
 
 
-def _cvxpy() -> Any:
+def solver() -> Any:
+    """CVXPY; InputError, in one line, where it is not installed."""
     try:
         import cvxpy
     except ImportError:

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.model import Model
 from identification.pseudo_inertia import link_of
+from identification.torque_model import TorqueModel
 from problem.errors import InputError
 from problem.inertia import about_origin, moved
 from recordings.run import Array
@@ -36,7 +36,7 @@ class Body:
     armature: float
 
 
-def bodies(model: Model) -> tuple[Body, ...]:
+def bodies(model: TorqueModel) -> tuple[Body, ...]:
     """The bodies of a model; InputError where it has no links or one that no simulator takes."""
     if model.inertial is None:
         raise InputError("the model has base parameters only: identify it with --method physical to export links")
@@ -60,7 +60,7 @@ def bodies(model: Model) -> tuple[Body, ...]:
     return tuple(out)
 
 
-def joint_values(model: Model) -> dict[str, Array]:
+def joint_values(model: TorqueModel) -> dict[str, Array]:
     """damping, friction and armature of each joint, (joints,)."""
     values = {name: np.zeros(len(model.arm)) for name in EXPORTED.values()}
     for part, place in zip(model.structure.components, model.structure.slices, strict=True):
@@ -69,7 +69,7 @@ def joint_values(model: Model) -> dict[str, Array]:
     return values
 
 
-def left_out(model: Model) -> tuple[str, ...]:
+def left_out(model: TorqueModel) -> tuple[str, ...]:
     """Components for which these formats have no place."""
     return tuple(part.label for part in model.structure.components if part.effect not in EXPORTED)
 

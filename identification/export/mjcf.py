@@ -6,12 +6,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from identification.export.chain import Body, bodies, numbers
-from identification.model import Model
+from identification.torque_model import TorqueModel
 
 KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 
-def mjcf(model: Model) -> str:
+def mjcf(model: TorqueModel) -> str:
     """The model as an MJCF document; InputError for a model without links."""
     root = ElementTree.Element("mujoco", model=model.arm.name)
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")

@@ -1,4 +1,4 @@
-"""URDF: rigid bodies, damping and friction. It has no place for the armature, which only MJCF carries.
+"""URDF: rigid bodies, damping and friction. It has no place for the armature, which goes to an SRDF beside it.
 
 URDF takes gravity as -z of the root: a fixed first joint turns the arm into it.
 """
@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 
 from identification.export.chain import Body, bodies, numbers
-from identification.model import Model
+from identification.torque_model import TorqueModel
 from problem.transforms import inverse, turn_z_to
 from recordings.run import Array
 
@@ -16,7 +16,7 @@ UPRIGHT = 1e-12  # cosine of the pitch, below which roll and yaw are one turn
 UNLIMITED = 1e9  # what a reader takes for no limit, where the format wants a number
 
 
-def urdf(model: Model) -> str:
+def urdf(model: TorqueModel) -> str:
     """The model as a URDF document; InputError for a model without links."""
     root = ElementTree.Element("robot", name=model.arm.name)
     ElementTree.SubElement(root, "link", name="world")

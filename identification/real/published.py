@@ -58,11 +58,12 @@ def compare_with_published(model: Model) -> tuple[Comparison, ...]:
     return tuple(out)
 
 
-def in_published_structure(recording: Recording, cutoff_hz: float) -> Model:
+def in_published_structure(recording: Recording, cutoff_hz: float, position_factor: float) -> Model:
     """The model with the terms of the published one, from the runs that identify."""
     joints = len(recording.arm)
     components = usual_components(joints) + neighbour_couplings(joints)
-    return Identifier(recording.arm, components, cutoff_hz=cutoff_hz).fit(recording.with_role("identify")).model_
+    identifier = Identifier(recording.arm, components, cutoff_hz=cutoff_hz, position_factor=position_factor)
+    return identifier.fit(recording.with_role("identify")).model_
 
 
 def functional(model: Model, expression: str) -> Array:

@@ -66,7 +66,8 @@ def _section(found: Study, looks: Looks) -> Iterator[str]:
     chosen = found.models[-1].identifier
     yield f"<p>Condition number of the chosen columns at unit length: {chosen.condition_number_:.3g}.</p>"
     if found.recipe.name == "staubli-tx40":
-        same = in_published_structure(found.recording, found.selection.choice.cutoff_hz)
+        choice = found.selection.choice
+        same = in_published_structure(found.recording, choice.cutoff_hz, choice.position_factor)
         yield from _published(compare_with_published(same))
     for run in found.recording.with_role("validate"):
         picture = png(chosen.model_.plot(run))

@@ -9,7 +9,6 @@ from identification.identifier import Identifier
 from identification.priors import Pull
 from identification.real.looks import Looks
 from identification.real.recipes import Recipe
-from identification.regression import signals_of
 from identification.selection import Choice, Selection, describe, select
 from identification.validation import RunError, run_error
 from recordings.load import load_recording
@@ -53,7 +52,8 @@ def study(recipe: Recipe, folder: Path, looks: Looks) -> Study:
     )
     models = []
     for name, components, by, pull in tasks:
-        identifier = Identifier(recording.arm, components, by, pull, choice.cutoff_hz, recording.robot).fit(runs)
+        filters = choice.cutoff_hz, recording.robot, choice.position_factor
+        identifier = Identifier(recording.arm, components, by, pull, *filters).fit(runs)
         models.append(Fitted(name, identifier, _errors(identifier, recording, name, looks)))
     return Study(recipe, recording, selection, tuple(models))
 
@@ -64,7 +64,9 @@ def _method(recipe: Recipe, recording: Recording, choice: Choice, components: tu
     runs = recording.with_role("identify")
     ways = ("physical",) if recipe.physical else ("physical", free)
     errors = {
-        way: Identifier(recording.arm, components, way, choice.pull, choice.cutoff_hz).held_out_error(runs)
+        way: Identifier(
+            recording.arm, components, way, choice.pull, choice.cutoff_hz, None, choice.position_factor
+        ).held_out_error(runs)
         for way in ways
     }
     return min(errors, key=errors.__getitem__)
@@ -74,7 +76,7 @@ def _errors(identifier: Identifier, recording: Recording, name: str, looks: Look
     model = identifier.model_
     for run in recording.with_role("validate"):
         looks.note(recording.arm.name, run.name, name)
-    return tuple(run_error(model, signals_of(run, model.cutoff_hz)) for run in recording.runs)
+    return tuple(run_error(model, model.signals(run)) for run in recording.runs)
 
 
 def summary(found: Study) -> str:

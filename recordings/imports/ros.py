@@ -14,7 +14,19 @@ from recordings.table import Table
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 FIELDS = ("position", "velocity", "effort")
-BROKEN = (ValueError, TypeError, LookupError, OSError, AssertionError, struct.error, OverflowError, MemoryError)
+BROKEN = (
+    ValueError,
+    TypeError,
+    LookupError,
+    OSError,
+    AssertionError,
+    AttributeError,  # a joint state without positions, by the definition that the file brings
+    SyntaxError,  # a message type whose name is none: rosbags makes classes of the file's definitions
+    NameError,
+    struct.error,
+    OverflowError,
+    MemoryError,
+)
 
 
 @dataclass(frozen=True, eq=False)

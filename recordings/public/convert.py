@@ -16,6 +16,9 @@ from recordings.write import Draft, DraftRun, Keys
 IDENTIFY_SHARE = 0.6  # of a single run; the rest validates
 TX40_RATE_HZ, TX40_MOTION_S = 5000, 7.5
 TX40_GEARS = np.array([32.0, 32.0, 45.0, -48.0, 45.0, 32.0])
+# the driver counts from the arm stretched out level, the D-H table of the robot file from the arm upright:
+# shoulder lift and first wrist joint of Universal Robots stand at -90 deg there
+UR10_ZEROS = (0.0, np.pi / 2, 0.0, np.pi / 2, 0.0, 0.0)
 KUKA_GEARS = (256.86, 267.43, 252.33, 221.0, 239.62, 154.32)
 
 
@@ -88,7 +91,8 @@ def unisa(name: str, path: Path) -> Draft:
     for signal, prefix in (("position", "position"), ("torque", "effort"), ("velocity", "velocity")):
         columns[signal] = tuple(f"{prefix}_{joint}" for joint in joints)
     units: Keys = {"time": "s", "position": "rad", "torque": "N.m", "velocity": "rad/s"}
-    return Draft(name, columns, units, _halves(table.names, table.values), {}, _source(name))
+    others = {"transmission": {"offset": list(UR10_ZEROS)}} if name == "unisa-ur10" else {}
+    return Draft(name, columns, units, _halves(table.names, table.values), others, _source(name))
 
 
 def _halves(names: tuple[str, ...], values: Array) -> tuple[DraftRun, DraftRun]:

@@ -41,14 +41,31 @@ def raw_file(recording: PublicRecording, file: RemoteFile) -> Path:
     return path
 
 
-def _downloaded(recording: PublicRecording, file: RemoteFile) -> Path:
+def at_hand(recording: PublicRecording) -> bool:
+    """True if all raw files are on this machine: in the folder that ARMLAB_RECORDINGS names, else in the cache."""
+    local = os.environ.get(LOCAL_COPIES)
+    folder = Path(local) if local else cache_folder()
+    return folder is not None and all((folder / recording.folder / file.name).is_file() for file in recording.files)
+
+
+def cache_folder() -> Path | None:
+    """Where downloads are kept; None without pooch."""
     try:
         import pooch
     except ImportError:
-        raise InputError("to download recordings install pooch: pip install 'armlab[recordings]'") from None
-    cache = Path(pooch.os_cache("armlab")) / recording.folder
+        return None
+    return Path(pooch.os_cache("armlab"))
+
+
+def _downloaded(recording: PublicRecording, file: RemoteFile) -> Path:
+    cache = cache_folder()
+    if cache is None:
+        raise InputError("to download recordings install pooch: pip install 'armlab[recordings]'")
+    import pooch
+
     try:
-        return Path(pooch.retrieve(file.address, f"sha256:{file.sha256}", file.name, cache))
+        folder = cache / recording.folder
+        return Path(pooch.retrieve(file.address, f"sha256:{file.sha256}", file.name, folder))
     except (OSError, ValueError) as error:  # no connection; another content than registered
         reason = " ".join(str(error).split())[:200]
         raise InputError(f"cannot fetch {file.address}: {reason}; or set {LOCAL_COPIES} to a local copy") from None

@@ -58,7 +58,7 @@ def test_its_comparison_runs_and_its_algorithm_beats_random_search_on_its_proble
     assert done.returncode == 0, done.stderr
     table = pd.read_csv(plugin / "results" / "comparison.csv").set_index(["problem", "algorithm"])
     medians = table["median"]
-    assert len(table) == 12
+    assert len(table) == 24
     assert medians["reaching", "evolution-strategy"] < medians["reaching", "random-search"]
 
 
@@ -72,7 +72,7 @@ def test_a_wrong_key_of_its_problem_is_refused_in_one_line(run: Run, plugin: Pat
 
 def test_a_change_of_its_problem_is_another_trial(run: Run, plugin: Path) -> None:
     run("bench.cli", "run", "comparison.yaml", "--workers", "1")
-    assert "120 trials, 120 done" in run("bench.cli", "run", "comparison.yaml", "--dry-run").stdout
+    assert "240 trials, 240 done" in run("bench.cli", "run", "comparison.yaml", "--dry-run").stdout
     source = plugin.parent / "installed" / "armlab_example" / "reaching.py"
     source.write_text(source.read_text(encoding="utf-8").replace("10.0 *", "20.0 *"), encoding="utf-8")
-    assert "120 trials, 40 done" in run("bench.cli", "run", "comparison.yaml", "--dry-run").stdout
+    assert "240 trials, 80 done" in run("bench.cli", "run", "comparison.yaml", "--dry-run").stdout

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from small_results import CONFIG, Ran, ran
 
-from bench.report.analysis import Cell, block_losses, cells_of
+from bench.report.analysis import Cell, block_losses, cell_of, cells_of
 from bench.report.command import write_report
 from bench.report.critical_picture import critical_picture
 from bench.report.data import page_data
@@ -18,7 +18,7 @@ from bench.report.looks import look
 from bench.report.page import report_page
 from bench.report.tables import ends_table, number, tally_table
 from bench.sharing.command import read_results, share
-from bench.sharing.result_set import ResultSet
+from bench.sharing.result_set import ResultSet, TableOfCurves
 from bench.statistics.critical import critical_difference
 from bench.statistics.targets import Run
 
@@ -38,14 +38,14 @@ def cell() -> Cell:
     """Two repetitions of two algorithms, one of which finds nothing feasible once."""
     trials = pd.DataFrame(
         {"algorithm": ["a", "a", "b", "b"], "repetition": [0, 1, 0, 1], "value": [10.0, 20.0, 5.0, 1.0],
-         "violation": [0.0, 0.0, 0.0, 2.0]}
+         "violation": [0.0, 0.0, 0.0, 2.0], "budget": 20}
     )  # fmt: skip
     moments = np.array([10.0, 20.0])
     runs = {
         "a": [Run(moments, np.array([100.0, 10.0])), Run(moments, np.array([40.0, 20.0]))],
         "b": [Run(moments, np.array([50.0, 5.0])), Run(moments, np.array([np.inf, np.inf]))],
     }
-    return Cell("small", trials, runs, 20)
+    return cell_of("small", trials, runs)
 
 
 def test_the_page_refers_to_nothing_outside_of_itself(small_run: Ran, tmp_path: Path) -> None:
@@ -82,20 +82,21 @@ def test_labels_of_a_third_party_cannot_break_out_of_the_page(small_run: Ran, tm
 
 def test_quartiles_of_convergence_count_an_infeasible_value_as_infinite(cell: Cell) -> None:
     assert cell.moments.tolist()[0] == 10
-    lower, middle, upper = cell.convergence("b")
+    lower, middle, upper = cell.progress["b"].quartiles
     assert (middle[0], upper[-1]) == (np.inf, np.inf)
-    lower, middle, upper = cell.convergence("a")
+    lower, middle, upper = cell.progress["a"].quartiles
     assert (lower[-1], middle[-1], upper[-1]) == (12.5, 15.0, 17.5)
 
 
 def test_targets_go_from_the_worst_first_feasible_value_to_the_best_of_all(cell: Cell) -> None:
     assert cell.targets[[0, -1]].tolist() == pytest.approx([100.0, 5.0])
-    assert cell.expected_times("a", np.array([20.0, 5.0])).tolist() == [20.0, np.inf]
-    assert cell.expected_times("b", np.array([20.0, 5.0])).tolist() == [40.0, 40.0]
+    assert cell.progress["a"].expected[[0, -1]].tolist() == [10.0, np.inf]
+    assert cell.progress["b"].expected[[0, -1]].tolist() == [30.0, 40.0]
 
 
 def test_a_problem_on_which_nothing_feasible_was_found_has_no_targets_and_still_a_page(results: ResultSet) -> None:
-    lost = replace(results, trials=results.trials.assign(violation=1.0), curves=results.curves.assign(violation=1.0))
+    curves = pd.concat([curves for _, _, curves in results.cells()]).assign(violation=1.0)
+    lost = replace(results, trials=results.trials.assign(violation=1.0), curves=TableOfCurves(curves))
     cells = cells_of(lost)
     assert all(len(cell.targets) == 0 for cell in cells)
     text = report_page(lost, cells, [])
@@ -135,6 +136,19 @@ def test_the_picture_has_a_dot_an_algorithm_and_a_bar_a_group_and_says_so_in_wor
     assert picture.count('class="group"') == len(found.groups) == 1
     assert "Average ranks: a 1.00, " in picture
     assert "Not told apart: b and c" in picture or "Not told apart: c and b" in picture
+
+
+def test_the_axis_of_many_ranks_numbers_as_many_as_there_is_room_for() -> None:
+    names = [f"a{k}" for k in range(22)]
+    found = critical_difference(pd.DataFrame(np.random.default_rng(0).normal(size=(3, 22)), columns=names))
+    picture = critical_picture(found, {name: look(k) for k, name in enumerate(names)})
+    numbers = [float(x) for x in re.findall(r'<text x="([\d.]+)" y="20" text-anchor="middle">\d+</text>', picture)]
+    assert len(numbers) > 5
+    assert min(np.diff(numbers)) >= 20
+
+
+def test_no_two_of_many_algorithms_look_the_same() -> None:
+    assert len({look(index) for index in range(40)}) == 40
 
 
 def test_the_tally_counts_problems_won_and_lost_on_both_sides(results: ResultSet) -> None:

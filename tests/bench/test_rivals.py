@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from refusals import refusal
 from small_results import ran
 
 from bench.experiment import load_experiment
-from bench.rivals import rival_pairs, rivals_table
+from bench.rival_pairs import rival_pairs
+from bench.rivals import rivals_table
+from problem.errors import InputError
 
 CONFIG = """\
 name: peers
@@ -46,14 +47,6 @@ def test_the_table_has_a_row_a_problem_and_the_medians_of_the_summary(folder: Pa
 
 
 def test_time_is_that_of_an_evaluation_in_microseconds_and_a_better_end_is_a_win() -> None:
-    class Trial:
-        def __init__(self, algorithm: str) -> None:
-            self.algorithm = algorithm
-
-    class Entry:
-        def __init__(self, name: str) -> None:
-            self.algorithm, self.trial = name, Trial(name)
-
     place = {"problem": "p", "swarm_size": 5, "budget": 100, "violation": 0.0, "evaluations": 100}
     frame = pd.DataFrame(
         [
@@ -62,16 +55,17 @@ def test_time_is_that_of_an_evaluation_in_microseconds_and_a_better_end_is_a_win
             for k in range(5)
         ]
     )
-    row = rivals_table(frame, [Entry("de"), Entry("scipy-de")]).iloc[0]  # type: ignore[list-item]
+    row = rivals_table(frame, [("de", "scipy-de")]).iloc[0]
     assert row["our_microseconds"] == pytest.approx(20.0)
     assert row["their_microseconds"] == pytest.approx(50.0)
     assert (row["our_median"], row["their_median"]) == (3.0, 102.0)
     assert row["ours_better"] == 1.0
 
 
-def test_a_comparison_without_pairs_is_refused(folder: Path) -> None:
-    entries = [entry for entry in load_experiment(folder / "peers.yaml").entries if entry.algorithm != "scipy-de"]
-    assert "should have a peer" in refusal(rivals_table, pd.DataFrame(), entries)
+def test_a_comparison_without_pairs_is_refused_before_anything_runs(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"output 'rivals' of .*peers.yaml should have a peer and, in 'algorithms'"):
+        ran(tmp_path, CONFIG.replace("scipy-de, ", ""))
+    assert [path.name for path in tmp_path.iterdir()] == ["peers.yaml"]
 
 
 def test_the_page_says_the_same_to_a_reader(folder: Path) -> None:

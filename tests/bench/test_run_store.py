@@ -23,6 +23,7 @@ def test_an_outcome_comes_back_to_the_bit(tmp_path: Path) -> None:
         store.add([("key", OUTCOME)], "{}")
     with open_store(tmp_path / "runs.sqlite") as store:
         _assert_same(store.get("key"), OUTCOME)
+        assert store.figures("key") == (4.5, 0.0, 4.75, 25, 0.125, 2)
 
 
 def test_values_that_are_not_finite_come_back(tmp_path: Path) -> None:
@@ -44,9 +45,9 @@ def test_an_outcome_that_is_there_is_never_written_again(tmp_path: Path) -> None
 def test_only_outcomes_that_are_there_are_done(tmp_path: Path) -> None:
     with open_store(tmp_path / "runs.sqlite") as store:
         store.add([("a", OUTCOME), ("b", OUTCOME)], "{}")
-        assert store.done(["a", "c"]) == {"a"}
+        assert [store.has(key) for key in "abc"] == [True, True, False]
         store.forget(["a"])
-        assert store.done(["a", "b"]) == {"b"}
+        assert [store.has(key) for key in "abc"] == [False, True, False]
         with pytest.raises(KeyError):
             store.get("a")
 
@@ -66,7 +67,8 @@ def test_a_batch_that_fails_half_way_leaves_nothing(tmp_path: Path) -> None:
     with open_store(tmp_path / "runs.sqlite") as store:
         with pytest.raises(sqlite3.IntegrityError):
             store.add([("a", OUTCOME), ("b", replace(OUTCOME, evaluations=None))], "{}")
-        assert store.done(["a", "b"]) == set()
+        assert not store.has("a")
+        assert not store.has("b")
 
 
 def _add_fifty(path: Path, own: float) -> None:

@@ -1,7 +1,7 @@
 """The runner does what is missing, in any order and on any number of workers, and keeps all that finishes."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,7 @@ from bench.table import as_csv, summary_table
 PlugIn = Callable[[str], Path]
 
 
-def _table(entries: list[Entry], order: list[Entry], store_path: Path, workers: int) -> str:
+def _table(entries: Sequence[Entry], order: Sequence[Entry], store_path: Path, workers: int) -> str:
     with open_store(store_path) as store:
         run_missing(order, store, workers)
         return as_csv(summary_table(tidy_frame(entries, store)))
@@ -62,7 +62,7 @@ def test_a_second_run_does_only_what_is_missing(small: Path, plug_in: PlugIn) ->
     with open_store(small.with_name("runs.sqlite")) as store:
         run_missing(entries[:1], store, 1)
         assert len(notes.read_text()) == 1
-        assert missing(entries, store) == entries[1:]
+        assert list(missing(entries, store)) == entries[1:]
         run_missing(entries, store, 1)
         run_missing(entries, store, 1)
     assert len(notes.read_text()) == 3
@@ -75,7 +75,7 @@ def test_a_trial_that_raises_is_named_and_not_kept_and_the_others_are(small: Pat
     with open_store(small.with_name("runs.sqlite")) as store:
         with pytest.raises(TrialsFailedError) as caught:
             run_missing(entries, store, 1)
-        failed = missing(entries, store)
+        failed = list(missing(entries, store))
     assert 0 < len(failed) < len(entries)
     for entry in entries:
         named = f"{entry.trial}: ZeroDivisionError: of a third party" in str(caught.value)

@@ -16,7 +16,7 @@ from bench.statistics.holm import holm
 from bench.statistics.paired import signed_rank_p, superiority, superiority_unpaired
 from bench.statistics.power import powers, signed_rank_power, smallest_seen
 from bench.statistics.profiles import performance_profile
-from bench.statistics.targets import Run, expected_running_time, running_times, share_reached, targets_between
+from bench.statistics.targets import Run, expected_running_time, hits, running_times, share_reached, targets_between
 
 # Demšar 2006 (JMLR 7, 1), table 6: AUC of four variants of C4.5 on 14 data sets. The ranks printed there tell the two
 # 0.975 of the last row but one apart, which agree to the printed digits.
@@ -169,7 +169,7 @@ def test_expected_running_time_adds_what_failures_cost() -> None:
 
 def test_the_share_of_targets_reached_counts_all_runs_and_targets() -> None:
     times = np.array([[100.0, np.inf], [50.0, 400.0]])
-    assert share_reached(times, np.array([49.0, 50.0, 100.0, 1000.0])).tolist() == [0.0, 0.25, 0.5, 0.75]
+    assert share_reached([hits(times)], np.array([49.0, 50.0, 100.0, 1000.0])).tolist() == [0.0, 0.25, 0.5, 0.75]
 
 
 def test_targets_are_evenly_spaced_in_the_logarithm_from_easy_to_hard() -> None:

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from identification.components import usual_components
 from identification.export.command import export_model
 from identification.export.mjcf import mjcf
+from identification.export.srdf import srdf
 from identification.export.urdf import urdf
 from identification.model import Model
 from identification.pseudo_inertia import parameters_of, regular_nominal
@@ -66,11 +67,13 @@ def test_mujoco_reproduces_rigid_and_viscous_torque_of_the_urdf(name: str) -> No
 @pytest.mark.parametrize("form", ["mjcf", "urdf"])
 def test_pinocchio_reproduces_the_exported_torque(name: str, form: str, tmp_path: Path) -> None:
     pin = pytest.importorskip("pinocchio")
-    model = model_of(name, SMOOTH if form == "mjcf" else ("viscous_friction",))
+    model = model_of(name)
     motion = states(len(model.arm))
-    path = tmp_path / f"arm.{form}.xml"
-    path.write_text(mjcf(model) if form == "mjcf" else urdf(model))
-    read = pin.buildModelFromMJCF(str(path)) if form == "mjcf" else pin.buildModelFromXML(path.read_text())
+    path = tmp_path / ("arm.xml" if form == "mjcf" else "arm.srdf")
+    path.write_text(mjcf(model) if form == "mjcf" else srdf(model))
+    read = pin.buildModelFromMJCF(str(path)) if form == "mjcf" else pin.buildModelFromXML(urdf(model))
+    if form == "urdf":
+        pin.loadRotorParameters(read, str(path), False)
     read.gravity.linear[:] = model.arm.gravity
     data, out = read.createData(), []
     for position, velocity, acceleration in zip(motion.position, motion.velocity, motion.acceleration, strict=True):
@@ -112,5 +115,7 @@ def test_a_model_without_links_cannot_be_exported(tmp_path: Path) -> None:
 def test_export_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
     path = model_of("irb120-arm", (*SMOOTH, "torque_offset")).save(tmp_path / "model.yaml")
     lines = list(export_model(path, tmp_path / "arm.urdf"))
-    assert "rotor inertias" in lines[1]
-    assert "torque_offset, joint 1" in lines[1]
+    assert lines[:2] == [str(tmp_path / "arm.urdf"), str(tmp_path / "arm.srdf")]
+    assert "URDF has no place for them" in lines[2]
+    assert "torque_offset, joint 1" in lines[3]
+    assert "rotor_inertia" not in lines[3]

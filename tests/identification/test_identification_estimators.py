@@ -8,10 +8,14 @@ from simulated_arm import arm, run, structure, truth
 from identification.components import every_joint
 from identification.estimators.linear import BayesianLeastSquares, OrdinaryLeastSquares, Prior, WeightedLeastSquares
 from identification.estimators.robust import RobustLeastSquares
+from identification.groups import candidate_groups
 from identification.identifier import METHODS, Identifier
+from identification.model import Model
 from identification.priors import Pull, nominal_prior, point_mass
 from identification.pseudo_inertia import least_eigenvalues, parameters_of, regular_nominal
 from identification.regression import Regression, regression, signals_of
+from identification.selection import select
+from problem.motion import Motion
 from recordings.run import Array, Run
 
 MODEL = structure()
@@ -91,17 +95,23 @@ def test_physical_estimates_are_bodies_that_can_exist_and_friction_that_brakes()
     short = run(MODEL, TRUTH * np.where(np.arange(MODEL.size) < len(MODEL.base), 1, -0.2), noise=3.0, seconds=3.0)
     free = Identifier(arm(), method="weighted").fit([short]).model_
     physical = Identifier(arm(), method="physical").fit([short]).model_
-    viscous = [
-        place.start
-        for part, place in zip(MODEL.components, MODEL.slices, strict=True)
-        if part.effect == "viscous_friction"
-    ]
-    assert free.values[viscous].min() < -0.1
+    assert braking(free, short).min() < -1
+    assert braking(physical, short).min() > -1e-6
     assert physical.inertial is not None
     assert least_eigenvalues(physical.inertial).min() > 0
     assert_allclose(MODEL.base.values(physical.inertial), physical.base_values, atol=1e-9)
-    signals = signals_of(short)
-    assert physical.values[viscous].min() > -0.2 * np.abs(signals.motion.velocity).max()
+
+
+def braking(model: Model, of: Run) -> Array:
+    """Viscous and Coulomb friction against the motion, N m, from a hundredth of the fastest speed on, both ways."""
+    fastest = np.abs(signals_of(of).motion.velocity).max(axis=0)
+    speeds = np.concatenate([np.linspace(-1, -0.01, 50), np.linspace(0.01, 1, 50)])[:, None] * fastest
+    motion = Motion(np.zeros_like(speeds), speeds, np.zeros_like(speeds))
+    friction = np.zeros_like(speeds)
+    for part, place in zip(model.structure.components, model.structure.slices, strict=True):
+        if part.effect in ("viscous_friction", "coulomb_friction"):
+            friction[:, part.joint - 1] += part.columns(motion) @ model.values[place]
+    return np.asarray(friction * np.sign(speeds))
 
 
 def test_a_tight_nominal_prior_gives_back_the_nominal_links() -> None:
@@ -120,6 +130,22 @@ def test_a_payload_of_any_mass_costs_the_prior_nothing() -> None:
     load[: len(model.base)] = model.base.values(point_mass(3, (0.0, 0.0, 0.1)))
     free = nominal_prior(model, 0.1)
     assert load @ prior.information @ load < 1e-6 * (load @ free.information @ load)
+
+
+def test_positions_with_a_higher_cut_off_leave_the_columns_what_the_torque_has() -> None:
+    clean = run(MODEL, TRUTH)
+    left = {}
+    for factor in (1.0, 2.0):
+        signals = signals_of(clean, 0.7, factor)
+        predicted = MODEL.filtered(signals) @ TRUTH
+        left[factor] = np.linalg.norm(signals.torque.ravel() - predicted) / np.linalg.norm(signals.torque)
+    assert left[2.0] < 0.2 * left[1.0]
+
+
+def test_the_smoothing_of_positions_is_chosen_by_what_predicts_held_out_blocks() -> None:
+    clean = run(MODEL, TRUTH)
+    choice = select(arm(), [clean], candidate_groups(3), (Pull(),), cutoffs=(0.2,)).choice
+    assert choice.position_factor == 2.0
 
 
 def test_runs_of_another_arm_are_refused() -> None:

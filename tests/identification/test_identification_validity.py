@@ -136,10 +136,12 @@ def test_a_known_payload_shows_the_gain_of_each_joints_torque() -> None:
     assert np.all(np.abs(found.gains - gains) < 2 * found.half_widths + 0.02)
 
 
-def test_a_payload_needs_runs_of_both_kinds() -> None:
+def test_a_payload_needs_runs_with_it_and_gains_runs_of_both_kinds() -> None:
     model, without = six_joint_run(np.zeros(10), 1, np.ones(6))
-    with pytest.raises(ValueError, match="runs without it are needed"):
+    with pytest.raises(ValueError, match="runs with the load are needed"):
         identify_payload(model, [without], [])
+    with pytest.raises(ValueError, match="runs without it are needed"):
+        torque_gains(model, [], [without], link_of(LOAD))
 
 
 def test_a_motionless_arm_does_not_tell_a_payload() -> None:

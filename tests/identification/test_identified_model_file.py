@@ -45,6 +45,43 @@ def test_a_model_predicts_the_same_after_a_round_trip(tmp_path: Path, method: st
     assert (loaded.inertial is None) == (saved.inertial is None)
 
 
+def test_a_loaded_model_tells_the_same_intervals_as_the_one_that_was_saved(tmp_path: Path) -> None:
+    saved = model()
+    loaded = Model.load(saved.save(tmp_path / "model.yaml"))
+    assert str(loaded) == str(saved)
+    again = Model.load(loaded.save(tmp_path / "again.yaml"))
+    assert str(again) == str(saved)
+
+
+def test_intervals_that_a_file_does_not_give_are_not_told(tmp_path: Path) -> None:
+    path = model().save(tmp_path / "model.yaml")
+    content = yaml.safe_load(path.read_text())
+    content["components"][0]["parameters"]["coefficient"]["ci95"] = None
+    del content["base_parameters"]["covariance"]
+    path.write_text(yaml.safe_dump(content))
+    loaded = Model.load(path)
+    assert all(each.interval is None for each in (*loaded.base_parameters, *loaded.component_parameters(0)))
+    assert loaded.component_parameters(1)[0].interval is not None
+
+
+def test_a_covariance_of_the_wrong_size_is_refused(tmp_path: Path) -> None:
+    path = model().save(tmp_path / "model.yaml")
+    content = yaml.safe_load(path.read_text())
+    content["base_parameters"]["covariance"] = [[1.0]]
+    path.write_text(yaml.safe_dump(content))
+    with pytest.raises(InputError, match="covariance should be 15 x 15"):
+        Model.load(path)
+
+
+def test_the_filters_of_the_identification_are_kept_in_the_file(tmp_path: Path) -> None:
+    plain = structure()
+    recorded = run(plain, truth(plain), noise=0.05)
+    saved = Identifier(arm(), (), cutoff_hz=8.0, robot="irb120-arm", position_factor=2.0).fit([recorded]).model_
+    loaded = Model.load(saved.save(tmp_path / "model.yaml"))
+    assert (loaded.cutoff_hz, loaded.position_factor) == (8.0, 2.0)
+    assert loaded.signals(recorded).position_cutoff_hz == 16.0
+
+
 def test_a_model_file_follows_the_schema(tmp_path: Path) -> None:
     schema = json.loads((Path(__file__).parents[1] / "schemas" / "model.schema.json").read_text())
     content = yaml.safe_load(model().save(tmp_path / "model.yaml").read_text())
@@ -66,8 +103,8 @@ def test_a_coupling_names_where_the_torque_is_and_where_the_motion_is(tmp_path: 
     ("change", "message"),
     [
         ({"joint": 7}, "joint 7 should be one from 1 to 3"),
-        ({"parameters": {"level": {"value": 1.0, "ci95": None, "unit": "N.m"}}}, "should be coefficient"),
-        ({"effect": "stribeck_friction"}, "no effect that a model can compute"),
+        ({"parameters": {"level": {"value": 1.0, "ci95": None, "unit": "N.m"}}}, "coefficient, not level"),
+        ({"effect": "stribeck_friction"}, "stribeck_friction has parameters level, static_level, velocity, exponent"),
     ],
 )
 def test_a_wrong_component_is_told_in_one_line(tmp_path: Path, change: dict[str, object], message: str) -> None:

@@ -1,10 +1,10 @@
-import os
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from public_copies import needs_copies
 
 from identification.components import neighbour_couplings, usual_components
 from identification.model import Model
@@ -13,10 +13,7 @@ from identification.real.published import Comparison, functional
 from identification.real.recipes import RECIPES
 from identification.structure import Structure
 from problem.robot_file import load_arm
-from recordings.public.fetch import LOCAL_COPIES
 from recordings.public.registry import PUBLIC
-
-NEEDS_COPIES = pytest.mark.skipif(LOCAL_COPIES not in os.environ, reason=f"{LOCAL_COPIES} names no local copies")
 
 
 def tx40() -> Model:
@@ -66,7 +63,7 @@ def test_every_public_recording_has_a_recipe() -> None:
     assert {recipe.name for recipe in RECIPES} == set(PUBLIC)
 
 
-@NEEDS_COPIES
+@needs_copies("emps")
 def test_real_writes_the_table_and_logs_each_look_at_validation_data(tmp_path: Path) -> None:
     lines = list(identify_public(tmp_path / "results", tmp_path / "recordings", ["emps"]))
     assert "pulses.csv" in lines[2]

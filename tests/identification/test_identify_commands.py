@@ -7,7 +7,8 @@ import yaml
 from click.testing import CliRunner
 from simulated_arm import RATE_HZ, arm, run, structure, truth
 
-from identification.cli import coverage, export_model, identify, predict, real
+from diagnosis.cli import export_model
+from identification.cli import coverage, identify, predict, real
 from identification.model import Model
 from problem.errors import InputError
 from recordings.write import Draft, DraftRun, write_recording

@@ -12,7 +12,8 @@ from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, fram
 from problem.robot_file import load_arm
 from recordings.check import check_recording
 from recordings.checks.channels import channel_findings
-from recordings.checks.fit import fit_findings
+from recordings.checks.fit import fit_findings, thin
+from recordings.checks.zeros import turned_zero
 from recordings.load import load_recording
 from recordings.run import Run
 
@@ -90,6 +91,22 @@ def test_swapped_channels_are_named(signal: str, pair: tuple[int, int]) -> None:
     assert finding.kind == "swapped_channels"
     assert f"channels {pair[0] + 1} and {pair[1] + 1}" in finding.text
     assert signal in finding.text
+
+
+@pytest.mark.parametrize("turn", [90, 180, -90])
+def test_a_zero_that_is_turned_by_quarters_is_named(tmp_path: Path, turn: int) -> None:
+    folder = folder_with(tmp_path, frame())
+    for file in ("run.csv", "check.csv"):
+        table = pd.read_csv(folder / file)
+        table["q2"] -= np.deg2rad(turn)
+        table.to_csv(folder / file, index=False)
+    (finding,) = (each for _, each in check_recording(folder).findings if each.kind == "turned_zero")
+    assert finding.joint == 2
+    assert f"turned by {turn:+d} deg" in finding.text
+
+
+def test_zeros_that_stand_right_are_not_suspected() -> None:
+    assert turned_zero(ARM, thin([run_of(frame(seed)) for seed in range(2)])) is None
 
 
 def test_links_of_another_robot_are_reported() -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from joint_state_bags import write_bag
 from numpy.testing import assert_allclose, assert_array_equal
 from recording_folders import POSITION, TORQUE, frame
 from refusals import refusal
@@ -99,34 +100,10 @@ def test_matlab_matrices_become_columns_whichever_way_they_lie(tmp_path: Path) -
     assert_array_equal(run.torque, table[TORQUE])
 
 
-def write_bag(path: Path, storage: str) -> Path:
-    """A ROS 2 bag with joint states at 200 Hz; returns the file that holds the messages."""
-    pytest.importorskip("rosbags")
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_typestore
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    types = store.types
-    plugin = StoragePlugin.MCAP if storage == "mcap" else StoragePlugin.SQLITE3
-    table = frame()
-    with Writer(path, version=9, storage_plugin=plugin) as writer:
-        link = writer.add_connection("/joint_states", "sensor_msgs/msg/JointState", typestore=store)
-        for row in table.to_numpy():
-            nanoseconds = 1_700_000_000 * 10**9 + round(row[0] * 1e9)
-            stamp = types["builtin_interfaces/msg/Time"](*divmod(nanoseconds, 10**9))
-            header = types["std_msgs/msg/Header"](stamp, "")
-            order = [2, 0, 1]  # a driver lists the joints as it likes
-            message = types["sensor_msgs/msg/JointState"](
-                header, [f"j{n + 1}" for n in order], row[1:4][order], np.array([]), row[4:7][order]
-            )
-            writer.write(link, nanoseconds, store.serialize_cdr(message, link.msgtype))
-    return next(file for file in path.iterdir() if file.suffix in (".db3", ".mcap"))
-
-
 @pytest.mark.parametrize("storage", ["sqlite3", "mcap"])
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_bag_of_joint_states_arrives_joint_by_joint(tmp_path: Path, storage: str, whole: bool) -> None:
-    file = write_bag(tmp_path / "bag", storage)
+    file = write_bag(tmp_path / "bag", storage, frame())
     options = {**OPTIONS, "position": "position_j1,position_j2,position_j3", "units": ()}
     options["torque"] = "effort_j1,effort_j2,effort_j3"
     import_files([file.parent if whole else file], tmp_path / "new", options, None)
@@ -148,7 +125,7 @@ def test_what_is_no_bag_is_refused_in_one_line(tmp_path: Path, suffix: str, cont
 
 
 def test_a_truncated_mcap_file_is_refused_in_one_line(tmp_path: Path) -> None:
-    file = write_bag(tmp_path / "bag", "mcap")
+    file = write_bag(tmp_path / "bag", "mcap", frame())
     file.write_bytes(file.read_bytes()[:5000])
     assert "cannot read" in refusal(read_bag, file)
 

@@ -1,0 +1,155 @@
+"""Kill the command, or one of its workers, at random times; count what is lost, and what is computed again."""
+
+import os
+import signal
+import sqlite3
+import time
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from importlib import import_module
+from multiprocessing.context import ForkProcess
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import numpy as np
+
+from algorithms.contract import Array
+from bench.experiment import Options, load_experiment, run_experiment
+from bench.scale.sweep import Tell
+
+Victim = Literal["driver", "worker"]
+_WORKERS = 2
+_SECONDS_OF_A_BATCH = 0.1  # about: so that kills do not all come right after a commit
+
+
+@dataclass(frozen=True)
+class Kill:
+    """One killing. kept: trials in the store right after it; lost: of those, not there at the end, or other than they
+    were; computed: trials that the restart ran; sound: whether the store kept its integrity and the table its bytes.
+    """
+
+    kept: int
+    lost: int
+    missing: int
+    computed: int
+    sound: bool
+
+    @property
+    def exact(self) -> bool:
+        """Nothing lost, nothing computed that was there, nothing left undone."""
+        return self.sound and not self.lost and self.computed == self.missing
+
+
+class _Count:
+    """A progress bar that only counts, in a file."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._count = path, 0
+
+    def __enter__(self) -> "_Count":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._path.write_text(str(self._count))
+
+    def update(self, n: int) -> None:
+        self._count += n
+
+
+def killed(config: Path, repetitions: int, victim: Victim, tell: Tell, seed: int = 0) -> list[Kill]:
+    """Kill as often as that, each time a run of its own, when a share of the trials is kept that is uniform in 0 to 1.
+
+    A killed driver is started again; a killed worker is left to the driver.
+    """
+    rng = np.random.default_rng(seed)
+    import_module("bench.results")  # what is imported here need not be imported in every fork
+    path, total = config.resolve(), len(load_experiment(config).entries)
+    expected = _whole(path)
+    results = []
+    for k in range(repetitions):
+        kill = _kill(path, victim, rng.uniform(size=2), expected, total)
+        results.append(kill)
+        tell(f"{victim} {k + 1} of {repetitions}: {kill.kept} kept, {kill.lost} lost, {kill.computed} computed")
+    return results
+
+
+def _whole(path: Path) -> bytes:
+    """The table of a run that nobody kills."""
+    with TemporaryDirectory() as place:
+        run = _started(path, Path(place))
+        run.join()
+        return _table(Path(place))
+
+
+def _kill(path: Path, victim: Victim, when: Array, expected: bytes, total: int) -> Kill:
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        run = _started(path, folder)
+        while run.is_alive() and len(_kept(folder)) < max(when[0] * total, 1):
+            time.sleep(0.005)
+        time.sleep(when[1] * _SECONDS_OF_A_BATCH)
+        _send(victim, run)
+        if victim == "driver":
+            run.join()
+        kept = _kept(folder)
+        if victim == "driver":
+            run = _started(path, folder)
+        run.join()
+        missing = total - (len(kept) if victim == "driver" else 0)
+        return Kill(
+            kept=len(kept),
+            lost=len(kept.items() - _kept(folder).items()),
+            missing=missing,
+            computed=int((folder / "count").read_text()),
+            sound=_is_sound(folder) and _table(folder) == expected,
+        )
+
+
+def _send(victim: Victim, run: ForkProcess) -> None:
+    target = run.pid if victim == "driver" else _worker_of(run.pid)
+    if target is not None:
+        with suppress(ProcessLookupError):  # it may have ended just now
+            os.kill(target, signal.SIGKILL)
+
+
+def _table(folder: Path) -> bytes:
+    """The CSV of summaries; beside it stand times, which no two runs share."""
+    (path,) = (path for path in folder.glob("*.csv") if not path.stem.endswith("_times"))
+    return path.read_bytes()
+
+
+def _is_sound(folder: Path) -> bool:
+    with closing(sqlite3.connect(folder / "runs.sqlite")) as connection:
+        return bool(connection.execute("PRAGMA integrity_check").fetchone() == ("ok",))
+
+
+def _started(path: Path, folder: Path) -> ForkProcess:
+    process = ForkProcess(target=_run, args=(path, folder))
+    process.start()
+    return process
+
+
+def _run(path: Path, folder: Path) -> None:
+    options = Options(folder / "runs.sqlite", folder, _WORKERS)
+    run_experiment(path, options, lambda total, done: _Count(folder / "count"))
+
+
+def _kept(folder: Path) -> dict[str, float]:
+    """The seconds of each trial in the store: they differ when a trial is run again."""
+    store = folder / "runs.sqlite"
+    if not store.exists():
+        return {}
+    with closing(sqlite3.connect(store, timeout=30)) as connection:
+        tables = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'trials'").fetchall()
+        return dict(connection.execute("SELECT key, seconds FROM trials").fetchall()) if tables else {}
+
+
+def _worker_of(pid: int | None) -> int | None:
+    """A process of loky that belongs to a driver."""
+    for entry in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            if parent == pid and b"popen_loky" in (entry / "cmdline").read_bytes():
+                return int(entry.name)
+    return None

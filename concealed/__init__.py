@@ -1,0 +1,1 @@
+"""The truth machine: recordings with hidden effects from an independent engine, sealed answers, scores."""

@@ -1,0 +1,120 @@
+"""What sits between motor and link, and what couples joints."""
+
+from collections.abc import Sequence
+from typing import Self
+
+import numpy as np
+
+from concealed.arms import Machine
+from concealed.bodies import with_rotor
+from concealed.effects.hidden import Hidden, Values, sign, size_of
+from concealed.engine import Parts, Spring
+from concealed.track import Track
+from problem.arm import Arm
+from recordings.run import Array
+
+
+class Rotor(Hidden):
+    """Inertia behind the gear that the simulation does not know, kg m2."""
+
+    effect, forms = "rotor_inertia", ("armature",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Up to the rotor inertia that is known."""
+        known = (machine.arm.rotor_inertia or (0.1,) * machine.joints)[joint]
+        return cls(joint, 0.2 * known, 1.5 * known, cls.drawn_form(rng))
+
+    def parameters(self) -> Values:
+        """The inertia that is added."""
+        return {"inertia": self.size}
+
+    def arm(self, arm: Arm) -> Arm:
+        """A heavier rotor."""
+        return with_rotor(arm, self.joint, self.size)
+
+
+class Elasticity(Hidden):
+    """A spring in the drive train, encoder at the motor; other form: it hardens. size: compliance, rad/(N m)."""
+
+    effect, forms = "joint_elasticity", ("linear", "hardening")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Stiffness of small gears."""
+        compliance = float(1 / size_of(120, machine, joint))
+        return cls(joint, compliance, 10 * compliance, cls.drawn_form(rng), {"damping": float(rng.uniform(1e-4, 4e-4))})
+
+    def parameters(self) -> Values:
+        """The stiffness."""
+        return {"stiffness": 1 / self.size}
+
+    def parts(self) -> Parts:
+        """A joint between motor and link."""
+        stiffness = 1 / self.size
+        hardening = stiffness * 5e4 if self.form == "hardening" else 0.0
+        return Parts((Spring(self.joint, stiffness, stiffness * self.shape["damping"], hardening),))
+
+
+class Backlash(Hidden):
+    """Play between motor and link; other form: a soft play, a spring whose stiffness grows. size: gap, rad."""
+
+    effect, forms = "backlash", ("gap", "soft")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """A stiff wall on both sides of the play."""
+        shape = {"stiffness": size_of(300, machine, joint), "damping": float(rng.uniform(3e-4, 1e-3))}
+        return cls(joint, 1e-3, 2e-2, cls.drawn_form(rng), shape)
+
+    def parameters(self) -> Values:
+        """The gap."""
+        return {"gap": self.size}
+
+    def parts(self) -> Parts:
+        """A joint with play between motor and link."""
+        wall, damping = self.shape["stiffness"], self.shape["stiffness"] * self.shape["damping"]
+        if self.form == "gap":
+            return Parts((Spring(self.joint, wall, damping, gap=self.size),))
+        return Parts((Spring(self.joint, 0.02 * wall, 0.2 * damping, wall / (self.size / 2) ** 2),))
+
+
+class Coupling(Hidden):
+    """Torque at a wrist joint from its neighbour's motion: friction of a shared motor; other form: its inertia too.
+
+    size: viscous coefficient, N m s/rad.
+    """
+
+    effect, forms = "joint_coupling", ("friction", "friction and inertia")
+
+    @classmethod
+    def places(cls, machine: Machine) -> Sequence[int]:
+        """The last two joints, in both directions."""
+        return range(machine.joints - 2, machine.joints)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Coulomb level and inertia in proportion to the viscous part."""
+        pair = 2 * machine.joints - 3 - joint
+        shape = {"from": float(pair), "level": float(rng.uniform(0.3, 1.2)), "inertia": float(rng.uniform(0.05, 0.2))}
+        coefficient = size_of(0.02, machine, joint)
+        return cls(joint, coefficient, 8 * coefficient, cls.drawn_form(rng), shape)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Where the torque appears, and where the motion is."""
+        return (self.joint + 1, int(self.shape["from"]) + 1)
+
+    def parameters(self) -> Values:
+        """Viscous, Coulomb and inertial part."""
+        inertia = self.size * self.shape["inertia"] if self.form == self.forms[1] else 0.0
+        return {"coefficient": self.size, "level": self.size * self.shape["level"], "inertia": inertia}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """From the other joint's motion."""
+        other = int(self.shape["from"])
+        velocity = track.velocity[:, other]
+        torque = self.size * (velocity + self.shape["level"] * sign(velocity))
+        if self.form == self.forms[1]:
+            torque = torque + self.size * self.shape["inertia"] * track.acceleration[:, other]
+        return np.asarray(torque)

@@ -1,0 +1,193 @@
+"""Our arms in MuJoCo: bodies, joints, rotors, and the hidden parts that need joints of their own."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from problem.arm import Arm, Joint, Link
+from problem.inertia import about_origin, moved, pseudo_link
+from problem.motion import Motion
+from recordings.run import Array
+
+OFF = ("EULERDAMP", "CONTACT", "WARMSTART", "SENSOR", "FRICTIONLOSS", "EQUALITY")  # what the arms have not
+TINY_MASS, TINY_INERTIA = 1e-8, 1e-9  # of a body between two joints of one axis; MuJoCo wants more than nothing
+
+
+@dataclass(frozen=True)
+class Spring:
+    """A spring between motor and link of a joint (from 0): N m/rad, N m s/rad; hardening in N m/rad3.
+
+    gap: rad, play within which nothing is transmitted; the stiffness holds beyond it.
+    """
+
+    joint: int
+    stiffness: float
+    damping: float
+    hardening: float = 0.0
+    gap: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mount:
+    """A base that gives way about a horizontal axis (3,): N m/rad, N m s/rad."""
+
+    axis: tuple[float, float, float]
+    stiffness: float
+    damping: float
+
+
+@dataclass(frozen=True)
+class Pendulum:
+    """A mass that swings about an axis at a point of a link (from 0): kg, m, N m s/rad."""
+
+    link: int
+    mass: float
+    length: float
+    damping: float
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The hidden parts of one machine."""
+
+    springs: tuple[Spring, ...] = ()
+    mount: Mount | None = None
+    pendulum: Pendulum | None = None
+
+    def __add__(self, other: "Parts") -> "Parts":
+        """Both together; of two mounts or pendulums the first."""
+        return Parts(self.springs + other.springs, self.mount or other.mount, self.pendulum or other.pendulum)
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A compiled model. places, dofs: index of each motor joint among the positions and the velocities."""
+
+    model: Any
+    places: NDArray[np.intp]
+    dofs: NDArray[np.intp]
+
+
+def plant(
+    arm: Arm, parts: Parts | None = None, step_s: float = 1 / 8000, gains: tuple[Array, Array] | None = None
+) -> Plant:
+    """The arm in MuJoCo; joint i turns about z of the frame before it.
+
+    gains: position and velocity gains (joints,) of the servos, torque = control - gain q - gain qd.
+    Raises ValueError for an arm without links, or a body that could not exist.
+    """
+    if arm.links is None:
+        raise ValueError(f"the arm {arm.name!r} has no `links`: nothing to simulate")
+    parts = parts or Parts()
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False  # or the range of a play would be read in degrees
+    spec.option.timestep = step_s
+    spec.option.gravity = arm.gravity
+    for name in OFF:
+        spec.option.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
+    parent, behind = _base(spec, parts.mount), np.eye(4)
+    rotors = arm.rotor_inertia or (0.0,) * len(arm)
+    for index, (joint, link) in enumerate(zip(arm.joints, arm.links, strict=True)):
+        spring = next((part for part in parts.springs if part.joint == index), None)
+        parent = _link(parent, index, behind @ joint.before, joint, link, rotors[index], spring)
+        if parts.pendulum is not None and parts.pendulum.link == index:
+            _add_pendulum(parent, joint, parts.pendulum)
+        behind = joint.after
+    for index, pair in enumerate(zip(*gains, strict=True) if gains is not None else ()):
+        _add_servo(spec, index, *pair)
+    model = spec.compile()
+    motors = [model.joint(f"motor{index}") for index in range(len(arm))]
+    places, dofs = ([getattr(motor, kind)[0] for motor in motors] for kind in ("qposadr", "dofadr"))
+    return Plant(model, np.array(places), np.array(dofs))
+
+
+def inverse_dynamics(arm: Arm, motion: Motion) -> Array:
+    """Torques (samples, joints) that MuJoCo finds for a motion, rotors included, N m."""
+    made = plant(arm)
+    data = mujoco.MjData(made.model)
+    torques = np.empty(motion.position.shape)
+    states = zip(motion.position, motion.velocity, motion.acceleration, strict=True)
+    for sample, (data.qpos[:], data.qvel[:], data.qacc[:]) in enumerate(states):
+        mujoco.mj_inverse(made.model, data)
+        torques[sample] = data.qfrc_inverse
+    return torques
+
+
+def _base(spec: Any, mount: Mount | None) -> Any:
+    if mount is None:
+        return spec.worldbody
+    body = _empty_body(spec.worldbody, "base", np.eye(4))
+    hinge = body.add_joint(name="mount", type=mujoco.mjtJoint.mjJNT_HINGE, axis=mount.axis)
+    hinge.stiffness[0], hinge.damping[0] = mount.stiffness, mount.damping
+    hinge.armature = 0.5  # of the plate that gives way, kg m2
+    return body
+
+
+def _link(parent: Any, index: int, pose: Array, joint: Joint, link: Link, rotor: float, spring: Spring | None) -> Any:
+    kind = mujoco.mjtJoint.mjJNT_HINGE if joint.kind == "revolute" else mujoco.mjtJoint.mjJNT_SLIDE
+    if spring is not None:
+        parent, pose = _empty_body(parent, f"rotor{index}", pose), np.eye(4)
+        parent.add_joint(name=f"motor{index}", type=kind, axis=(0, 0, 1), armature=rotor)
+    body = parent.add_body(name=f"link{index}", **_placed(pose))
+    if spring is None:
+        body.add_joint(name=f"motor{index}", type=kind, axis=(0, 0, 1), armature=rotor)
+    else:
+        _add_spring(body, index, kind, spring)
+    _set_inertia(body, pseudo_link(moved(about_origin(link), joint.after)))
+    return body
+
+
+def _add_spring(body: Any, index: int, kind: Any, spring: Spring) -> None:
+    hinge = body.add_joint(name=f"spring{index}", type=kind, axis=(0, 0, 1))
+    hinge.damping[0] = spring.damping
+    if spring.gap > 0:  # the play's walls are a limit with stiffness and damping of their own
+        hinge.limited = mujoco.mjtLimited.mjLIMITED_TRUE
+        hinge.range = (-spring.gap / 2, spring.gap / 2)
+        hinge.solref_limit = (-spring.stiffness, -spring.damping)
+        hinge.solimp_limit = (0.99, 0.99, 0.001, 0.5, 2)
+        return
+    hinge.stiffness[0] = spring.stiffness
+    hinge.stiffness[2] = spring.hardening
+
+
+def _add_pendulum(parent: Any, joint: Joint, pendulum: Pendulum) -> None:
+    pose = joint.after.copy()
+    pose[:3, 3] += joint.after[:3, :3] @ np.array(pendulum.point)
+    body = parent.add_body(name="pendulum", **_placed(pose))
+    hinge = body.add_joint(name="pendulum", type=mujoco.mjtJoint.mjJNT_BALL)
+    hinge.damping[0] = pendulum.damping
+    inertia = 0.1 * pendulum.mass * pendulum.length**2
+    body.mass, body.ipos = pendulum.mass, (0, 0, -pendulum.length)
+    body.inertia, body.explicitinertial = (inertia,) * 3, True
+
+
+def _add_servo(spec: Any, index: int, position_gain: float, velocity_gain: float) -> None:
+    servo = spec.add_actuator(name=f"servo{index}", target=f"motor{index}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    servo.gaintype, servo.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+    servo.gainprm[0] = 1.0
+    servo.biasprm[1], servo.biasprm[2] = -position_gain, -velocity_gain
+
+
+def _empty_body(parent: Any, name: str, pose: Array) -> Any:
+    body = parent.add_body(name=name, **_placed(pose))
+    body.mass, body.inertia, body.explicitinertial = TINY_MASS, (TINY_INERTIA,) * 3, True
+    return body
+
+
+def _placed(pose: Array) -> dict[str, Any]:
+    return {"pos": pose[:3, 3], "quat": Rotation.from_matrix(pose[:3, :3]).as_quat(scalar_first=True)}
+
+
+def _set_inertia(body: Any, link: Link) -> None:
+    """Mass, centre and the principal inertia about it."""
+    centre = np.array(link.first_moment) / link.mass
+    back = np.eye(4)
+    back[:3, 3] = -centre
+    xx, yy, zz, xy, xz, yz = pseudo_link(moved(about_origin(link), back)).inertia
+    body.mass, body.ipos, body.explicitinertial = link.mass, centre, True
+    body.fullinertia = (xx, yy, zz, xy, xz, yz)

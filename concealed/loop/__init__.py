@@ -1,0 +1,1 @@
+"""The closed loop: an ambiguous recording, a second motion, and whether both together name what is hidden."""

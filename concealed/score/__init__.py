@@ -1,0 +1,1 @@
+"""Counts what verdicts got right; the only part that reads the truth."""

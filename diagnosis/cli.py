@@ -1,0 +1,111 @@
+"""The command of the diagnosis, without any logic of its own."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from identification.cli import real as identify_real
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder for verdict, report and model.")
+@click.option(
+    "--baseline",
+    type=click.Choice(["nominal", "refit", "simulated"]),
+    help="What is compared [default: nominal where there is a simulation].",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of random waves in surrogates.")
+@click.option("--compare", "old", type=click.Path(path_type=Path), help="An older recording: say what changed since.")
+@click.option("--without", multiple=True, metavar="GUARD", help="Switch a guard off, to see what it is worth.")
+def diagnose(
+    recording: Path, out: Path, baseline: str | None, seed: int, old: Path | None, without: tuple[str, ...]
+) -> None:
+    """Say where the simulation of RECORDING is wrong, what physics is missing, and how much better it then predicts."""
+    from diagnosis.command import diagnose_recording
+    from diagnosis.compare.command import compare_recordings
+
+    with Progress() as progress:
+        lines = (
+            diagnose_recording(recording, out, baseline, seed, without, progress.tell)
+            if old is None
+            else compare_recordings(old, recording, out, baseline, seed, progress.tell)
+        )
+        for line in lines:
+            progress.clear()
+            click.echo(line)
+
+
+@click.command("export-model")
+@click.argument("model", type=click.Path(path_type=Path))
+@click.argument("out", type=click.Path(path_type=Path))
+def export_model(model: Path, out: Path) -> None:
+    """Write MODEL, a model.yaml with links, as OUT: a .urdf or an MJCF .xml file."""
+    from diagnosis.export.command import export_model as write
+
+    for line in write(model, out):
+        click.echo(line)
+
+
+def _real(results: Path, recordings: Path, only: tuple[str, ...], **others: Any) -> None:
+    from diagnosis.real.command import diagnose_public
+
+    assert identify_real.callback is not None
+    identify_real.callback(results=results, recordings=recordings, only=only, **others)
+    with Progress() as progress:
+        for line in diagnose_public(results, recordings, only, progress.tell):
+            progress.clear()
+            click.echo(line)
+
+
+real = click.Command(
+    "real",
+    params=identify_real.params,
+    callback=_real,
+    help="Identify and diagnose the public recordings of real arms: tables and pages in results/real.",
+)
+
+
+@click.command()
+@click.argument("robot")
+@click.argument("trajectory")
+@click.option("--noise", multiple=True, type=float, help="Of the torque, N m: once, or once a joint [default: 1 %].")
+@click.option("--joints", type=click.IntRange(min=1), help="How many of its first joints move [default: all].")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the card as page, tables and pictures.")
+def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints: int | None, out: Path | None) -> None:
+    """Say which effects TRAJECTORY on ROBOT could not tell apart, before anyone records it.
+
+    ROBOT: a file or a built-in name. TRAJECTORY: a CSV with t, q1, ... in s and rad, a recording folder, or the name
+    of a trajectory in results/best_known.json.
+    """
+    from diagnosis.confusability.command import write_card
+
+    for line in write_card(robot, trajectory, joints, noise, out):
+        click.echo(line)
+
+
+class Progress:
+    """Tells on the terminal's error stream, in one line, what is being done; nothing where that is no terminal."""
+
+    def __init__(self) -> None:
+        self.seen = sys.stderr.isatty()
+
+    def __enter__(self) -> "Progress":
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leaves a clear line, for the error too that may have ended the work."""
+        self.clear()
+
+    def tell(self, message: str) -> None:
+        """Shows a message in place of the one before."""
+        if self.seen:
+            click.echo(f"\r\033[K{message} ...", nl=False, err=True)
+
+    def clear(self) -> None:
+        """Takes the message away."""
+        if self.seen:
+            click.echo("\r\033[K", nl=False, err=True)

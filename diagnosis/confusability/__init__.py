@@ -1,0 +1,1 @@
+"""Which effects a planned motion can tell apart, before anyone records it."""

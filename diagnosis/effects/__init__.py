@@ -1,0 +1,1 @@
+"""The library of effects, one family a file."""

@@ -1,0 +1,139 @@
+"""What a drive adds or reads wrong: rotor inertia, torque gain and offset, a limit of torque."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from diagnosis.effects.contract import Scene, Value
+from diagnosis.effects.term import CERTAIN, EveryJoint, Term, number
+from problem.arm import Arm
+from recordings.run import Array
+
+LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)  # of the highest torque that the model predicts
+
+
+@dataclass(frozen=True)
+class RotorInertia(Term):
+    """inertia qdd."""
+
+    effect = "rotor_inertia"
+    names = ("inertia",)
+
+    def columns(self, scene: Scene) -> Array:
+        """The acceleration."""
+        return self._stacked(scene.motion.acceleration[:, self.own])
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The inertia on the joint side."""
+        return {"inertia": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau_{self.joint} += {number(coefficients[0])} qdd_{self.joint}"
+
+    @classmethod
+    def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with an inertia."""
+        return cls.at(arm, joints[0]), np.array([parameters["inertia"]])
+
+
+@dataclass(frozen=True)
+class TorqueGain(Term):
+    """(gain - 1) tau_model of one joint, friction included."""
+
+    effect = "torque_gain_error"
+    names = ("gain",)
+    follows_model = True
+    of_channel = True
+
+    def columns(self, scene: Scene) -> Array:
+        """The torque of the present model."""
+        return self._stacked(scene.torque[:, self.own])
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The factor: 1.09 is 9 % too much."""
+        return {"gain": 1 + float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau_{self.joint} *= {number(1 + coefficients[0])}"
+
+    @classmethod
+    def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a gain."""
+        return cls.at(arm, joints[0]), np.array([parameters["gain"] - 1.0])
+
+
+@dataclass(frozen=True)
+class TorqueOffset(Term):
+    """A constant."""
+
+    effect = "torque_offset"
+    names = ("offset",)
+
+    def columns(self, scene: Scene) -> Array:
+        """Ones."""
+        return self._stacked(np.ones(len(scene.time)))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The constant."""
+        return {"offset": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau_{self.joint} += {number(coefficients[0])}"
+
+    @classmethod
+    def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a constant."""
+        return cls.at(arm, joints[0]), np.array([parameters["offset"]])
+
+
+@dataclass(frozen=True)
+class TorqueSaturation(Term):
+    """Torque cut at a limit; shape: the limit. Where it is this effect, its coefficient is one."""
+
+    effect = "torque_saturation"
+    names = ("limit",)
+    follows_model = True
+    of_channel = True
+
+    @classmethod
+    def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Limits below the highest torque of the model."""
+        top = max(float(np.abs(scene.torque[:, joint - 1]).max()) for scene in scenes)
+        return [cls.at(arm, joint, shape=(x * top,), bounds=((0.4 * top, top),)) for x in LIMIT_SHARES if top > 0]
+
+    def columns(self, scene: Scene) -> Array:
+        """What the limit takes away from the torque of the present model."""
+        torque, limit = scene.torque[:, self.own], self.shape[0]
+        return self._stacked(np.clip(torque, -limit, limit) - torque)
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The limit."""
+        return {"limit": self.shape[0]}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"|tau_{self.joint}| <= {number(self.shape[0])}"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A limit takes away all that is above it, no more and no less."""
+        spread = 0.0 if covariance is None else CERTAIN * float(np.sqrt(max(covariance[0, 0], 0.0)))
+        if abs(coefficients[0] - 1) > 0.3 + spread:
+            return f"takes away {coefficients[0]:.2f} of the torque above the limit, not all of it"
+        return None
+
+    @classmethod
+    def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a limit."""
+        limit = float(parameters["limit"])
+        return cls.at(arm, joints[0], shape=(limit,), bounds=((limit / 2, limit * 2),)), np.ones(1)
+
+
+ROTOR_INERTIA = EveryJoint("rotor_inertia", (RotorInertia,))
+TORQUE_GAIN = EveryJoint("torque_gain_error", (TorqueGain,), resting=True)
+TORQUE_OFFSET = EveryJoint("torque_offset", (TorqueOffset,), resting=True)
+TORQUE_SATURATION = EveryJoint("torque_saturation", (TorqueSaturation,), resting=True)

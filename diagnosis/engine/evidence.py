@@ -1,0 +1,296 @@
+"""What speaks for each effect of a model: a robust test, the gain on held-out data, and physics."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.stats import chi2
+
+from diagnosis.engine.folds import Folds, Gain, folds_of, gain_of
+from diagnosis.engine.links import Widths
+from diagnosis.engine.plausible import implausible
+from diagnosis.engine.refine import precision_of
+from diagnosis.engine.robust import Scatter, block_numbers, scatter, whitened_rows
+from diagnosis.engine.rounds import Round
+from diagnosis.engine.segments import rows_of
+from diagnosis.engine.solver import EXPECTED, Fit, State
+from recordings.run import Array
+
+WIDER = 3.0  # times the widest link
+EXCITED = 0.25  # of the mean square in identification
+LITTLE = 0.002  # of the validation error
+PUSHED = 0.3  # of a push's peak
+PUSH_S = 0.15  # s in motion: a shorter push is a reversal
+SPECIAL = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
+           "friction_drift", "load_dependent_friction")  # fmt: skip
+SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
+ONCE = ("external_contact",)
+SURELY_WORSE = 0.99  # one-sided p-value of a gain, for a loss
+HELD_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """p_value: of the effect being zero, robust; corrected: after everything that was looked at. gain: share by
+    which the whitened held-out error of the joint that profits most falls, held_p: one-sided, of that fall; the better
+    of validation runs and of identification stretches held out in turn. validated: the share on validation runs.
+    rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
+    of the model. objection: of physics. worse: whether validation runs are surely predicted worse. repeatable: False
+    for what happened once, in one stretch of one run: no other data can tell of it. usual: what every arm has.
+    """
+
+    joint: int
+    p_value: float
+    corrected: float
+    gain: float
+    held_p: float
+    validated: float
+    rms_before: float
+    rms_after: float
+    score: float
+    objection: str | None = None
+    worse: bool = False
+    repeatable: bool = True
+    usual: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Judges the effects of a state of a round."""
+
+    found: Round
+    state: State
+
+    @cached_property
+    def wide(self) -> Fit:
+        """The fit with everything that is compared: the state's groups, and the simpler ones that they contain."""
+        simpler = [other for group in self.state.groups for other in self.simpler(group)]
+        return self.found.solver.fit(State(tuple(sorted({*self.state.groups, *simpler})), self.state.widths))
+
+    @cached_property
+    def folds(self) -> Folds:
+        """Whitened rows of the wide fit, in folds."""
+        found, fit = self.found, self.wide
+        rows = whitened_rows(found.columns, {}, fit, found.moments.lengths, found.noise, found.bench.observed)
+        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
+        values = np.concatenate([links, fit.coefficients[fit.columns]])
+        return folds_of(rows, values, precision_of(found.solver, fit, len(fit.inverse)))
+
+    def effects(self) -> dict[int, Evidence]:
+        """Evidence for each group."""
+        solver, state = self.found.solver, self.state
+        fit = solver.fit(state)
+        spread, losses = self._scattered(state), solver.losses(fit)
+        out = {}
+        for group in state.groups:
+            candidate = solver.groups[group].candidate
+            values = solver.values(fit, group)
+            objection = implausible(candidate, values)
+            objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
+            tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
+            evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
+            if self.simpler(group):
+                evidence = self._beyond_usual(group)
+            if candidate.effect in ONCE:
+                evidence = replace(evidence, repeatable=False)
+                objection = self._pushed_at_rest(group)
+            out[group] = replace(evidence, objection=objection, usual=candidate.effect in EXPECTED)
+        return out
+
+    def links(self) -> dict[int, Evidence]:
+        """Evidence for each link (from 0) that is off."""
+        widths = self.state.widths or ()
+        others = {
+            link: tuple(0.0 if other == link else each for other, each in enumerate(widths))
+            for link, width in enumerate(widths)
+            if width
+        }
+        return {link: self._off(without, link + 1, len(widths)) for link, without in others.items()}
+
+    def together(self) -> Evidence:
+        """Evidence for the links being off at all."""
+        count = len(self.state.widths or ())
+        return self._off((0.0,) * count, count, count)
+
+    def _off(self, without: Widths, joints: int, looks: int) -> Evidence:
+        """Evidence for the present widths against others."""
+        fit, less = (self.found.solver.fit(each) for each in (self.state, State(self.state.groups, without)))
+        score = fit.score - less.score
+        p_value = float(np.exp(-np.clip(score, 0, 700)))  # a Bayes factor bounds the p-value from above
+        gains = {joint: self._validated(fit, less, joint) for joint in range(joints)}
+        return self._evidence(fit, less, gains, (p_value, looks), score, None)
+
+    def looks(self, group: int) -> int:
+        """How much was looked at: every place has its equal share of the level, and divides it among its shapes.
+
+        Half of the level is for what every arm has.
+        """
+        groups = self.found.solver.groups
+        if not self.found.solver.unusual[group]:
+            return 2 * int(np.sum(~self.found.solver.unusual))
+        own = groups[group].place
+        return 2 * self.found.solver.places * sum(each.candidate.looks for each in groups if each.place == own)
+
+    def _in_wider_links(self, group: int) -> float:
+        """P-value of a group where the links may be off far more than was found; 0 for links as simulated.
+
+        What shows only because the links are thought to be off by so little is no evidence: nobody knows that width.
+        """
+        solver, state = self.found.solver, self.state
+        if not state.widths or not any(state.widths):
+            return 0.0
+        wider = solver.fit(State(state.groups, tuple(WIDER * max(state.widths) for _ in state.widths)))
+        values = wider.coefficients[solver.groups[group].columns]
+        place = self._place(wider, group)
+        block = wider.inverse[np.ix_(place, place)]
+        return float(chi2.sf(values @ np.linalg.pinv(block, hermitian=True) @ values, solver.ranks[group]))
+
+    def _pushed_at_rest(self, group: int) -> str | None:
+        """Against a push: that the joint stood still, or turned, for most of it."""
+        found, candidate = self.found, self.found.solver.groups[group].candidate
+        joint, column = candidate.rows[0], int(self.found.solver.groups[group].columns[0])
+        own = found.columns.matrices[joint][:, int(np.flatnonzero(found.columns.index[joint] == column)[0])]
+        pushed = np.abs(own) > PUSHED * np.abs(own).max()
+        moving = pushed & rows_of(found.bench.observed.used(joint), len(own))
+        seconds = float(np.sum(moving)) / found.bench.observed.rate_hz
+        return None if seconds > PUSH_S and moving.sum() > 0.5 * pushed.sum() else "the joint hardly moves during it"
+
+    def simpler(self, group: int) -> tuple[int, ...]:
+        """Usual friction that a special law of friction has to be better than."""
+        groups, candidate = self.found.solver.groups, self.found.solver.groups[group].candidate
+        wanted = {name for name in candidate.replaces if name in EXPECTED}
+        if candidate.effect in SPECIAL:
+            wanted |= {"coulomb_friction", "viscous_friction"}
+        if candidate.effect in SPRINGS:
+            wanted |= {"torque_offset"}
+        return tuple(
+            number
+            for number, each in enumerate(groups)
+            if each.candidate.effect in wanted and each.candidate.joint == candidate.joint
+        )
+
+    def _beyond_usual(self, group: int) -> Evidence:
+        """The evidence against usual friction in the place of one special law, and of all at this joint."""
+        groups, state = self.found.solver.groups, self.state
+        joint, simpler = groups[group].candidate.joint, self.simpler(group)
+        special = [each for each in state.groups if groups[each].candidate.joint == joint and self.simpler(each)]
+        tested = max(self._beyond(group, simpler), self._in_wider_links(group)), self.looks(group)
+        found = list[Evidence]()
+        for taken in ([group], special):
+            less = State(tuple(sorted({*state.groups, *simpler} - set(taken))), state.widths)
+            score = self.found.solver.fit(state).score - self.found.solver.fit(less).score
+            found.append(self._against(less, tested, groups[group].candidate.rows, score))
+        return min(found, key=lambda each: each.gain)
+
+    def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
+        """Evidence for the state against a smaller one."""
+        fit, other = (self.found.solver.fit(each) for each in (self.state, less))
+        return self._evidence(fit, other, self._gains(fit, other, rows), tested, score, None)
+
+    def _scattered(self, state: State) -> Scatter:
+        """Robust covariance of the parameters of a state within the wide fit."""
+        chosen = self._chosen(state)
+        rows, fit = self.folds.rows, self.found.solver.fit(state)
+        errors = [
+            target - design[:, chosen] @ self._values(fit)
+            for target, design in zip(self.folds.targets, rows.designs, strict=True)
+        ]
+        own = type(rows)(tuple(design[:, chosen] for design in rows.designs), tuple(errors), rows.blocks)
+        precision = self.folds.precision[np.ix_(chosen, chosen)]
+        return scatter(own, precision, self.found.bench.settings.guards.robust_variance)
+
+    def _values(self, fit: Fit) -> Array:
+        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
+        return np.concatenate([links, fit.coefficients[fit.columns]])
+
+    def _chosen(self, state: State) -> list[int]:
+        """Where the parameters of a smaller state stand among those of the wide fit."""
+        rank = self.wide.links.shape[1]
+        at = {int(column): rank + place for place, column in enumerate(self.wide.columns)}
+        return [*range(rank), *(at[int(column)] for column in self.found.solver.fit(state).columns)]
+
+    def _tested(self, fit: Fit, spread: Scatter, group: int) -> float:
+        columns = self.found.solver.groups[group].columns
+        return spread.p_value(fit.coefficients[columns], self._place(fit, group))
+
+    def _beyond(self, group: int, simpler: tuple[int, ...]) -> float:
+        """P-value of what a group explains that the simpler ones in it do not."""
+        state = State(tuple(sorted({*self.state.groups, *simpler})), self.state.widths)
+        return self._tested(self.found.solver.fit(state), self._scattered(state), group)
+
+    def _place(self, fit: Fit, group: int) -> list[int]:
+        """Where a group's coefficients stand in a fit's covariance."""
+        columns = self.found.solver.groups[group].columns
+        start = fit.links.shape[1] + int(np.flatnonzero(fit.columns == columns[0])[0])
+        return list(range(start, start + len(columns)))
+
+    def _covariance(self, fit: Fit, spread: Scatter, group: int) -> Array:
+        """Of a group's unscaled coefficients."""
+        place = self._place(fit, group)
+        lengths = self.found.moments.lengths[self.found.solver.groups[group].columns]
+        return np.asarray(spread.covariance[np.ix_(place, place)] / np.outer(lengths, lengths))
+
+    def _gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[Gain, Gain]]:
+        """Per joint the gain on validation rows, and on identification stretches held out in turn."""
+        pair = [self._in_turn(each.state) for each in (less, fit)]
+        blocks = self.folds.rows.blocks
+        return {
+            joint: (
+                self._validated(fit, less, joint)[0],
+                gain_of(pair[0][joint], pair[1][joint], blocks[joint]),
+            )
+            for joint in joints
+        }
+
+    def _in_turn(self, state: State) -> list[Array]:
+        """Held-out errors of a state, stretch by stretch; those of the judged state itself are kept."""
+        return self._own_errors if state == self.state else self.folds.errors(self._chosen(state))
+
+    @cached_property
+    def _own_errors(self) -> list[Array]:
+        return self.folds.errors(self._chosen(self.state))
+
+    def _validated(self, fit: Fit, less: Fit, joint: int) -> tuple[Gain, Gain]:
+        observed, noise = self.found.bench.observed, self.found.noise
+        left = np.column_stack([self.found.residual_at(joint, each) for each in (less, fit)])
+        white = noise.white(left, joint, observed, "validate")
+        blocks = noise.numbers(block_numbers(observed, HELD_BLOCK_S), joint, observed, "validate")
+        gain = gain_of(white[:, 0], white[:, 1], blocks)
+        return gain, gain
+
+    def _evidence(
+        self,
+        fit: Fit,
+        less: Fit,
+        gains: dict[int, tuple[Gain, Gain]],
+        tested: tuple[float, int],
+        score: float,
+        objection: str | None,
+    ) -> Evidence:
+        joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
+        validated, inside = gains[joint]
+        best = validated if validated.share >= inside.share else inside
+        held_p = min(each.p_value for each in (validated, inside) if each.share >= min(0.5 * best.share, best.share))
+        p_value, looks = tested
+        corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
+        before, after = (self._validation_rms(each, joint) for each in (less, fit))
+        return Evidence(
+            joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, objection,
+            _refuted(validated, inside) or after > (1 + LITTLE) * before,
+        )  # fmt: skip
+
+    def _validation_rms(self, fit: Fit, joint: int) -> float:
+        observed = self.found.bench.observed
+        rows = rows_of(observed.of_role("validate", joint), observed.rows)
+        return float(np.sqrt(np.mean(self.found.residual_at(joint, fit)[rows] ** 2)))
+
+
+def _refuted(validated: Gain, inside: Gain) -> bool:
+    """Whether validation data speak against an effect: surely, or by not profiting although they excite it."""
+    excited = validated.change > EXCITED * inside.change
+    return validated.share < 0 and (excited or validated.p_value > SURELY_WORSE)
+
+
+def looks_of(found: Round) -> int:
+    """Everything that was compared: each candidate with each shape, and the alternatives of scans."""
+    return max(sum(group.candidate.looks for group in found.solver.groups), 1)

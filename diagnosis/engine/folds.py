@@ -1,0 +1,78 @@
+"""Each stretch of the identification runs held out in turn: what a fit to the others leaves of it.
+
+A validation run may not excite what the identification runs show. So a gain counts on either: on the runs that took no
+part at all, or on stretches of time that took no part in their turn.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from diagnosis.engine.robust import Rows
+from recordings.run import Array
+
+FOLDS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Folds:
+    """Whitened rows of a wide fit, cut into folds of whole stretches of time. precision: of the parameters' prior."""
+
+    rows: Rows
+    targets: tuple[Array, ...]
+    precision: Array
+    grams: tuple[Array, ...]
+    products: tuple[Array, ...]
+
+    def errors(self, chosen: Sequence[int]) -> list[Array]:
+        """Held-out errors of a fit with the chosen parameters only, (rows,) for each joint."""
+        out = [target.copy() for target in self.targets]
+        place = np.ix_(chosen, chosen)
+        whole, towards = np.sum(self.grams, axis=0), np.sum(self.products, axis=0)
+        for fold in range(FOLDS):
+            gram = (whole - self.grams[fold] + self.precision)[place]
+            values = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ (towards - self.products[fold])[chosen]
+            for error, design, block in zip(out, self.rows.designs, self.rows.blocks, strict=True):
+                own = block % FOLDS == fold
+                error[own] -= design[np.ix_(own, chosen)] @ values
+        return out
+
+
+def folds_of(rows: Rows, values: Array, precision: Array) -> Folds:
+    """The folds of a fit's rows; values: its parameters, to give the errors back what they explain."""
+    targets = tuple(error + design @ values for error, design in zip(rows.errors, rows.designs, strict=True))
+    grams, products = [], []
+    for fold in range(FOLDS):
+        gram, product = np.zeros(precision.shape), np.zeros(len(values))
+        for target, design, block in zip(targets, rows.designs, rows.blocks, strict=True):
+            own = block % FOLDS == fold
+            gram += design[own].T @ design[own]
+            product += design[own].T @ target[own]
+        grams.append(gram)
+        products.append(product)
+    return Folds(rows, targets, precision, tuple(grams), tuple(products))
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Share by which held-out errors fall, and the one-sided p-value of that between stretches of time.
+
+    change: mean square of what the prediction changes by: how much the data excite it.
+    """
+
+    share: float
+    p_value: float
+    change: float
+
+
+def gain_of(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> Gain:
+    """The gain from errors (rows,) without and with something."""
+    better = without**2 - with_it**2
+    sums = np.bincount(blocks, better)[np.unique(blocks)]
+    share = float(np.sum(better)) / max(float(with_it @ with_it), 1e-300)
+    spread = float(np.std(sums, ddof=1)) / np.sqrt(len(sums)) if len(sums) > 2 else 0.0
+    p_value = float(student.sf(np.mean(sums) / spread, len(sums) - 1)) if spread > 0 else 1.0
+    return Gain(share, p_value, float(np.mean((without - with_it) ** 2)))

@@ -1,0 +1,104 @@
+"""Only what passes every test stays: the weakest effect that fails one leaves, and the rest is searched anew."""
+
+from dataclasses import replace
+
+from diagnosis.engine.evidence import Evidence, Judge
+from diagnosis.engine.rounds import Round
+from diagnosis.engine.search import Search, Step
+from diagnosis.engine.solver import EXPECTED, State
+from diagnosis.settings import Settings
+
+USUAL_SHARE = 0.1  # of the least gain: what every arm has needs less of it; an offset is whitened away with slow errors
+CYCLES = 3  # of withdrawing and looking again
+HELD_LEVEL = 0.05  # of the one-sided test on held-out data
+LARGE, LARGE_LEVEL = 0.2, 0.2  # a gain that no chance makes, though a few stretches hold most of it
+Passed = tuple[Round, dict[int, Evidence], dict[int, Evidence]]
+
+
+def failing(evidence: Evidence, settings: Settings) -> str | None:
+    """Why an effect may not be claimed; None where it passes."""
+    guards = settings.guards
+    if guards.physics_signs and evidence.objection is not None:
+        return evidence.objection
+    if evidence.corrected > settings.level:
+        return f"p = {evidence.corrected:.2g} after correction"
+    if not evidence.repeatable:
+        return None
+    least = settings.least_gain * (USUAL_SHARE if evidence.usual else 1.0)
+    if guards.heldout_gain and evidence.gain < least:
+        return f"held-out gain {100 * evidence.gain:.2g} %"
+    if (
+        guards.heldout_gain
+        and not evidence.usual
+        and evidence.held_p > (LARGE_LEVEL if evidence.gain > LARGE else HELD_LEVEL)
+    ):
+        return f"held-out gain not sure (p = {evidence.held_p:.2g})"
+    if guards.heldout_gain and evidence.worse:
+        return f"validation gets worse by {-100 * evidence.validated:.2g} %"
+    return None
+
+
+def pruned(found: Round) -> Passed:
+    """The round with the effects that pass, and the evidence of those and of the links that do (from 0).
+
+    After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
+    be its copy. Then the search looks once more, without the places that were withdrawn.
+    """
+    guards, state, banned = found.bench.settings.guards, found.state, frozenset[int]()
+    steps = list(found.steps)
+    for _ in range(CYCLES):
+        state, effects, banned = _passing(found, state, banned, steps)
+        search = Search(found.solver, guards, state.widths is None, len(state.widths or ()), banned)
+        again = search.improved(state, steps)
+        if again == state:
+            break
+        state = again
+    else:
+        state, effects, banned = _passing(found, state, banned, steps)
+    state, links = _links(found, state, steps)
+    if links is None:
+        state, effects, banned = _passing(found, state, banned, steps)
+    return replace(found, state=state, steps=tuple(steps)), effects, links or {}
+
+
+def _passing(
+    found: Round, state: State, banned: frozenset[int], steps: list[Step]
+) -> tuple[State, dict[int, Evidence], frozenset[int]]:
+    """The state without its failing effects, the weakest first; usual friction in the place of special laws."""
+    groups, settings = found.solver.groups, found.bench.settings
+    while True:
+        judge = Judge(found, state)
+        effects = judge.effects()
+        bad = {group: why for group, each in effects.items() if (why := failing(each, settings)) is not None}
+        if not bad:
+            return state, effects, banned
+        weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
+        joint = groups[weakest].candidate.joint
+        special = {group for group in state.groups if judge.simpler(group) and groups[group].candidate.joint == joint}
+        usual = groups[weakest].candidate.effect in EXPECTED
+        gone = special if usual and special else {weakest}
+        for group in gone:
+            what = groups[group].candidate
+            steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
+        places = {groups[group].place for group in gone}
+        banned |= {number for number, each in enumerate(groups) if each.place in places}
+        back = {other for group in gone for other in judge.simpler(group)}
+        state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
+
+
+def _links(found: Round, state: State, steps: list[Step]) -> tuple[State, dict[int, Evidence] | None]:
+    """The state, and the links that may be claimed: those that pass alone, or the likeliest if they do together.
+
+    They stay as wide as they were found as long as any passes: that they are off is no claim about each. None where
+    they had to be brought back to the simulation.
+    """
+    judge, settings = Judge(found, state), found.bench.settings
+    links = judge.links()
+    if not links:
+        return state, {}
+    passed = {link: each for link, each in links.items() if failing(each, settings) is None}
+    together = judge.together()
+    if passed or failing(together, settings) is None:
+        return state, passed or {max(links, key=lambda link: links[link].score): together}
+    steps.append(Step(f"withdrawn: links: {failing(together, settings)}", 0.0))
+    return State(state.groups, (0.0,) * len(state.widths or ())), None

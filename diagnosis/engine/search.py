@@ -1,0 +1,197 @@
+"""The search for the set of groups with the best score: forward, backward, exchanges, and widths of the links' errors.
+
+A greedy search is led astray where strong columns look alike. So it starts twice, from the simulation as it is and from
+a refit with friction on every joint, takes back what others explain, and exchanges members before it stops.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.effects.contract import Candidate
+from diagnosis.engine.links import ONE, WIDTHS, Widths
+from diagnosis.engine.plausible import implausible
+from diagnosis.engine.solver import CROWD, EXPECTED, Solver, State
+from diagnosis.settings import Guards
+from recordings.run import Array
+
+ONE_LAW = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis")
+TRIED = 40  # best candidates of a step that are asked for their physics
+MOST_UNUSUAL = 12  # effects beside friction and offsets: a start that asks for more has lost its way
+LEAST = 1e-6  # of a score: smaller steps are rounding
+ROUNDS = 200
+
+
+@dataclass(frozen=True)
+class Step:
+    """One move of the search, for the log."""
+
+    what: str
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Moves that raise the score of a state. fixed: whether the links' widths may not be changed.
+    banned: groups that were withdrawn."""
+
+    solver: Solver
+    guards: Guards
+    fixed: bool
+    links: int
+    banned: frozenset[int] = frozenset()
+
+    def best(self, starts: Sequence[State]) -> tuple[State, tuple[Step, ...]]:
+        """The best state that the starts lead to, and the moves of all."""
+        steps: list[Step] = []
+        ends = [self.improved(start, steps) for start in starts]
+        if not self.fixed:
+            crossed = {State(each.groups, other.widths) for each in ends for other in ends} - set(ends)
+            ends += [self.improved(start, steps) for start in sorted(crossed, key=lambda each: each.groups)]
+        return max(ends, key=lambda end: self.solver.fit(end).score), tuple(steps)
+
+    def improved(self, state: State, steps: list[Step]) -> State:
+        """The state where no move raises the score any more."""
+        for _ in range(ROUNDS):
+            better = self._step(state)
+            if better is None:
+                break
+            what, state = better
+            steps.append(Step(what, self.solver.fit(state).score))
+        return state
+
+    def _step(self, state: State) -> tuple[str, State] | None:
+        here = self.solver.fit(state).score
+        for moves in (self._forward, self._backward, self._widths, self._exchanges):
+            found = [(what, other) for what, other in moves(state)]
+            if not found:
+                continue
+            what, other = max(found, key=lambda move: self.solver.fit(move[1]).score)
+            if self.solver.fit(other).score > here + LEAST:
+                return what, other
+        return None
+
+    def _forward(self, state: State) -> Iterator[tuple[str, State]]:
+        crowded = self.solver.crowd(state.groups) >= MOST_UNUSUAL
+        added = None if crowded else self._addition(state)
+        if added is not None:
+            yield f"+ {self._name(added)}", self.joined(state, added)
+
+    def joined(self, state: State, group: int) -> State:
+        """The state with a group, without those that it replaces."""
+        for other in self._replaced(state, group):
+            state = state.minus(other)
+        return state.plus(group)
+
+    def _replaced(self, state: State, group: int) -> list[int]:
+        groups, candidate = self.solver.groups, self.solver.groups[group].candidate
+        return [
+            other
+            for other in state.groups
+            if groups[other].candidate.effect in candidate.replaces and groups[other].candidate.joint == candidate.joint
+        ]
+
+    def excluded(self, state: State, group: int) -> bool:
+        """Whether the state holds the group's place already, or something that contains it."""
+        candidate = self.solver.groups[group].candidate
+        inside = (self.solver.groups[other] for other in state.groups)
+        return any(
+            other.place == self.solver.groups[group].place
+            or (
+                candidate.effect in ONE_LAW
+                and other.candidate.effect in ONE_LAW
+                and candidate.joint == other.candidate.joint
+            )
+            or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
+            for other in inside
+        )
+
+    def _addition(self, state: State, but: int | None = None) -> int | None:
+        """The group that raises the score most and breaks no law of physics."""
+        gains = self.gains(state)
+        asked = 0
+        for group in np.argsort(-gains):
+            number = int(group)
+            if gains[number] <= LEAST or asked >= TRIED:
+                return None
+            if number == but or number in self.banned or self.excluded(state, number):
+                continue
+            asked += 1
+            if self.objection(self.joined(state, number), number) is None:
+                return number
+        return None
+
+    def gains(self, state: State) -> Array:
+        """Gain of each group, with the price of what it replaces given back."""
+        gains = self.solver.gains(state)
+        for number in self._replacing:
+            replaced = self._replaced(state, number)
+            gains[number] += sum(self.solver.prices[other] for other in replaced)
+            gains[number] += CROWD * sum(bool(self.solver.unusual[other]) for other in replaced)
+        return gains
+
+    @cached_property
+    def _replacing(self) -> list[int]:
+        return [number for number, group in enumerate(self.solver.groups) if group.candidate.replaces]
+
+    def objection(self, state: State, group: int) -> str | None:
+        """What physics says against a group as it is fitted in a state."""
+        if not self.guards.physics_signs:
+            return None
+        fit = self.solver.fit(state)
+        candidate = self.solver.groups[group].candidate
+        values, covariance = self.solver.values(fit, group), self.solver.covariance(fit, group)
+        return implausible(candidate, values) or candidate.objection(values, covariance)
+
+    def _backward(self, state: State) -> Iterator[tuple[str, State]]:
+        if not self.guards.backward_elimination or not state.groups:
+            return
+        losses = self.solver.losses(self.solver.fit(state))
+        group = max(losses, key=lambda each: losses[each])
+        if losses[group] > 0:
+            yield f"- {self._name(group)}", state.minus(group)
+
+    def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
+        if not self.guards.backward_elimination:
+            return
+        for group in state.groups:
+            without = state.minus(group)
+            added = self._addition(without, group)
+            if added is not None:
+                yield f"{self._name(group)} -> {self._name(added)}", self.joined(without, added)
+
+    def _widths(self, state: State) -> Iterator[tuple[str, State]]:
+        if self.fixed or state.widths is None:
+            return
+        for widths in self._neighbours(state.widths):
+            yield f"links off by {widths}", State(state.groups, widths)
+
+    def _neighbours(self, widths: Widths) -> Iterator[Widths]:
+        """All links alike, or one link changed."""
+        yield from ((size,) * self.links for size in (0.0, *WIDTHS))
+        for size in (0.0, *ONE):
+            for link in range(self.links):
+                yield tuple(size if other == link else width for other, width in enumerate(widths))
+
+    def _name(self, group: int) -> str:
+        candidate = self.solver.groups[group].candidate
+        where = "" if candidate.joint is None else f" {candidate.joint}"
+        shape = "" if not candidate.shape else f" {tuple(round(value, 4) for value in candidate.shape)}"
+        return f"{candidate.effect}{where}{shape}"
+
+
+def background(solver: Solver, widths: Widths | None) -> State:
+    """Friction and offset on every joint."""
+    chosen = [
+        number
+        for number, group in enumerate(solver.groups)
+        if group.candidate.effect in EXPECTED and group.variant == 0
+    ]
+    return State(tuple(chosen), widths)
+
+
+def _contend(candidate: Candidate, other: Candidate) -> bool:
+    """Whether a joint has either of two effects: what one contains, or a second special law of velocity."""
+    return candidate.effect in other.replaces or (candidate.effect in ONE_LAW and other.effect in ONE_LAW)

@@ -1,0 +1,1 @@
+"""Models with missing physics as files of simulators, as far as these have the physics."""

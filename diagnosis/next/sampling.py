@@ -1,0 +1,71 @@
+"""How a run will be looked at: its rate, the filter that torque and columns share, and the noise of the kept rows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.effects.contract import Candidate, Scene
+from diagnosis.next.whitening import Whitening
+from problem.base_parameters import BaseParameters
+from problem.regressor import observation_matrix
+from recordings.filters import Butterworth, Filter
+from recordings.run import Array
+
+THINNED = 2  # samples of a designed motion for each kept row
+ROWS_PER_CUTOFF = 3.0  # as a diagnosis keeps them
+INDEPENDENT = 2.0  # numbers a second that a low-pass leaves independent, for each hertz of its cut-off
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """kept_hz: rows a second after the filter. noise: of those rows."""
+
+    kept_hz: float
+    cutoff_hz: float
+    noise: Whitening
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second of a designed motion."""
+        return THINNED * self.kept_hz
+
+    def times(self, duration: float) -> Array:
+        """Instants of a designed motion, s."""
+        return np.asarray(np.arange(round(duration * self.rate_hz) + 1) / self.rate_hz)
+
+    def filter(self, samples: int) -> Filter:
+        """The filter of a designed motion."""
+        return Butterworth(self.rate_hz, self.cutoff_hz, samples, THINNED)
+
+    def whitened(self, columns: Array) -> Array:
+        """Whitened rows of kept columns (rows, joints, columns): (rows of all joints, columns)."""
+        return np.concatenate([self.noise(columns[:, joint], joint) for joint in range(columns.shape[1])])
+
+
+def white(levels: Array, cutoff_hz: float) -> Sampling:
+    """White noise below the cut-off. levels: (joints,), standard deviation of the filtered torque, N m."""
+    kept_hz = ROWS_PER_CUTOFF * cutoff_hz
+    scales = np.asarray(levels) * np.sqrt(kept_hz / (INDEPENDENT * cutoff_hz))  # rows that share their noise count less
+    return Sampling(kept_hz, cutoff_hz, Whitening(tuple(np.ones(1) for _ in levels), tuple(scales.tolist())))
+
+
+def kept_columns(
+    base: BaseParameters, candidates: tuple[Candidate, ...], scene: Scene, keep: Filter, smooth: bool = False
+) -> Array:
+    """Base parameters' columns, then the candidates', at the kept rows: (rows, joints, columns).
+
+    smooth: the motion is far below the cut-off, so that the filter would leave the rigid columns as they are.
+    """
+    joints = len(scene.arm)
+    rigid = observation_matrix(scene.arm, scene.motion)[:, base.columns].reshape(len(scene.time), joints, -1)
+    out = [rigid[keep.rows] if smooth else keep(rigid)]
+    own = [candidate.columns(scene) for candidate in candidates]
+    flat = keep(np.concatenate([each.reshape(len(each), -1) for each in own], axis=1)) if own else np.empty((0, 0))
+    at = 0
+    for candidate, each in zip(candidates, own, strict=True):
+        count = each.shape[1] * each.shape[2]
+        full = np.zeros((len(flat), joints, each.shape[2]))
+        full[:, list(candidate.rows)] = flat[:, at : at + count].reshape(-1, each.shape[1], each.shape[2])
+        out.append(full)
+        at += count
+    return np.concatenate(out, axis=2)

@@ -1,0 +1,1 @@
+"""The public recordings of real arms diagnosed with only the rigid body given."""

@@ -1,0 +1,177 @@
+"""Each hidden effect leaves its own mark: at its joint, in the direction that its law says."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hidden_cases import MACHINE, case, residual
+
+from concealed.effects.bodies import Geometry, LinkError, Payload, Tilt
+from concealed.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
+from concealed.effects.drives import Backlash, Coupling, Elasticity, Rotor
+from concealed.effects.friction import Asymmetric, Coulomb, LoadDependent, NonlinearViscous, Stribeck, Viscous
+from concealed.effects.hidden import Hidden
+from concealed.effects.library import LIBRARY
+from concealed.effects.memory import Drift, Presliding, bouc_wen, recursion
+from concealed.effects.springs import Cable, Compensator, Ripple
+from concealed.outside import OUTSIDE
+from problem.arm import link_poses
+from problem.motion import Motion
+from recordings.run import Array
+from recordings.vocabulary import EFFECT_IDS
+
+J = 1  # the second joint carries gravity
+Column = Callable[[Motion, Array, Hidden], Array]
+
+
+def _velocity(motion: Motion, nominal: Array, effect: Hidden) -> Array:
+    return motion.velocity[:, J]
+
+
+def _sign(motion: Motion, nominal: Array, effect: Hidden) -> Array:
+    return np.sign(motion.velocity[:, J])
+
+
+def _slope(motion: Motion, nominal: Array, effect: Hidden) -> Array:
+    return np.gradient(nominal[:, J])
+
+
+MARKS: dict[type[Hidden], tuple[Column, float]] = {  # a column, and the least correlation with it
+    Coulomb: (_sign, 0.95),
+    Viscous: (_velocity, 0.97),
+    NonlinearViscous: (_velocity, 0.8),
+    Stribeck: (_sign, 0.9),
+    Asymmetric: (_sign, 0.6),
+    LoadDependent: (lambda m, t, e: np.abs(t[:, J]) * np.sign(m.velocity[:, J]), 0.95),
+    Presliding: (_sign, 0.5),
+    Drift: (_velocity, 0.9),
+    Rotor: (lambda m, t, e: m.acceleration[:, J], 0.99),
+    Gain: (lambda m, t, e: e.shape["direction"] * t[:, J], 0.9),
+    Offset: (lambda m, t, e: e.shape["direction"] * np.ones(len(t)), 0.9),
+    Ripple: (lambda m, t, e: np.sin(e.shape["order"] * m.position[:, J] + e.shape["phase"]), 0.5),
+    Coupling: (lambda m, t, e: m.velocity[:, 2], 0.8),
+    Compensator: (lambda m, t, e: np.sin(m.position[:, J] + e.shape["phase"]), 0.8),
+    Cable: (lambda m, t, e: m.position[:, J] - e.shape["rest"], 0.9),
+    Delay: (lambda m, t, e: -_slope(m, t, e), 0.9),
+    Skew: (lambda m, t, e: -e.shape["direction"] * _slope(m, t, e), 0.9),
+    Saturation: (lambda m, t, e: -np.sign(t[:, J]) * np.maximum(np.abs(t[:, J]) - e.parameters()["limit"], 0), 0.9),
+}
+
+
+def _drawn(kind: type[Hidden], form: str | None = None, joint: int = J) -> Hidden:
+    rng = np.random.default_rng(5)
+    effect = kind.draw(rng, MACHINE, joint)
+    while form is not None and effect.form != form:
+        effect = kind.draw(rng, MACHINE, joint)
+    return effect
+
+
+def _cosine(first: Array, second: Array) -> float:
+    return float(first @ second / np.linalg.norm(first) / np.linalg.norm(second))
+
+
+FORMS = [(kind, form) for kind in MARKS for form in kind.forms]
+
+
+@pytest.mark.parametrize(("kind", "form"), FORMS, ids=[f"{kind.effect}-{form}" for kind, form in FORMS])
+def test_an_effect_shows_in_its_direction_at_its_joint_alone(kind: type[Hidden], form: str) -> None:
+    effect = _drawn(kind, form).informed(np.full(3, 25.0))
+    left, motion, nominal = residual(case(effect))
+    column, least = MARKS[kind]
+    assert _cosine(left[:, J], column(motion, nominal, effect)) > least
+    if effect.place is not None:
+        others = np.delete(np.sqrt(np.mean(left**2, axis=0)), J)
+        assert others.max() < 0.05 * np.sqrt(np.mean(left[:, J] ** 2))
+
+
+@pytest.mark.parametrize("kind", [Payload, LinkError, Tilt, Geometry, EncoderOffset, Elasticity, Backlash])
+def test_bodies_and_drives_leave_more_than_the_noise(kind: type[Hidden]) -> None:
+    made = case(_drawn(kind))
+    left, *_ = residual(made)
+    assert np.sqrt(np.mean(left[:, J] ** 2)) > 0.2 * made.plan.noise.level[J]
+    assert made.multiples[0] > 1
+
+
+def test_a_payload_adds_its_weight_and_its_inertia() -> None:
+    effect = Payload(2, 2.0, 6.0, "compact", {"x": 0.05, "y": 0.0, "z": 0.1, "radius": 0.001})
+    left, motion, _ = residual(case(effect))
+    step = 1e-4
+
+    def point(position: Array) -> Array:
+        return (link_poses(MACHINE.arm, position)[2] @ np.array([0.05, 0.0, 0.1, 1.0]))[:3]
+
+    def jacobian(position: Array) -> Array:
+        shifts = step * np.eye(3)
+        return np.column_stack([(point(position + each) - point(position - each)) / (2 * step) for each in shifts])
+
+    path = np.array([point(position) for position in motion.position])
+    force = 2.0 * np.gradient(np.gradient(path, 1 / 500, axis=0), 1 / 500, axis=0) + [0, 0, 2.0 * 9.81]
+    needed = np.array([jacobian(each).T @ push for each, push in zip(motion.position, force, strict=True)])
+    np.testing.assert_allclose(left[20:-20], needed[20:-20], atol=0.02)
+
+
+def test_an_elastic_joint_moves_its_resonance_and_not_its_static_torque() -> None:
+    effect = Elasticity(1, 1e-4, 1.0, "linear", {"damping": 3e-4})
+    left, _, nominal = residual(case(effect))
+    assert np.std(left[:, 1]) < 0.2 * np.std(nominal[:, 1])
+    assert np.std(left[:, 1]) > 1e-3
+
+
+def test_a_contact_is_felt_in_its_run_and_its_time_alone() -> None:
+    shape = {"start": 2.0, "end": 3.0, "run": 0.0, "direction": -1.0}
+    made = case(Contact(1, 4.0, 9.0, "half sine", shape))
+    inside, *_ = residual(made, 0)
+    other, *_ = residual(made, 1)
+    assert inside[1000:1500, 1].min() == pytest.approx(-4.0, rel=0.02)
+    assert np.abs(inside[1520:, 1]).max() < 0.05
+    assert np.abs(other).max() < 0.05
+
+
+def test_every_effect_of_the_vocabulary_can_be_hidden() -> None:
+    assert {kind.effect for kind in LIBRARY} == set(EFFECT_IDS) - {"unknown"}
+
+
+def test_parameters_have_names_and_units_of_the_vocabulary() -> None:
+    for kind in LIBRARY:
+        effect = _drawn(kind)
+        assert effect.units().keys() == effect.parameters().keys()
+
+
+def test_outside_effects_are_ten_and_none_has_a_name_of_the_library() -> None:
+    assert len(OUTSIDE) == 10
+    assert not {kind.effect for kind in OUTSIDE} & set(EFFECT_IDS)
+
+
+@pytest.mark.parametrize("kind", OUTSIDE, ids=[kind.effect for kind in OUTSIDE])
+def test_an_outside_effect_can_be_seen(kind: type[Hidden]) -> None:
+    joint = next(iter(kind.places(MACHINE)))
+    made = case(_drawn(kind, joint=joint))
+    left, *_ = residual(made)
+    assert np.sqrt(np.mean(left**2, axis=0)).max() > 0.1 * made.plan.noise.level.max()
+    assert made.multiples[0] > 1
+
+
+def test_a_third_of_the_draws_take_another_than_the_obvious_form() -> None:
+    rng = np.random.default_rng(0)
+    for kind in LIBRARY:
+        if len(kind.forms) > 1:
+            drawn = [kind.drawn_form(rng) != kind.forms[0] for _ in range(400)]
+            assert np.mean(drawn) > 1 / 3
+
+
+def test_recursion_is_the_linear_recurrence() -> None:
+    np.testing.assert_allclose(recursion(np.array([0.5, 0.5, 0.0]), np.array([1.0, 1.0, 3.0])), [1.0, 1.5, 3.0])
+
+
+def test_hose_hysteresis_stays_within_one_and_forgets_nothing_at_rest() -> None:
+    path = bouc_wen(np.concatenate([np.full(2000, 0.01), np.zeros(50), np.full(4000, -0.01)]))
+    assert path[1999] == pytest.approx(1.0, abs=0.01)
+    assert path[2049] == path[1999]
+    assert path[-1] == pytest.approx(-1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("size", [1e-6, 0.01, 0.1])
+@pytest.mark.parametrize("form", Saturation.forms)
+def test_a_saturated_channel_takes_its_share_from_the_highest_torque(form: str, size: float) -> None:
+    channel = Saturation(0, size, 0.6, form, {"peak": 20.0})
+    assert channel.read(np.array([[20.0]]))[0, 0] == pytest.approx(20.0 * (1 - size), rel=1e-9)

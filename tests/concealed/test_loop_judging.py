@@ -1,0 +1,117 @@
+"""The closed loop's judgement: small verdicts, and tables of small results."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from concealed.loop.judge import Truth, end_of, start_of, suspects, truth_of
+from concealed.loop.run import LoopSettings
+from concealed.loop.table import Share, rows, shares, text, write
+
+LATE = ("time_delay", None)
+VISCOUS = ("viscous_friction", 2)
+TRUTH = Truth(LATE)
+
+
+def verdict(*findings: tuple[tuple[str, int | None], list[tuple[str, int | None]]]) -> dict[str, Any]:
+    """A verdict with findings and their rivals."""
+    return {
+        "findings": [
+            {"effect": own[0], "joint": own[1], "rivals": [{"effect": e, "joint": j} for e, j in rivals]}
+            for own, rivals in findings
+        ]
+    }
+
+
+@pytest.mark.parametrize(
+    ("given", "start"),
+    [
+        (verdict((VISCOUS, [LATE])), "ambiguous"),
+        (verdict((LATE, [VISCOUS])), "ambiguous"),
+        (verdict((LATE, [])), "one name"),
+        (verdict((VISCOUS, [])), "another class"),
+        (verdict(), "nothing"),
+    ],
+)
+def test_a_first_verdict_is_ambiguous_only_with_the_hidden_effect_among_rivals(
+    given: dict[str, Any], start: str
+) -> None:
+    assert start_of(given, TRUTH) == start
+
+
+def test_suspects_are_all_names_of_the_groups_with_the_hidden_effect() -> None:
+    given = verdict((VISCOUS, [LATE]), (("torque_offset", 1), [("asymmetric_friction", 1)]))
+    assert suspects(given, TRUTH) == {LATE, VISCOUS}
+
+
+@pytest.mark.parametrize(
+    ("given", "end"),
+    [
+        (verdict((LATE, [])), "right"),
+        (verdict((LATE, [VISCOUS])), "open"),
+        (verdict((VISCOUS, [LATE])), "open"),
+        (verdict((VISCOUS, [])), "wrong"),
+        (verdict((LATE, []), (VISCOUS, [])), "wrong"),
+        (verdict(), "open"),
+        (verdict((LATE, []), (("torque_offset", 1), [])), "right"),
+    ],
+)
+def test_only_the_hidden_name_alone_is_right(given: dict[str, Any], end: str) -> None:
+    assert end_of(given, TRUTH, frozenset({LATE, VISCOUS})) == end
+
+
+def test_a_suspect_that_is_there_as_well_may_be_named() -> None:
+    given = verdict((LATE, []), (VISCOUS, []))
+    assert end_of(given, Truth(LATE, frozenset({VISCOUS})), frozenset({LATE, VISCOUS})) == "right"
+
+
+def test_background_and_links_that_are_off_count_as_there() -> None:
+    answer = {
+        "injected": [{"effect": "time_delay", "joint": None}],
+        "background": [{"effect": "viscous_friction", "joint": 2}],
+        "cad_errors": [{"effect": "inertial_parameter_error", "joint": 1}],
+    }
+    assert truth_of(answer) == Truth(LATE, frozenset({VISCOUS, ("inertial_parameter_error", 1)}))
+
+
+def result(number: int, start: str, designed: str, random: str, condition: str) -> dict[str, Any]:
+    """One result as a case gives it."""
+    ends = {"designed": designed, "random": random, "condition": condition}
+    pair, suspected = ["time_delay", "viscous_friction"], [["time_delay", None], ["viscous_friction", 2]]
+    return {
+        "case": number, "name": f"case{number}", "tier": "clean", "pair": pair, "multiple": 2.0, "start": start,
+        "suspected": suspected, "ends": ends, "passed": [{"pair": pair, "start": "nothing"}],
+    }  # fmt: skip
+
+
+FOUND = [
+    result(0, "told", "right", "open", "wrong"),
+    result(1, "mistaken", "right", "right", "open"),
+    result(2, "told", "right", "ran away", "open"),
+    {"case": 3, "name": "case3", "ends": {}, "passed": [{"pair": ["a", "b"], "start": "one name"}]},
+]
+
+
+def test_cases_that_ran_away_or_never_were_ambiguous_are_left_out_whole() -> None:
+    assert set(rows(FOUND)["case"]) == {"case0", "case1"}
+
+
+def test_shares_count_by_kind_of_motion_and_by_beginning() -> None:
+    assert shares(rows(FOUND))["designed", "right"] == Share(2, 2)
+    assert shares(rows(FOUND), "told")["random", "open"] == Share(1, 1)
+
+
+def test_a_share_is_told_with_wilsons_interval() -> None:
+    assert str(Share(5, 10)) == "50 % (24-76)"
+    assert str(Share(0, 0)) == "-"
+
+
+def test_the_page_tells_shares_comparisons_and_draws_that_were_passed_over(tmp_path: Path) -> None:
+    page = text(LoopSettings(4, 1001), FOUND, "abc")
+    assert "Seed 1001, 2 ambiguous cases of 4, manifest SHA-256 abc" in page
+    assert "| designed motion | 100 % (34-100) |" in page
+    assert "only the designed motion decided rightly in 1 cases, only the other one in 0" in page
+    assert "- nothing: 3" in page
+    names = [path.name for path in write(LoopSettings(4, 1001), FOUND, "abc", tmp_path)]
+    assert names == ["loop.md", "loop.csv", "loop.png"]

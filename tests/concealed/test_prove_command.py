@@ -1,0 +1,94 @@
+"""The proof as a whole, with a diagnosis that always says the same: what is kept, what is logged, what starts anew."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from made_verdicts import finding, verdict, write
+
+from concealed import ablation
+from concealed import prove as proving
+from concealed.ablation import Ablation, ablate
+from concealed.prove import LOG, Proof, chosen_proof, prove
+from concealed.sets import SetSettings
+from problem.errors import InputError
+
+SETS = {"mixed": SetSettings(1, 5000, "clean", "nulls")}
+
+
+@pytest.fixture
+def silent(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Stands in for all diagnoses; lists the cases that were looked at."""
+    looked: list[str] = []
+
+    def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int, options: object = ()) -> Iterator[str]:
+        for case in cases:
+            write(verdicts, case, verdict())
+            looked.append(case)
+            yield case
+
+    monkeypatch.setattr(proving, "diagnose_all", diagnose_all)
+    return looked
+
+
+def test_a_judged_proof_is_logged_once_with_commit_seed_seal_and_score(silent: list[str], tmp_path: Path) -> None:
+    proof = Proof(SETS, "judged", "a" * 40)
+    said = list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
+    list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
+    entries = [json.loads(line) for line in (tmp_path / "results" / LOG).read_text().splitlines()]
+    assert len(entries) == 1
+    assert entries[0]["commit"] == "a" * 40
+    assert entries[0]["seed"] == 5000
+    assert any(entries[0]["manifest"] in line for line in said)
+    assert entries[0]["score"]["clean"]["false claims on nulls"][0] == 0
+
+
+def test_the_seal_is_printed_before_the_first_diagnosis(silent: list[str], tmp_path: Path) -> None:
+    steps = prove(Proof(SETS, "judged", "b" * 40), tmp_path / "work", tmp_path / "results", 1)
+    for line in steps:
+        if "SHA-256" in line:
+            break
+    assert silent == []
+    list(steps)
+    assert len(silent) == 1
+
+
+def test_a_finished_quick_proof_starts_anew_and_is_not_logged(silent: list[str], tmp_path: Path) -> None:
+    for _ in range(2):
+        list(prove(Proof(SETS, "quick"), tmp_path / "work", tmp_path / "results", 1))
+    assert len(silent) == 2
+    assert not (tmp_path / "results" / LOG).exists()
+
+
+def test_a_development_proof_has_a_development_seed_and_no_commit() -> None:
+    proof = chosen_proof(False, 1200, 4, 0)
+    assert proof.commit is None
+    assert proof.sets == {"mixed": SetSettings(4, 1200, development=True)}
+    with pytest.raises(InputError, match="seed 5000 should be one for development, 1000 to 1999"):
+        chosen_proof(False, 5000, 4, 0)
+
+
+def test_an_ablation_diagnoses_the_same_cases_with_each_guard_off(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[tuple[str, tuple[str, ...]]] = []
+
+    def diagnose_all(
+        folder: Path, verdicts: Path, cases: list[str], jobs: int, options: tuple[str, ...]
+    ) -> Iterator[str]:
+        for case in cases:
+            claim = finding("viscous_friction", 2)
+            write(verdicts, case, verdict("mismatch", (claim,)) if options else verdict())
+            asked.append((case, options))
+            yield case
+
+    monkeypatch.setattr(ablation, "diagnose_all", diagnose_all)
+    settings = Ablation(1300, 1, 1, ("correction",))
+    list(ablate(settings, tmp_path / "work", tmp_path / "results", 1))
+    with_all, without = asked[:2], asked[2:]
+    assert [case for case, _ in with_all] == [case for case, _ in without]
+    assert {options for _, options in without} == {("--without", "correction")}
+    rows = (tmp_path / "results" / "guards.md").read_text().splitlines()
+    shares = {row.split(" | ")[0]: row.split(" | ")[1] for row in rows if " of 1" in row}
+    assert shares == {"| all guards on": "0 of 1", "| correction": "1 of 1"}

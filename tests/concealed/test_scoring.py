@@ -1,0 +1,202 @@
+"""Scores of verdicts that were written by hand."""
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+from made_verdicts import finding, perfect, verdict
+
+from concealed.score.matching import category
+from concealed.score.measures import Measure, by_effect, confusion, detection, measures, wilson
+from concealed.score.reading import Judged
+from concealed.score.rows import Rows, rows
+
+
+def effect(
+    name: str, joint: int | None, multiple: float = 8.0, outside: bool = False, **values: float
+) -> dict[str, Any]:
+    parameters = {key: {"value": value, "unit": "1", "comparable": True} for key, value in values.items()}
+    about: dict[str, Any] = {"equivalent": []}
+    about |= {"form": "x", "obvious_form": True, "size": 1.0, "shape": {}, "target": multiple, "joints": [joint]}
+    return {"effect": name, "joint": joint, "outside": outside, "multiple": multiple, "parameters": parameters, **about}
+
+
+def truth(
+    *injected: dict[str, Any], kind: str = "single", background: tuple[dict[str, Any], ...] = (), cad: int = 0
+) -> dict[str, Any]:
+    return {
+        "case": "c",
+        "tier": "clean",
+        "kind": kind,
+        "arm": "irb120-arm",
+        "joints": 3,
+        "injected": list(injected),
+        "background": list(background),
+        "cad_errors": [{"effect": "inertial_parameter_error", "joint": link} for link in range(1, cad + 1)],
+        "absorbed_rotors": [1, 2],
+        "noise": {"kind": "white"},
+    }
+
+
+def judged(answer: dict[str, Any], said: dict[str, Any], name: str = "c") -> Judged:
+    return Judged({**answer, "case": name}, said, Path("none"), Path("none"), Path("none"), 2.0)
+
+
+def scored(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> Rows:
+    return rows([judged(answer, said, f"c{number}") for number, (answer, said) in enumerate(pairs)])
+
+
+def measured(table: Rows, start: str) -> Measure:
+    return next(each for each in measures(table, "clean") if each.name.startswith(start))
+
+
+NULL = truth(kind="null")
+COULOMB = truth(effect("coulomb_friction", 2, level=2.0))
+OUTSIDE = truth(effect("viscous_map", 1, outside=True), kind="outside")
+
+
+def test_perfect_verdicts_score_perfectly() -> None:
+    table = scored(*((each, perfect(each)) for each in (NULL, COULOMB, OUTSIDE)))
+    assert measured(table, "right name or class").value == 1
+    assert measured(table, "right joint").value == 1
+    assert measured(table, "false claims on nulls").value == 0
+    assert measured(table, "wrong names among claims").value == 0
+    assert measured(table, "unknown on effects outside").value == 1
+    assert measured(table, "95 %").value == 1
+
+
+def test_silence_makes_no_false_claim_and_names_nothing() -> None:
+    table = scored(*((each, verdict()) for each in (NULL, COULOMB, OUTSIDE)))
+    assert measured(table, "right name or class").value == 0
+    assert measured(table, "unknown on effects outside").value == 0
+    assert measured(table, "false claims on nulls").value == 0
+    assert measured(table, "wrong names among claims").value is None
+
+
+def test_wrong_names_are_counted_among_claims_and_on_nulls() -> None:
+    wrong = verdict("mismatch", (finding("backlash", 3),))
+    table = scored((NULL, wrong), (COULOMB, wrong))
+    assert measured(table, "wrong names among claims").value == 1
+    assert measured(table, "false claims on nulls").value == 1
+    assert confusion(table, "clean").loc["coulomb_friction", "backlash"] == 1
+    assert confusion(table, "clean").loc["nothing", "backlash"] == 1
+
+
+def test_the_right_name_at_the_wrong_joint_is_misplaced() -> None:
+    table = scored((COULOMB, verdict("mismatch", (finding("coulomb_friction", 3),))))
+    assert measured(table, "right first name, all").value == 1
+    assert measured(table, "right joint").value == 0
+    assert table.claims["category"].tolist() == ["misplaced"]
+
+
+THREE = ("backlash", "coulomb_friction", "cable_stiffness")
+
+
+@pytest.mark.parametrize(("rivals", "right"), [(THREE, True), ((*THREE, "payload"), False)])
+def test_a_class_counts_with_at_most_three_rivals(rivals: tuple[str, ...], right: bool) -> None:
+    table = scored((COULOMB, verdict("mismatch", (finding("stribeck_friction", 2, rivals=rivals),))))
+    assert measured(table, "right name or class").value == right
+    assert measured(table, "right first name, above").value == 0
+
+
+def test_findings_of_the_background_are_right_answers() -> None:
+    friction = effect("viscous_friction", 3)
+    answer = truth(kind="null", background=(friction,), cad=3)
+    said = verdict("mismatch", (finding("viscous_friction", 3), finding("inertial_parameter_error", 2)))
+    assert measured(scored((answer, said)), "false claims on nulls").value == 0
+    elsewhere = verdict("mismatch", (finding("viscous_friction", 1),))
+    assert measured(scored((answer, elsewhere)), "false claims on nulls").value == 1
+
+
+IDENTICAL = [
+    (truth(effect("asymmetric_friction", 2)), finding("torque_offset", 2)),
+    (truth(effect("rotor_inertia", 2)), finding("inertial_parameter_error", 3)),
+    (truth(effect("cable_stiffness", 2)), finding("gravity_compensator", 2)),
+    (truth(effect("payload", 3)), finding("inertial_parameter_error", 3)),
+    (truth(effect("time_delay", None)), finding("viscous_friction", 1)),
+    (truth(kind="null", cad=3), finding("rotor_inertia", 1)),
+    (truth(effect("coulomb_friction", 1), effect("torque_offset", 1)), finding("asymmetric_friction", 1)),
+    (truth(effect("stribeck_friction", 1)), finding("coulomb_friction", 1)),
+]
+NOT_IDENTICAL = [
+    (truth(effect("asymmetric_friction", 2)), finding("torque_offset", 1)),
+    (truth(kind="null", cad=3), finding("rotor_inertia", 3)),
+    (truth(kind="null", cad=3), finding("torque_gain_error", 3)),
+    (truth(kind="null"), finding("rotor_inertia", 1)),
+    (truth(effect("coulomb_friction", 1)), finding("asymmetric_friction", 1)),
+    (truth(effect("encoder_offset", 2)), finding("inertial_parameter_error", 2)),
+    (truth(effect("coulomb_friction", 1)), finding("stribeck_friction", 1)),
+]
+
+
+@pytest.mark.parametrize(("answer", "said"), IDENTICAL)
+def test_what_no_motion_separates_is_no_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
+    assert category(judged(answer, verdict("mismatch", (said,))), said) == "identical"
+
+
+@pytest.mark.parametrize(("answer", "said"), NOT_IDENTICAL)
+def test_what_motion_can_separate_is_a_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
+    assert category(judged(answer, verdict("mismatch", (said,))), said) == "wrong"
+
+
+def test_unknown_is_right_for_an_effect_outside_and_false_where_nothing_is() -> None:
+    said = verdict("mismatch", (finding("unknown", 1),))
+    assert category(judged(OUTSIDE, said), said["findings"][0]) == "injected"
+    assert category(judged(NULL, said), said["findings"][0]) == "unknown"
+    assert measured(scored((NULL, said)), "false claims on nulls").value == 1
+    listed = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depends_on": ["position_1"]}])
+    assert measured(scored((OUTSIDE, listed)), "unknown on effects outside").value == 1
+
+
+def test_intervals_that_miss_the_truth_are_counted() -> None:
+    def said(low: float, high: float) -> dict[str, Any]:
+        values = {"level": {"value": 2.2, "ci95": [low, high], "unit": "N.m"}}
+        return verdict("mismatch", (finding("coulomb_friction", 2, values),))
+
+    table = scored((COULOMB, said(1.9, 2.5)), (COULOMB, said(2.1, 2.3)))
+    assert measured(table, "95 %").value == 0.5
+    assert table.parameters["relative_error"].tolist() == pytest.approx([0.1, 0.1])
+
+
+def test_gap_closed_is_taken_from_the_verdict_where_nothing_was_predicted() -> None:
+    fit = [{"joint": 2, "heldout_rms_before": 1.1, "heldout_rms_after": 0.3, "noise_floor": 0.1, "gap_closed": 0.8}]
+    table = scored((COULOMB, verdict("mismatch", (), fit=fit)))
+    assert table.cases["gap_closed"].tolist() == pytest.approx([0.8])
+    assert table.cases["gap_source"].tolist() == ["reported"]
+
+
+def test_detection_curve_sorts_by_size() -> None:
+    small, large = truth(effect("coulomb_friction", 2, 0.7)), truth(effect("coulomb_friction", 2, 12.0))
+    curve = detection(scored((small, verdict()), (large, perfect(large))), "clean")
+    first = curve[curve["name"] == "named_first"].set_index("from")["value"]
+    assert first[0.5] == 0
+    assert first[10.0] == 1
+
+
+def test_names_by_effect_count_hidden_found_and_wrongly_claimed() -> None:
+    wrong = verdict("mismatch", (finding("backlash", 3),))
+    table = by_effect(scored((COULOMB, perfect(COULOMB)), (COULOMB, wrong)), "clean").set_index("effect")
+    assert table.loc["coulomb_friction", ["above", "first"]].tolist() == [2, 1]
+    assert table.loc["backlash", "wrong_claims"] == 1
+
+
+def test_wilson_intervals_are_those_of_the_textbook() -> None:
+    assert wilson(0, 100) == pytest.approx((0.0, 0.036995), abs=1e-5)  # Newcombe 1998, method 3
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)  # Newcombe 1998, table I
+
+
+def test_rows_of_no_case_keep_their_columns() -> None:
+    empty = rows([])
+    assert isinstance(empty.effects, pd.DataFrame)
+    assert "multiple" in empty.effects
+    assert not len(empty.claims)
+
+
+def test_levels_by_direction_are_named_by_a_level_and_an_offset_together() -> None:
+    hidden = {**effect("asymmetric_friction", 2), "equivalent": ["coulomb_friction", "torque_offset"]}
+    parts = (finding("coulomb_friction", 2), finding("torque_offset", 2))
+    both, one = (scored((truth(hidden), verdict("mismatch", found))) for found in (parts, parts[:1]))
+    assert measured(both, "right first name, above").value == 1
+    assert measured(both, "right joint").value == 1
+    assert measured(one, "right first name, above").value == 0

@@ -1,0 +1,169 @@
+"""The sealed protocol: the same set from the same seed, and a seal that shows every change."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from click.testing import CliRunner
+from made_verdicts import perfect, verdict, write
+
+from concealed.cli import conceal as conceal_command
+from concealed.cli import score as score_command
+from concealed.manifest import NAME, checked_manifest, digest
+from concealed.noise import JUDGED, USUAL
+from concealed.plan import DEVELOPMENT_SEEDS, SMALLEST, draw_plan, target_multiple
+from concealed.prove import FAILED, diagnose_all, judged_seed
+from concealed.score.command import score
+from concealed.sets import SetSettings, conceal, settings_for
+from problem.errors import InputError
+from recordings.load import load_recording
+
+SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("concealed") / "set"
+    list(conceal(SETTINGS, folder, 1))
+    return folder
+
+
+@pytest.fixture
+def copy(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "set"))
+
+
+def _verdicts(folder: Path, out: Path) -> Path:
+    for path in (folder / "truth").glob("*.json"):
+        write(out, path.stem, perfect(json.loads(path.read_text())))
+    return out
+
+
+def test_a_set_is_the_same_to_the_byte_for_one_and_two_jobs(made: Path, tmp_path: Path) -> None:
+    list(conceal(SETTINGS, tmp_path / "again", 2))
+    assert digest(tmp_path / "again" / NAME) == digest(made / NAME)
+
+
+def test_an_interrupted_set_goes_on_where_it_stopped(copy: Path) -> None:
+    sealed = digest(copy / NAME)
+    lost = sorted((copy / "observations").iterdir())[0]
+    shutil.rmtree(lost)
+    assert list(conceal(SETTINGS, copy, 1)) == [lost.name]
+    assert digest(copy / NAME) == sealed
+
+
+def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
+    with pytest.raises(InputError, match="holds another concealed set"):
+        list(conceal(SetSettings(3, 1006), copy, 1))
+
+
+@pytest.mark.parametrize("part", ["truth", "observations"])
+def test_a_file_changed_after_sealing_is_refused(copy: Path, tmp_path: Path, part: str) -> None:
+    file = next(path for path in sorted((copy / part).rglob("*")) if path.suffix in (".json", ".yaml"))
+    file.write_text(file.read_text() + " ")
+    with pytest.raises(InputError, match="was changed after"):
+        score(copy, _verdicts(copy, tmp_path / "v"), None, tmp_path / "out")
+
+
+def test_a_manifest_made_anew_is_refused_by_its_printed_hash(copy: Path) -> None:
+    sealed = digest(copy / NAME)
+    (copy / NAME).write_text((copy / NAME).read_text().replace('"seed": 1005', '"seed": 1006'))
+    with pytest.raises(InputError, match="is not the manifest that was sealed"):
+        checked_manifest(copy, sealed)
+
+
+def test_conceal_prints_the_hash_and_score_takes_it(made: Path, tmp_path: Path) -> None:
+    arguments = ["--cases", "3", "--seed", "1005", "--development", "--out", str(made)]
+    printed = CliRunner().invoke(conceal_command, arguments)
+    assert digest(made / NAME) in printed.output
+    verdicts = _verdicts(made, tmp_path / "v")
+    told = [str(made), "--verdicts", str(verdicts), "--manifest", digest(made / NAME)]
+    scored = CliRunner().invoke(score_command, told)
+    assert scored.exit_code == 0, scored.output
+    assert (verdicts / "score" / "score.json").is_file()
+
+
+def test_observations_are_recordings_with_the_same_columns_and_no_word_of_the_answer(made: Path) -> None:
+    for folder in (made / "observations").iterdir():
+        assert len(load_recording(folder).with_role("validate")) == 1
+        settings = yaml.safe_load((folder / "recording.yaml").read_text())
+        assert set(settings["columns"]) == {"time", "position", "torque"}
+        assert {path.name for path in folder.iterdir()} == {
+            "recording.yaml",
+            "robot.yaml",
+            *(run["file"] for run in settings["runs"]),
+        }
+
+
+def test_the_robot_file_holds_the_nominal_links_and_not_the_true_ones(made: Path) -> None:
+    for number in range(SETTINGS.cases):
+        plan = SETTINGS.plan(number)
+        arm = load_recording(made / "observations" / plan.name).arm
+        np.testing.assert_allclose(arm.parameters, plan.machine.arm.parameters)
+        assert arm.rotor_inertia == plan.machine.arm.rotor_inertia
+
+
+def test_development_never_draws_the_noise_of_judged_nulls() -> None:
+    kinds = {draw_plan(1000, index, "clean", True, True).noise.kind for index in range(150)}
+    assert kinds == set(USUAL)
+
+
+def test_half_of_the_judged_nulls_have_noise_that_development_never_saw() -> None:
+    kinds = [draw_plan(77, index, "realistic", True, False).noise.kind for index in range(300)]
+    assert 0.4 < np.mean([kind in JUDGED for kind in kinds]) < 0.6
+    assert set(JUDGED) < set(kinds)
+
+
+def test_development_seeds_are_marked_whatever_was_asked() -> None:
+    assert settings_for(1, 1500, "both", "mixed", False).development
+    assert not settings_for(1, 5, "both", "mixed", False).development
+
+
+def test_a_judged_seed_follows_from_the_commit_and_is_no_development_seed() -> None:
+    first, second = judged_seed("0" * 40), judged_seed("f" * 40)
+    assert first != second
+    assert first not in DEVELOPMENT_SEEDS
+    assert second not in DEVELOPMENT_SEEDS
+
+
+def test_sizes_spread_evenly_from_half_a_limit_to_twenty() -> None:
+    sizes = [target_multiple(draw_plan(1000, index, "clean", False, True), 0) for index in range(60)]
+    assert SMALLEST <= min(sizes) < 0.6
+    assert 17 < max(sizes) <= 20
+    counts, _ = np.histogram(np.log(sizes), bins=6, range=(np.log(0.5), np.log(20)))
+    assert counts.min() >= 8
+
+
+def test_realistic_links_are_three_to_ten_per_cent_off() -> None:
+    plan = draw_plan(1000, 3, "realistic", True, True)
+    assert all(0.03 <= error <= 0.1 for error in plan.cad_errors)
+    assert len(plan.cad_errors) == plan.machine.joints
+    assert {effect.effect for effect in plan.background} >= {"coulomb_friction", "viscous_friction"}
+
+
+def test_a_diagnosis_that_fails_is_kept_as_failed(made: Path, tmp_path: Path) -> None:
+    case = json.loads((made / NAME).read_text())["cases"][0]
+    (tmp_path / "nothing" / "observations" / case).mkdir(parents=True)
+    assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == [case]
+    assert (tmp_path / "v" / case / FAILED).is_file()
+    assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == []
+
+
+def test_missing_and_broken_verdicts_count_against_and_stop_nothing(made: Path, tmp_path: Path) -> None:
+    cases = json.loads((made / NAME).read_text())["cases"]
+    write(tmp_path / "v", cases[0], verdict())
+    write(tmp_path / "v", cases[1], "{ no json")
+    found = score(made, tmp_path / "v", None, tmp_path / "out")
+    counted = {
+        tier: next(each for each in measures if each["name"] == "missing or invalid verdicts")
+        for tier, measures in found["tiers"].items()
+    }
+    assert sum(each["value"] * each["number"] for each in counted.values()) == 2
+
+
+def test_no_verdict_at_all_is_refused(made: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no valid verdict"):
+        score(made, tmp_path / "v", None, tmp_path / "out")

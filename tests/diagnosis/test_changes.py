@@ -1,0 +1,134 @@
+"""What changed between two recordings: nothing, friction in both directions, a load; and recordings of two robots."""
+
+import json
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.testing import assert_allclose
+from refusals import refusal
+from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
+
+from bench.cli import main
+from diagnosis.compare.changes import Change, holm
+from diagnosis.compare.compare import Comparison, compare
+from diagnosis.compare.structure import predicted
+from diagnosis.compare.tell import as_json, sentences, terminal_lines
+from diagnosis.effects.contract import Scene
+from problem.regressor import rigid_body_torque
+from recordings.load import load_recording
+from recordings.recording import Recording
+
+LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
+
+
+@cache
+def recording(name: str, seed: int, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0) -> Recording:
+    runs = [frame(seed + each, 8, viscous, mass) for each in range(2)]
+    return load_recording(recording_in(Path(mkdtemp()) / name, *runs))
+
+
+@cache
+def comparison(kind: str) -> Comparison:
+    new = {
+        "same": recording("again", 10),
+        "warm": recording("warm", 10, LESS),
+        "loaded": recording("loaded", 10, VISCOUS, 0.5),
+    }
+    return compare(recording("cold", 0), new[kind])
+
+
+def changed(found: Comparison) -> list[Change]:
+    return [each for each in found.changes if each.changed]
+
+
+def test_two_recordings_of_an_unchanged_robot_are_the_same() -> None:
+    found = comparison("same")
+    assert found.status == "same"
+    assert changed(found) == []
+    assert sentences(found)[0] == "Nothing changed between cold and again that the recordings show."
+
+
+def test_friction_that_fell_is_found_although_friction_itself_cannot_be_negative() -> None:
+    found = comparison("warm")
+    assert found.status == "changed"
+    assert found.against is not None
+    assert [(each.effect, each.joint) for each in found.against.claims] == [("viscous_friction", 2)]
+    (change,) = changed(found)
+    assert (change.effect, change.joint, change.parameter) == ("viscous_friction", 2, "coefficient")
+    low, high = change.interval
+    assert low < -0.3 < high
+    assert high - low < 0.05
+    assert change.old == pytest.approx(VISCOUS[1], abs=0.03)
+
+
+def test_a_load_is_told_from_wear() -> None:
+    found = comparison("loaded")
+    assert found.status == "changed"
+    assert found.against is not None
+    effects = {(each.effect, each.joint) for each in found.against.claims}
+    assert effects & {("payload", 3), ("inertial_parameter_error", 3)}
+    assert {each.effect for each in changed(found)} == {"base_parameter"}
+
+
+def test_intervals_of_unchanged_parameters_hold_zero() -> None:
+    quiet = [each for each in comparison("warm").changes if not each.changed]
+    assert len(quiet) > 15
+    assert np.mean([each.interval[0] < 0 < each.interval[1] for each in quiet]) > 0.7
+
+
+def test_the_old_model_predicts_its_own_robot() -> None:
+    old = comparison("same").old
+    time = np.arange(800) / 200
+    motion = motion_at(time, 77)
+    zero = np.zeros(motion.position.shape)
+    torque = predicted(old, Scene("run", time, motion, ARM, ARM.parameters, zero))
+    truth = rigid_body_torque(ARM, motion) + np.array(VISCOUS) * motion.velocity
+    truth += np.array([1.0, 1.5, 0.7]) * np.sign(motion.velocity)
+    assert np.all(np.sqrt(np.mean((torque - truth) ** 2, axis=0)) < 0.1)
+
+
+def test_another_robot_is_refused_in_one_line(tmp_path: Path) -> None:
+    turned = recording_in(tmp_path / "turned", frame(0, 8), frame(1, 8), robot="irb120-arm")
+    other = load_recording(turned)
+    shorter = ARM.first(2)
+    message = refusal(compare, recording("cold", 0), Recording(other.folder, "x", shorter, (), other.transmission))
+    assert "not the same geometry" in message
+
+
+def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path) -> None:
+    short = load_recording(recording_in(tmp_path / "short", frame(0, 0.8), frame(1, 0.8)))
+    found = compare(recording("cold", 0), short)
+    assert found.status == "inconclusive"
+    assert "too short" in " ".join(sentences(found))
+
+
+def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
+    content = json.loads(json.dumps(as_json(comparison("warm")), allow_nan=False))
+    assert content["schema"] == "comparison/1"
+    assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient"]
+    assert content["against"]["status"] == "mismatch"
+    text = " ".join(terminal_lines(comparison("warm")))
+    assert "viscous friction at joint 2" in text
+    assert max(map(len, terminal_lines(comparison("warm")))) < 180
+
+
+def test_holm_multiplies_the_smallest_by_all_and_keeps_the_order() -> None:
+    assert_allclose(holm(np.array([0.04, 0.01, 0.5])), [0.08, 0.03, 0.5])
+    assert_allclose(holm(np.array([0.02, 0.01])), [0.02, 0.02])
+
+
+def test_the_command_writes_page_and_json(tmp_path: Path) -> None:
+    old = recording_in(tmp_path / "old", frame(0, 6), frame(1, 6))
+    new = recording_in(tmp_path / "new", frame(2, 6, LESS), frame(3, 6, LESS))
+    arguments = ["diagnose", "--compare", str(old), str(new), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    assert {each.name for each in (tmp_path / "out").iterdir()} == {"comparison.json", "comparison.html"}
+    page = (tmp_path / "out" / "comparison.html").read_text()
+    assert "What changed between old and new" in page
+    assert f"armlab {' '.join(arguments)}" in page
+    assert json.loads((tmp_path / "out" / "comparison.json").read_text())["status"] == "changed"

@@ -1,0 +1,131 @@
+"""The whole engine on small recordings: what is hidden is named, and nothing else is."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import engine_cases as cases
+import jsonschema
+import numpy as np
+import pytest
+import yaml
+
+from diagnosis.files import write_verdict
+from diagnosis.result import Diagnosis
+from diagnosis.run import diagnose
+from diagnosis.verdict import verdict
+from problem.motion import Motion
+from problem.robot_file import load_arm
+from recordings.run import Array
+
+SCHEMAS = Path(__file__).parents[1] / "schemas"
+
+
+def viscous(motion: Motion, time: Array) -> Array:
+    torque = np.zeros(motion.position.shape)
+    torque[:, 2] = 0.8 * motion.velocity[:, 2]
+    return torque
+
+
+def friction_everywhere(motion: Motion, time: Array) -> Array:
+    return np.asarray(motion.velocity * [1.5, 1.2, 0.8] + np.sign(motion.velocity) * [2.0, 1.5, 1.0])
+
+
+def product_of_positions(motion: Motion, time: Array) -> Array:
+    torque = np.zeros(motion.position.shape)
+    torque[:, 1] = 2.0 * np.sin(4 * motion.position[:, 0]) * motion.position[:, 2]
+    return torque
+
+
+@pytest.fixture(scope="module")
+def viscous_found() -> Diagnosis:
+    return diagnose(cases.recording(viscous))
+
+
+def test_nothing_is_claimed_where_nothing_is_hidden() -> None:
+    found = diagnose(cases.recording())
+    assert (found.status, found.claims, found.unexplained) == ("none", (), ())
+
+
+def test_hidden_viscous_friction_is_the_only_finding_with_an_interval_around_the_truth(
+    viscous_found: Diagnosis,
+) -> None:
+    (claim,) = viscous_found.claims
+    (coefficient,) = claim.parameters
+    assert (claim.effect, claim.joint) == ("viscous_friction", 3)
+    assert np.ptp(coefficient.interval) < 0.02
+    assert coefficient.interval[0] < 0.8 < coefficient.interval[1]
+
+
+def test_the_gap_between_refitted_arm_and_noise_is_closed(viscous_found: Diagnosis) -> None:
+    gap = viscous_found.fit[2].gap_closed
+    assert gap is not None
+    assert gap > 0.98
+
+
+def test_excess_error_is_located_at_the_guilty_joint(viscous_found: Diagnosis) -> None:
+    assert viscous_found.located[0].joint == 3
+    assert viscous_found.located[0].share > 0.99
+
+
+def test_verdict_is_valid_json_of_its_schema(viscous_found: Diagnosis) -> None:
+    schema = json.loads((SCHEMAS / "verdict.schema.json").read_text())
+    content = json.loads(json.dumps(verdict(viscous_found), allow_nan=False))
+    jsonschema.validate(content, schema)
+
+
+def test_files_are_written_whole_and_the_model_follows_its_schema(viscous_found: Diagnosis, tmp_path: Path) -> None:
+    write_verdict(viscous_found, tmp_path / "out")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["model.yaml", "verdict.json"]
+    model = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())
+    jsonschema.validate(model, json.loads((SCHEMAS / "model.schema.json").read_text()))
+    assert [part["effect"] for part in model["components"]] == ["viscous_friction"]
+
+
+def test_the_same_seed_gives_the_same_verdict(viscous_found: Diagnosis) -> None:
+    assert verdict(diagnose(cases.recording(viscous))) == verdict(viscous_found)
+
+
+def test_friction_on_every_joint_of_an_arm_with_wrong_links_is_named_as_such() -> None:
+    real = load_arm("irb120-arm").parameters * np.repeat([1.06, 0.95, 1.05], 10)
+    found = diagnose(cases.recording(friction_everywhere, inertial=real))
+    friction = {("viscous_friction", joint) for joint in (1, 2, 3)} | {
+        ("coulomb_friction", joint) for joint in (1, 2, 3)
+    }
+    named = {(claim.effect, claim.joint) for claim in found.claims}
+    assert friction <= named
+    assert {effect for effect, _ in named - friction} <= {"inertial_parameter_error"}
+
+
+def test_structure_outside_the_library_is_called_unknown_with_what_it_depends_on() -> None:
+    found = diagnose(cases.recording(product_of_positions, seconds=20.0))
+    unknown = [claim for claim in found.claims if claim.effect == "unknown"]
+    assert [claim.joint for claim in unknown] == [2]
+    assert set(found.unexplained[0].depends_on) & {"position_1", "position_3"}
+    assert found.fit[1].after < 0.8 * found.fit[1].before
+
+
+def test_torque_of_the_wrong_sign_is_inconclusive_and_says_so() -> None:
+    good = cases.recording(friction_everywhere)
+    turned = replace(good, runs=tuple(run.with_signals(run.time, {"torque": -run.torque}) for run in good.runs))
+    found = diagnose(turned)
+    assert found.status == "inconclusive"
+    assert "sign" in found.summary
+
+
+def test_torque_in_another_unit_is_inconclusive_and_tells_the_factor() -> None:
+    good = cases.recording(friction_everywhere)
+    scaled = replace(good, runs=tuple(run.with_signals(run.time, {"torque": 1000 * run.torque}) for run in good.runs))
+    found = diagnose(scaled)
+    assert found.status == "inconclusive"
+    assert "unit" in found.summary
+
+
+def test_an_arm_that_never_moves_is_inconclusive() -> None:
+    good = cases.recording()
+    still = replace(good, runs=tuple(run.with_signals(run.time, {"position": 0 * run.position}) for run in good.runs))
+    assert diagnose(still).status == "inconclusive"
+
+
+def test_a_recording_of_a_second_is_inconclusive() -> None:
+    assert diagnose(cases.recording(seconds=0.9)).status == "inconclusive"

@@ -1,0 +1,30 @@
+"""A model that a diagnosis wrote, as the simulation of the next diagnosis."""
+
+from pathlib import Path
+
+import yaml
+from told_recordings import frame, recording_in
+
+from diagnosis.command import diagnose_recording
+from diagnosis.run import diagnose
+from identification.model_file import read_model
+from recordings.load import load_recording
+
+
+def test_nothing_is_missing_of_the_model_that_a_diagnosis_found(tmp_path: Path) -> None:
+    folder = recording_in(tmp_path / "first", frame(0, 10, mass=0.6), frame(1, 10, mass=0.6))
+    list(diagnose_recording(folder, tmp_path / "out", None, 0))
+    _with_upright_base(tmp_path / "out" / "model.yaml")
+    assert read_model(tmp_path / "out" / "model.yaml").extras
+    content = yaml.safe_load((folder / "recording.yaml").read_text())
+    (folder / "recording.yaml").write_text(yaml.safe_dump(content | {"simulation": "../out/model.yaml"}))
+    again = diagnose(load_recording(folder))
+    assert again.status == "none", again.summary
+
+
+def _with_upright_base(path: Path) -> None:
+    """Adds an effect that only the library can compute, and that changes nothing."""
+    content = yaml.safe_load(path.read_text())
+    gravity = {"value": [0.0, 0.0, -9.81], "ci95": None, "unit": "m/s2"}
+    tilt = {"effect": "base_tilt", "joint": None, "joints": [], "parameters": {"gravity": gravity}}
+    path.write_text(yaml.safe_dump(content | {"components": [*content["components"], tilt]}))

@@ -1,0 +1,53 @@
+"""The preset `tell-apart` among the problems of the benchmark."""
+
+import numpy as np
+import pytest
+from next_questions import points, told_apart
+from refusals import refusal
+
+from diagnosis.next.design import Budget, random_point, searched
+from diagnosis.next.preset import RivalSettings, TellApartSettings
+from problem.contract_suite import ProblemContract
+from problem.frame import ShiftedProblem
+from problem.settings import validate
+
+
+class TestTellApart(ProblemContract):
+    settings = TellApartSettings(duration=4.0, harmonics=4, cutoff_hz=10.0)
+
+
+def test_its_value_is_one_over_the_smallest_separation() -> None:
+    problem = told_apart()
+    drawn = points(problem, 3)
+    assert problem.evaluate(drawn).value == pytest.approx([1 / problem.separation(point) for point in drawn])
+
+
+def test_its_settings_have_a_hash_as_the_runner_needs_it() -> None:
+    assert hash(TellApartSettings()) == hash(TellApartSettings())
+
+
+def test_a_frame_seed_moves_the_coordinates() -> None:
+    assert isinstance(TellApartSettings(duration=4.0, harmonics=3, frame_seed=1).build(), ShiftedProblem)
+
+
+def test_an_effect_that_is_no_id_is_refused() -> None:
+    given = {"preset": "tell-apart", "rivals": ({"effect": "friction", "joint": 1}, {"effect": "time_delay"})}
+    assert "rivals" in refusal(validate, TellApartSettings, given, "the problem")
+
+
+def test_rivals_without_any_size_are_refused() -> None:
+    rivals = (RivalSettings(effect="viscous_friction", joint=2), RivalSettings(effect="time_delay"))
+    assert "how large" in refusal(TellApartSettings(rivals=rivals).build)
+
+
+@pytest.mark.parametrize("algorithm", ["mupso", "gwo", "cma-es"])
+def test_registered_algorithms_find_motions_that_tell_more_than_random_ones(algorithm: str) -> None:
+    problem = told_apart()
+    budget = Budget(4.0, 4, algorithm, 250, seed=3)
+    others = [problem.separation(random_point(problem, Budget(seed=seed))) for seed in range(12)]
+    assert problem.separation(searched(problem, budget)) > np.median(others)
+
+
+def test_an_unknown_algorithm_is_refused_with_the_nearest_name() -> None:
+    message = refusal(searched, told_apart(), Budget(4.0, 4, "mupsi", 100))
+    assert "did you mean 'mupso'" in message

@@ -1,0 +1,240 @@
+"""The report as its reader has it: in Chromium on a desk, on a phone and on paper, without network or script."""
+
+import json
+import shutil
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from told_recordings import frame, recording_in
+
+from diagnosis.files import verdict_texts, write_texts
+from diagnosis.report.looks import FLOOR, FOUND, GIVEN, MEASURED, REFITTED, UNKNOWN
+from diagnosis.report.memory import filter_memory_seconds, memory_seconds
+from diagnosis.report.terminal import terminal_lines
+from diagnosis.report.write import report_texts, write_report
+from diagnosis.result import Diagnosis, Rival, Unexplained
+from diagnosis.run import diagnose
+from problem.errors import InputError
+from recordings.load import load_recording
+
+HOSTILE = "x<script>alert(1)<!script>\"&'<img src=y onerror=alert(2)>"
+ARM_FILE = Path(__file__).parents[2] / "problem" / "robots" / "irb120-arm.yaml"
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+    """A diagnosis with friction and a load, of a recording whose names want to be HTML."""
+    folder = tmp_path_factory.mktemp("made") / HOSTILE
+    recording_in(folder, frame(0, 8, mass=0.4), frame(1, 8, mass=0.4), names=f"<b>{HOSTILE}", robot="robot.yaml")
+    robot = yaml.safe_load(ARM_FILE.read_text())
+    robot["name"] = HOSTILE
+    for number, joint in enumerate(robot["joints"]):
+        joint["name"] = f"j{number}{HOSTILE}"
+    (folder / "robot.yaml").write_text(yaml.safe_dump(robot))
+    return diagnose(load_recording(folder))
+
+
+@pytest.fixture(scope="module")
+def texts(found: Diagnosis) -> dict[str, str]:
+    return report_texts(found, "armlab diagnose 'a b' --out c")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
+    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+    if chromium is None:
+        pytest.skip("there is no Chromium on this machine")
+    with playwright.sync_playwright() as session:
+        browser = session.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def address(texts: dict[str, str], tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_text(texts["report.html"], encoding="utf-8")
+    return path.as_uri()
+
+
+def opened(browser: Any, address: str, width: int) -> tuple[Any, list[str]]:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    complaints: list[str] = []
+    page.context.set_offline(True)
+    page.on("request", lambda request: complaints.append(request.url) if request.url != address else None)
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on("dialog", lambda dialog: complaints.append(dialog.message))
+    page.on("console", lambda message: complaints.append(message.text))
+    page.goto(address)
+    page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true")
+    complaints[:] = [complaint for complaint in complaints if not complaint.startswith("data:")]
+    return page, complaints
+
+
+OVERLAPS = """() => [...document.querySelectorAll('svg')].flatMap(svg => {
+  const boxes = [...svg.querySelectorAll('text')].map(text => [text.textContent, text.getBoundingClientRect()]);
+  return boxes.flatMap(([one, a], index) => boxes.slice(index + 1).flatMap(([other, b]) => {
+    const across = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+    const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+    return across > 2 && down > 3.5 ? [`${one} | ${other}`] : [];
+  }));
+})"""
+OUTSIDE = """() => [...document.querySelectorAll('svg')].flatMap(svg => {
+  const whole = svg.getBoundingClientRect();
+  return [...svg.querySelectorAll('text')].filter(text => {
+    const box = text.getBoundingClientRect();
+    return box.left < whole.left - 2 || box.right > whole.right + 3;
+  }).map(text => text.textContent);
+})"""
+
+
+@pytest.mark.parametrize("width", [1200, 360])
+def test_the_page_fits_its_screen_asks_for_nothing_and_no_words_in_its_pictures_overlap(
+    browser: Any, address: str, width: int
+) -> None:
+    page, complaints = opened(browser, address, width)
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    assert page.evaluate(OVERLAPS) == []
+    assert page.evaluate(OUTSIDE) == []
+    assert complaints == []
+    page.close()
+
+
+def test_names_from_files_are_shown_as_they_are_and_never_become_elements(browser: Any, address: str) -> None:
+    page, complaints = opened(browser, address, 1200)
+    assert page.locator("h1").inner_text() == f"Diagnosis of {HOSTILE}"
+    assert page.locator("img, script, b").count() == 0
+    assert complaints == []
+    page.close()
+
+
+def test_on_paper_the_way_through_the_page_goes_and_the_charts_stay(browser: Any, address: str) -> None:
+    page, _ = opened(browser, address, 1200)
+    page.emulate_media(media="print")
+    assert not page.locator("nav").is_visible()
+    assert page.locator("svg").first.is_visible()
+    page.close()
+
+
+def test_every_picture_says_in_words_what_it_shows(browser: Any, address: str) -> None:
+    page, _ = opened(browser, address, 1200)
+    pictures = page.locator('svg[role="img"]').all()
+    assert len(pictures) == page.locator("svg").count() > 10
+    assert all(len(each.get_attribute("aria-label")) > 15 for each in pictures)
+    page.close()
+
+
+def test_the_verdict_stands_in_two_sentences_with_the_joint_and_the_gain(browser: Any, address: str) -> None:
+    page, _ = opened(browser, address, 1200)
+    verdict = page.locator(".verdict").inner_text()
+    assert "misses" in verdict
+    assert "on data that took no part falls from" in verdict
+    page.close()
+
+
+def test_every_finding_has_its_equation_numbers_and_evidence(found: Diagnosis, texts: dict[str, str]) -> None:
+    page = texts["report.html"]
+    assert found.claims
+    assert page.count('<article class="finding">') == len(found.claims)
+    for claim in found.claims:
+        assert f"<code>{claim.equation}</code>" in page
+    assert page.count("fitted law") >= len(found.claims)
+
+
+def test_the_page_repeats_the_command(texts: dict[str, str]) -> None:
+    assert "armlab diagnose &#x27;a b&#x27; --out c" in texts["report.html"]
+
+
+def test_rivals_say_why_they_cannot_be_told_and_what_would_tell_them(found: Diagnosis) -> None:
+    rivals = (Rival("rotor_inertia", 1, (1,), identical=True), Rival("cable_stiffness", 2, (2,), deficit=0.7))
+    claim = replace(found.claims[0], rivals=rivals, next_experiment="weigh the link")
+    page = report_texts(replace(found, claims=(claim,)))["report.html"]
+    assert "rotor inertia, joint 1: no motion of this arm can tell the two apart" in page
+    assert "cable stiffness, joint 2: on this very motion it fits as well (0.7 units" in page
+    assert "To tell: weigh the link." in page
+
+
+def test_each_picture_is_a_file_that_stands_by_itself(texts: dict[str, str]) -> None:
+    pictures = {name: text for name, text in texts.items() if name.endswith(".svg")}
+    assert {"figures/arm.svg", "figures/errors.svg", "figures/torque_joint3.svg"} <= set(pictures)
+    for text in pictures.values():
+        assert ElementTree.fromstring(text).tag == "{http://www.w3.org/2000/svg}svg"
+        assert text.strip() in texts["report.html"]
+
+
+def test_series_differ_by_more_than_their_colour() -> None:
+    looks = [MEASURED, GIVEN, REFITTED, FOUND, FLOOR]
+    assert len({(each.width, each.dash) for each in looks}) == len(looks)
+
+
+def test_the_terminal_text_is_short_and_names_effect_law_and_gain(found: Diagnosis) -> None:
+    lines = list(terminal_lines(found))
+    assert lines[0].startswith("MISMATCH: ")
+    assert max(map(len, lines)) <= 110
+    assert len(lines) < 60
+    assert found.claims[0].equation in " ".join(line.strip() for line in lines)
+    assert sum("N m" in line and "%" in line for line in lines) >= len(found.fit)
+
+
+def test_files_of_others_in_the_folder_stay_and_nothing_is_left_half_written(found: Diagnosis, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    write_report(found, tmp_path)
+    write_texts(verdict_texts(found, tmp_path), tmp_path)
+    names = {each.name for each in tmp_path.iterdir()}
+    assert names == {"notes.txt", "report.html", "figures", "verdict.json", "model.yaml"}
+    assert json.loads((tmp_path / "verdict.json").read_text())["status"] == "mismatch"
+
+
+def test_where_one_file_cannot_be_written_none_is(found: Diagnosis, tmp_path: Path) -> None:
+    (tmp_path / "figures").write_text("a file where the folder of pictures should be")
+    with pytest.raises(InputError, match="cannot write into"):
+        write_report(found, tmp_path)
+    assert [each.name for each in tmp_path.iterdir()] == ["figures"]
+
+
+def test_a_folder_that_stands_where_a_file_should_stand_stops_all_of_them(found: Diagnosis, tmp_path: Path) -> None:
+    (tmp_path / "report.html").mkdir()
+    with pytest.raises(InputError, match="is a folder, where a file of the verdict should stand"):
+        write_texts(verdict_texts(found, tmp_path) | report_texts(found), tmp_path)
+    assert [each.name for each in tmp_path.rglob("*.*")] == ["report.html"]
+
+
+def test_a_report_is_the_same_when_it_is_written_again(found: Diagnosis, texts: dict[str, str]) -> None:
+    assert report_texts(found, "armlab diagnose 'a b' --out c") == texts
+
+
+def test_what_is_left_is_called_white_or_not_by_how_long_it_remembers_itself(found: Diagnosis) -> None:
+    assert found.observed is not None
+    observed, rng = found.observed, np.random.default_rng(0)
+    low_pass = observed.signals[0].filter
+    white = np.concatenate([low_pass(rng.standard_normal((each.run.samples, 1))) for each in observed.signals])[:, 0]
+    slow = np.convolve(rng.standard_normal(len(white)), np.ones(40), mode="same")
+    expected = filter_memory_seconds(observed)
+    assert 0.3 * expected < memory_seconds(white, 0, observed) < 2.5 * expected
+    assert memory_seconds(slow, 0, observed) > 5 * expected
+
+
+def test_every_link_of_the_page_leads_somewhere(browser: Any, address: str) -> None:
+    page, _ = opened(browser, address, 1200)
+    targets = [each.get_attribute("href") for each in page.locator("nav a").all()]
+    assert targets
+    assert all(page.locator(str(each)).count() == 1 for each in targets)
+    page.close()
+
+
+def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_marked_apart(found: Diagnosis) -> None:
+    claim = replace(found.claims[0], effect="unknown", joint=2, joints=(2,), candidate=None, depends_on=("time",))
+    told = replace(found, claims=(claim,), unexplained=(Unexplained(2, 0.4, ("time",)),))
+    texts = report_texts(told)
+    assert "surrogate" in texts["figures/finding1_unknown.svg"]
+    assert "time from the start of the run, s" in texts["figures/finding1_unknown.svg"]
+    assert UNKNOWN in texts["figures/arm.svg"]
+    assert "something that no known effect explains at joint 2" in texts["report.html"]
+    assert "40 % of the held-out error variance depends on time" in texts["report.html"]
