@@ -21,7 +21,8 @@ TINY_MASS, TINY_INERTIA = 1e-8, 1e-9  # of a body between two joints of one axis
 class Spring:
     """A spring between motor and link of a joint (from 0): N m/rad, N m s/rad; hardening in N m/rad3.
 
-    gap: rad, play within which nothing is transmitted; the stiffness holds beyond it.
+    gap: rad, play within which nothing is transmitted; stiffness and damping are those of its walls then, and MuJoCo
+    takes them by the inertia that they move, 1/s2 and 1/s.
     """
 
     joint: int
@@ -144,13 +145,13 @@ def _link(parent: Any, index: int, pose: Array, joint: Joint, link: Link, rotor:
 
 def _add_spring(body: Any, index: int, kind: Any, spring: Spring) -> None:
     hinge = body.add_joint(name=f"spring{index}", type=kind, axis=(0, 0, 1))
-    hinge.damping[0] = spring.damping
     if spring.gap > 0:  # the play's walls are a limit with stiffness and damping of their own
         hinge.limited = mujoco.mjtLimited.mjLIMITED_TRUE
         hinge.range = (-spring.gap / 2, spring.gap / 2)
         hinge.solref_limit = (-spring.stiffness, -spring.damping)
         hinge.solimp_limit = (0.99, 0.99, 0.001, 0.5, 2)
         return
+    hinge.damping[0] = spring.damping
     hinge.stiffness[0] = spring.stiffness
     hinge.stiffness[2] = spring.hardening
 

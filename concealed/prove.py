@@ -22,13 +22,14 @@ from joblib import Parallel, delayed
 from concealed.manifest import NAME, digest
 from concealed.plan import DEVELOPMENT_SEEDS
 from concealed.score.command import lines, score
+from concealed.score.reading import FAILED
 from concealed.sets import Kind, SetSettings, conceal
 from problem.errors import InputError
 
 QUICK, QUICK_SEED, QUICK_CASES = "quick", 1900, 24
 TIMEOUT_S = 900.0
 LOG = "log.jsonl"
-FAILED, FINISHED = "failed.txt", "finished"
+FINISHED = "finished"
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,13 @@ import numpy as np
 
 from diagnosis.effects.library import library
 from diagnosis.engine.claiming import claims_of
-from diagnosis.engine.evidence import looks_of
+from diagnosis.engine.doubt import doubted, inexact
+from diagnosis.engine.evidence import Evidence, looks_of
 from diagnosis.engine.floor import noise_floor
 from diagnosis.engine.links import link_prior
 from diagnosis.engine.located import located
 from diagnosis.engine.observed import Observed, observe
-from diagnosis.engine.pruning import pruned
+from diagnosis.engine.pruning import Passed, pruned, withdrawn
 from diagnosis.engine.remaining import structured, structures, unknown_claim
 from diagnosis.engine.rounds import Round, begun, coloured, found, inertial_of
 from diagnosis.engine.segments import rows_of
@@ -28,6 +29,8 @@ from diagnosis.summary import summary
 from problem.base_parameters import base_parameters
 from recordings.recording import Recording
 from recordings.run import Array
+
+Left = tuple[Structure, ...]
 
 WORTH_CLOSING = 0.02  # of the noise floor: a smaller gap cannot be measured
 
@@ -62,23 +65,36 @@ def diagnose(
     made = [features(observed, joint, rng) for joint in range(observed.joints)]
     searched = found(begun(bench, library(), progress), made, progress)
     progress("testing claims")
-    model, effects, links = pruned(searched)
-    left = structures(model, made, coloured(model, made))
-    unknowns = [each for each in left if chosen.guards.unknown and structured(each)]
+    model, effects, links, left = _named(pruned(searched), made)
+    unknowns = [each for each in left if structured(each) and not inexact(each, effects)]
     residual = model.residual(model.fit)
     claims = claims_of(model, effects, links) + tuple(unknown_claim(model, each, residual) for each in unknowns)
-    return _told(recording, model, claims, unknowns, made, time.perf_counter() - started)
+    remains = [each for each in left if structured(each)]
+    return _told(recording, model, claims, (unknowns, remains), made, time.perf_counter() - started)
+
+
+def _named(passed: Passed, made: Sequence[Features]) -> tuple[Round, dict[int, Evidence], dict[int, Evidence], Left]:
+    """The model with the names that hold: see `engine.doubt`; and what it leaves. Nothing without the guard."""
+    model, effects, links = passed
+    if not model.bench.settings.guards.unknown:
+        return model, effects, links, ()
+    left = structures(model, made, coloured(model, made))
+    while doubtful := doubted(effects, left):
+        model, effects, links = withdrawn(model, doubtful, "what is left at its joint is no less structured")
+        left = structures(model, made, coloured(model, made))
+    return model, effects, links, left
 
 
 def _told(
     recording: Recording,
     model: Round,
     claims: tuple[Claim, ...],
-    unknowns: list[Structure],
+    structure: tuple[list[Structure], list[Structure]],
     made: Sequence[Features],
     seconds: float,
 ) -> Diagnosis:
-    bench = model.bench
+    """structure: what is a finding `unknown`, and all that remains."""
+    bench, (unknowns, remains) = model.bench, structure
     final = model.residual(model.fit)
     for each in unknowns:
         final[:, each.joint] -= each.prediction
@@ -90,7 +106,7 @@ def _told(
     where = located(start, floor, bench.observed)
     status: Status = "mismatch" if claims else "none"
     unexplained = tuple(
-        Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in unknowns
+        Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
     )
     base, covariance = model.base_parameters()
     return Diagnosis(

@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import solveh_banded
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from recordings.run import Array
 
@@ -70,10 +70,17 @@ class Butterworth(LowPass):
 
     def smooth(self, signal: Array) -> Array:
         """The smoothed signal, (samples, ...)."""
-        sections = _sections(self.cutoff_hz, self.rate_hz)
+        sections, settled = _sections(self.cutoff_hz, self.rate_hz)
         padding = min(int(np.ceil(3 * self.rate_hz / self.cutoff_hz)), len(signal) - 1)
-        moved = np.ascontiguousarray(np.moveaxis(signal, 0, -1))
-        return np.moveaxis(sosfiltfilt(sections, moved, padlen=padding), -1, 0)
+        columns = signal.reshape(len(signal), -1).T
+        before, after = (
+            2 * columns[:, :1] - columns[:, padding:0:-1],
+            2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1],
+        )
+        passed = np.concatenate([before, columns, after], axis=1)
+        for _ in range(2):  # scipy's sosfiltfilt, which finds the settled state anew at each call
+            passed = sosfilt(sections, passed, zi=settled[:, None] * passed[:, :1])[0][:, ::-1]
+        return passed[:, padding : passed.shape[1] - padding].T.reshape(signal.shape)
 
     def response(self, frequency_hz: Array) -> Array:
         """Gain at each frequency: the squared one of a single pass, by the bilinear transform."""
@@ -82,9 +89,10 @@ class Butterworth(LowPass):
 
 
 @lru_cache(maxsize=64)
-def _sections(cutoff_hz: float, rate_hz: float) -> Array:
-    """Second-order sections; kept, for a diagnosis filters thousands of columns alike."""
-    return np.asarray(butter(ORDER, cutoff_hz, fs=rate_hz, output="sos"))
+def _sections(cutoff_hz: float, rate_hz: float) -> tuple[Array, Array]:
+    """Second-order sections and their settled state; kept, for a diagnosis filters thousands of columns alike."""
+    sections = np.asarray(butter(ORDER, cutoff_hz, fs=rate_hz, output="sos"))
+    return sections, np.asarray(sosfilt_zi(sections))
 
 
 @dataclass(frozen=True)

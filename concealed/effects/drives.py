@@ -63,8 +63,8 @@ class Backlash(Hidden):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """A stiff wall on both sides of the play."""
-        shape = {"stiffness": size_of(300, machine, joint), "damping": float(rng.uniform(3e-4, 1e-3))}
+        """Walls on both sides of the play so stiff that they are no elasticity to speak of."""
+        shape = {"hz": float(rng.uniform(60, 110)), "stiffness": size_of(300, machine, joint)}
         return cls(joint, 1e-3, 2e-2, cls.drawn_form(rng), shape)
 
     def parameters(self) -> Values:
@@ -73,10 +73,10 @@ class Backlash(Hidden):
 
     def parts(self) -> Parts:
         """A joint with play between motor and link."""
-        wall, damping = self.shape["stiffness"], self.shape["stiffness"] * self.shape["damping"]
+        pitch, wall = 2 * np.pi * self.shape["hz"], self.shape["stiffness"]
         if self.form == "gap":
-            return Parts((Spring(self.joint, wall, damping, gap=self.size),))
-        return Parts((Spring(self.joint, 0.02 * wall, 0.2 * damping, wall / (self.size / 2) ** 2),))
+            return Parts((Spring(self.joint, pitch**2, 2 * pitch, gap=self.size),))
+        return Parts((Spring(self.joint, 0.02 * wall, 1e-4 * wall, wall / (self.size / 2) ** 2),))
 
 
 class Coupling(Hidden):

@@ -1,4 +1,4 @@
-"""Figures of a score: detection curves, confusion, names by effect, the gap that was closed."""
+"""All figures of a score: detection curves, confusion, names by effect, the gap that was closed, run time."""
 
 from pathlib import Path
 from typing import Any
@@ -6,97 +6,93 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from concealed.score.measures import by_effect, confusion, detection
+from concealed.score.curves import detection_figure, effects_figure
+from concealed.score.matrix import confusion_figure
+from concealed.score.measures import ABOVE
 from concealed.score.rows import Rows
+from concealed.score.style import BLUE, COLOURS, GREY, LIGHT, ORANGE, SKY, figure_of, save
+from concealed.score.tables import by_effect, confusion
 
-COLOURS = {"clean": "#0072B2", "realistic": "#D55E00"}  # Okabe and Ito 2008: told apart by everyone
-MARKS = {"clean": "o", "realistic": "s"}
+WHOLE = ("gap", "seconds", "detection", "detection_by_effect")  # both tiers in one figure
+OF_A_TIER = ("confusion_{}", "confusion_{}_all", "names_{}")
+LINES = {"clean": "-", "realistic": "--"}
 
 
 def draw_all(rows: Rows, folder: Path) -> list[Path]:
-    """Draws every figure into a folder; returns the files."""
-    import matplotlib
-
-    matplotlib.use("Agg")
+    """Draws every figure that has something to show into a folder, in place of older ones; returns the files."""
+    for name in (*WHOLE, *(each.format(tier) for each in OF_A_TIER for tier in COLOURS)):
+        (folder / f"{name}.svg").unlink(missing_ok=True)
     tiers = sorted(set(rows.cases["tier"]))
-    drawn = [_save(_detection(rows, tiers), folder / "detection.svg"), _save(_gap(rows, tiers), folder / "gap.svg")]
+    drawn = [save(_seconds(rows, tiers), folder / "seconds.svg")]
+    if rows.cases["gap_closed"].notna().any():
+        drawn.append(save(_gap(rows, tiers), folder / "gap.svg"))
+    if len(rows.effects):
+        drawn.append(save(detection_figure(rows, tiers), folder / "detection.svg"))
+        drawn.append(save(effects_figure(rows), folder / "detection_by_effect.svg"))
     for tier in tiers:
-        drawn.append(_save(_confusion(confusion(rows, tier), tier), folder / f"confusion_{tier}.svg"))
-        drawn.append(_save(_names(by_effect(rows, tier), tier), folder / f"names_{tier}.svg"))
+        drawn += _of_tier(rows, tier, folder)
     return drawn
 
 
-def _detection(rows: Rows, tiers: list[str]) -> Any:
-    figure, axes = _axes(6.4, 4.0)
-    for tier in tiers:
-        table = detection(rows, tier)
-        table = table[(table["name"] == "named_class") & (table["number"] > 0)]
-        middle = np.sqrt(np.maximum(table["from"], 0.25) * np.minimum(table["to"], 20.0))
-        errors = [table["value"] - table["low"], table["high"] - table["value"]]
-        style = {"color": COLOURS[tier], "marker": MARKS[tier], "capsize": 3, "label": tier}
-        axes.errorbar(middle, table["value"], yerr=errors, **style)
-    axes.axvline(3, color="0.5", linestyle=":")
-    axes.set(xscale="log", ylim=(0, 1.02), xlabel="size, detection limits", ylabel="share with the right name or class")
-    axes.legend(title="95 % Wilson intervals")
-    return figure
+def _of_tier(rows: Rows, tier: str, folder: Path) -> list[Path]:
+    large, drawn = f"{tier} tier, effects above {ABOVE:g} detection limits", []
+    tables = {"": (confusion(rows, tier, ABOVE), large), "_all": (confusion(rows, tier), f"{tier} tier, all sizes")}
+    for suffix, (counts, title) in tables.items():
+        if len(counts):
+            drawn.append(save(confusion_figure(counts, title), folder / f"confusion_{tier}{suffix}.svg"))
+    names = by_effect(rows, tier)
+    if len(names):
+        drawn.append(save(_names(names, large), folder / f"names_{tier}.svg"))
+    return drawn
 
 
 def _gap(rows: Rows, tiers: list[str]) -> Any:
-    figure, axes = _axes(6.4, 4.0)
+    figure, panels = figure_of((8.4, 3.4), columns=2, sharey=True)
+    titles = {
+        "gap_closed": "from rigid links, refitted",
+        "gap_closed_beyond_friction": "from rigid links and plain friction, refitted",
+    }
+    for axes, (column, title) in zip(panels, titles.items(), strict=True):
+        for tier in tiers:
+            closed = rows.cases.loc[rows.cases["tier"] == tier, column].dropna().to_numpy(dtype=np.float64)
+            _cumulative(axes, np.clip(closed, -0.5, 1.1), tier)
+        axes.axvline(0.9, color=GREY, linestyle=":")
+        axes.set(xlabel="share of the gap closed (1: true floor)", xlim=(-0.5, 1.1), ylim=(0, 1.02))
+        axes.set_title(title, fontsize=9)
+    panels[0].set_ylabel("share of cases, cumulative")
+    return figure
+
+
+def _seconds(rows: Rows, tiers: list[str]) -> Any:
+    figure, axes = figure_of((5.4, 3.2))
     for tier in tiers:
-        closed = rows.cases.loc[rows.cases["tier"] == tier, "gap_closed"].dropna().to_numpy(dtype=np.float64)
-        if len(closed):
-            share = np.arange(1, len(closed) + 1) / len(closed)
-            axes.step(
-                np.sort(np.clip(closed, -0.5, 1.1)), share, color=COLOURS[tier], label=f"{tier}, {len(closed)} cases"
-            )
-    axes.axvline(0.9, color="0.5", linestyle=":")
-    axes.set(
-        xlabel="gap closed on the held-out run (1: down to the true floor)", ylabel="share of cases", xlim=(-0.5, 1.1)
-    )
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend()
+        _cumulative(axes, rows.cases.loc[rows.cases["tier"] == tier, "seconds"].dropna().to_numpy(np.float64), tier)
+    axes.set(xlabel="time of a diagnosis, s (one thread)", ylabel="share of cases, cumulative", ylim=(0, 1.02))
+    axes.set_xlim(left=0)
     return figure
 
 
-def _confusion(table: pd.DataFrame, tier: str) -> Any:
-    figure, axes = _axes(1.8 + 0.3 * table.shape[1], 1.6 + 0.26 * table.shape[0])
-    shares = table.div(table.sum(axis=1), axis=0).to_numpy(dtype=np.float64)
-    axes.imshow(shares, cmap="cividis", vmin=0, vmax=1, aspect="auto")
-    for (row, column), count in np.ndenumerate(table.to_numpy()):
-        if count:
-            colour = "black" if shares[row, column] > 0.5 else "white"
-            axes.text(column, row, str(count), ha="center", va="center", fontsize=7, color=colour)
-    axes.set_xticks(range(table.shape[1]), list(table.columns), rotation=90, fontsize=7)
-    axes.set_yticks(range(table.shape[0]), list(table.index), fontsize=7)
-    axes.set(xlabel="said", ylabel="hidden", title=f"{tier} tier, number of effects")
-    return figure
+def _cumulative(axes: Any, values: Any, tier: str) -> None:
+    if len(values):
+        style = {"color": COLOURS[tier], "linestyle": LINES[tier], "label": f"{tier}, {len(values)} cases"}
+        axes.ecdf(values, **style)
+        axes.legend(fontsize=8, frameon=False)
 
 
-def _names(table: pd.DataFrame, tier: str) -> Any:
-    table = table[table["above"] > 0]
-    figure, axes = _axes(6.4, 1.2 + 0.24 * len(table))
+def _names(table: pd.DataFrame, title: str) -> Any:
+    table = table[(table["above"] > 0) | (table["wrong_claims"] > 0)]
+    figure, axes = figure_of((6.8, 1.5 + 0.22 * len(table)))
     places = np.arange(len(table))
-    axes.barh(places, table["above"], color="0.85", label="hidden above three limits")
-    axes.barh(places, table["class"], color="#56B4E9", label="right class")
-    axes.barh(places, table["first"], color="#0072B2", height=0.45, label="right first name")
-    axes.set_yticks(places, list(table["effect"]), fontsize=7)
+    axes.barh(places, table["above"], color=LIGHT, label="hidden")
+    axes.barh(places, table["class"], color=SKY, label="right class (outside: unknown)")
+    axes.barh(places, table["first"], color=BLUE, height=0.4, label="right first name")
+    axes.barh(places, -table["wrong_claims"], color=ORANGE, hatch="///", edgecolor="white", label="claimed wrongly")
+    axes.axvline(0, color="black", lw=0.8)
+    axes.set_yticks(places, [each.replace("_", " ") for each in table["effect"]], fontsize=7.5)
     axes.invert_yaxis()
-    axes.set(xlabel="effects", title=f"{tier} tier")
-    axes.legend(fontsize=7)
+    axes.xaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
+    axes.xaxis.get_major_locator().set_params(integer=True)
+    axes.set_xlabel("effects")
+    axes.set_title(title, fontsize=9, loc="left")
+    axes.legend(fontsize=7.5, frameon=False, loc="upper left", bbox_to_anchor=(1, 1))
     return figure
-
-
-def _axes(width: float, height: float) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots()
-
-
-def _save(figure: Any, path: Path) -> Path:
-    import matplotlib
-
-    with matplotlib.rc_context({"svg.hashsalt": path.stem}):
-        figure.savefig(path, metadata={"Date": None})
-    return path

@@ -7,6 +7,7 @@ from typing import Any
 
 from problem.errors import InputError
 
+FAILED = "failed.txt"  # beside where a verdict should be: what a diagnosis that gave none complained of
 STATUS = ("mismatch", "none", "inconclusive")
 MISSING: dict[str, Any] = {"status": "invalid", "findings": [], "unexplained": [], "fit": []}
 

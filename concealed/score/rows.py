@@ -12,7 +12,8 @@ from concealed.score.reading import Judged
 
 LARGEST_CLASS = 4
 ABOUT = ["case", "tier", "kind"]
-CASE = [*ABOUT, "arm", "noise", "status", "false_claims", "false_unknown", "gap_closed", "gap_source", "seconds"]
+OF_GAP = ["gap_closed", "gap_closed_beyond_friction", "gap_source"]
+CASE = [*ABOUT, "arm", "noise", "status", "false_claims", "false_unknown", *OF_GAP, "seconds"]
 OF_EFFECT = ["effect", "form", "obvious_form", "joint", "outside", "multiple"]
 EFFECT = [*ABOUT, "arm", *OF_EFFECT, "named_first", "named_class", "class_size", "right_joint", "answered"]
 CLAIM = [*ABOUT, "effect", "joint", "category", "class_size"]
@@ -42,21 +43,27 @@ def rows(cases: list[Judged]) -> Rows:
     return Rows(*(pd.DataFrame(each, columns=names) for each, names in zip(frames, columns, strict=True)))
 
 
+def records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a frame, each by the names of its columns."""
+    return [dict(zip(map(str, frame.columns), row, strict=True)) for row in frame.itertuples(index=False)]
+
+
 def _about(case: Judged) -> dict[str, Any]:
     return {"case": case.name, "tier": case.truth["tier"], "kind": case.truth["kind"]}
 
 
 def _case(case: Judged) -> dict[str, Any]:
     categories = [category(case, finding) for finding in case.findings]
-    closed, source = gap_closed(case)
+    gap = gap_closed(case)
     return _about(case) | {
         "arm": case.truth["arm"],
         "noise": case.truth["noise"]["kind"],
         "status": case.verdict["status"],
         "false_claims": sum(each in ("wrong", "misplaced", "unknown") for each in categories),
         "false_unknown": case.says_unknown and not case.truth["injected"],
-        "gap_closed": closed,
-        "gap_source": source,
+        "gap_closed": gap.closed,
+        "gap_closed_beyond_friction": gap.beyond,
+        "gap_source": gap.source,
         "seconds": case.seconds,
     }
 

@@ -11,7 +11,7 @@ from diagnosis.effects.term import CERTAIN, EveryJoint, Term, number
 from problem.arm import Arm
 from recordings.run import Array
 
-LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)  # of the highest torque that the model predicts
+LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.97, 0.985)  # of the model's highest torque
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ with the Stribeck curve g; their torque is stiffness z. Written over the way of 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import accumulate
 from typing import Any, Self
 
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from diagnosis.effects.contract import Scene, Value
 from diagnosis.effects.direction import PARTS, mean_within, within
@@ -31,7 +31,6 @@ class DahlFriction(Term):
     effect = "presliding_hysteresis"
     form = "Dahl"
     names = ("level", "stiffness")
-    replaces = ("coulomb_friction",)
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -72,7 +71,7 @@ class LuGreFriction(Term):
     effect = "presliding_hysteresis"
     form = "LuGre"
     names = ("level", "stiffness", "static_level", "velocity")
-    replaces = ("coulomb_friction", "stribeck_friction")
+    replaces = ("stribeck_friction",)
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -152,8 +151,9 @@ def lugre_state(position: Array, curve: Array, way: float) -> Array:
     steps = np.diff(position, prepend=position[0])
     between = np.append(curve[0], (curve[1:] + curve[:-1]) / 2)
     decay = np.exp(-np.abs(steps) / (way * between))
-    inputs = zip(decay.tolist(), (np.sign(steps) * between * (1 - decay)).tolist(), strict=True)
-    return np.fromiter(accumulate(inputs, lambda z, step: step[0] * z + step[1], initial=0.0), float)[1:]
+    bands = np.vstack([np.ones(len(decay)), np.append(-decay[1:], 0.0)])  # z_k - decay_k z_(k-1) = input_k, all at once
+    solved, _ = dtbtrs(bands, (np.sign(steps) * between * (1 - decay))[:, None], uplo="L")
+    return np.asarray(solved[:, 0])
 
 
 PRESLIDING = EveryJoint("presliding_hysteresis", (DahlFriction, LuGreFriction))

@@ -53,8 +53,8 @@ class PointPayload(LinkTerm):
 
     @classmethod
     def shown(cls, arm: Arm, link: int) -> bool:
-        """Whether the arm feels where on the link a mass is."""
-        return bool({1, 2, 3} & set(felt_parameters(arm, link)[0]))
+        """On the flange alone, if it feels where a mass is: elsewhere a small mass is a wrong number of the link."""
+        return link == len(arm) and bool({1, 2, 3} & set(felt_parameters(arm, link)[0]))
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from diagnosis.engine.folds import Folds, Gain, folds_of, gain_of
 from diagnosis.engine.links import Widths
 from diagnosis.engine.plausible import implausible
+from diagnosis.engine.pushes import no_push
 from diagnosis.engine.refine import precision_of
 from diagnosis.engine.robust import Scatter, block_numbers, scatter, whitened_rows
 from diagnosis.engine.rounds import Round
@@ -19,8 +20,6 @@ from recordings.run import Array
 WIDER = 3.0  # times the widest link
 EXCITED = 0.25  # of the mean square in identification
 LITTLE = 0.002  # of the validation error
-PUSHED = 0.3  # of a push's peak
-PUSH_S = 0.15  # s in motion: a shorter push is a reversal
 SPECIAL = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
            "friction_drift", "load_dependent_friction")  # fmt: skip
 SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
@@ -93,7 +92,7 @@ class Judge:
                 evidence = self._beyond_usual(group)
             if candidate.effect in ONCE:
                 evidence = replace(evidence, repeatable=False)
-                objection = self._pushed_at_rest(group)
+                objection = self._pushed(group)
             out[group] = replace(evidence, objection=objection, usual=candidate.effect in EXPECTED)
         return out
 
@@ -145,15 +144,13 @@ class Judge:
         block = wider.inverse[np.ix_(place, place)]
         return float(chi2.sf(values @ np.linalg.pinv(block, hermitian=True) @ values, solver.ranks[group]))
 
-    def _pushed_at_rest(self, group: int) -> str | None:
-        """Against a push: that the joint stood still, or turned, for most of it."""
+    def _pushed(self, group: int) -> str | None:
+        """Against a push: see `engine.pushes`."""
         found, candidate = self.found, self.found.solver.groups[group].candidate
         joint, column = candidate.rows[0], int(self.found.solver.groups[group].columns[0])
         own = found.columns.matrices[joint][:, int(np.flatnonzero(found.columns.index[joint] == column)[0])]
-        pushed = np.abs(own) > PUSHED * np.abs(own).max()
-        moving = pushed & rows_of(found.bench.observed.used(joint), len(own))
-        seconds = float(np.sum(moving)) / found.bench.observed.rate_hz
-        return None if seconds > PUSH_S and moving.sum() > 0.5 * pushed.sum() else "the joint hardly moves during it"
+        push, observed = own * found.coefficients(found.fit)[column], found.bench.observed
+        return no_push(push, joint, observed, observed.torque[:, joint] - found.residual_at(joint, found.fit) - push)
 
     def simpler(self, group: int) -> tuple[int, ...]:
         """Usual friction that a special law of friction has to be better than."""

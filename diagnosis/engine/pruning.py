@@ -55,6 +55,23 @@ def pruned(found: Round) -> Passed:
         state = again
     else:
         state, effects, banned = _passing(found, state, banned, steps)
+    return _closed(found, (state, effects, banned), steps)
+
+
+def withdrawn(found: Round, groups: frozenset[int], why: str) -> Passed:
+    """The same without some groups, and without what no longer passes; usual friction in the place of special laws."""
+    judge, steps = Judge(found, found.state), list(found.steps)
+    for group in groups:
+        candidate = found.solver.groups[group].candidate
+        steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    back = {other for group in groups for other in judge.simpler(group)}
+    state = State(tuple(sorted(set(found.state.groups) - groups | back)), found.state.widths)
+    return _closed(found, _passing(found, state, groups, steps), steps)
+
+
+def _closed(found: Round, passed: tuple[State, dict[int, Evidence], frozenset[int]], steps: list[Step]) -> Passed:
+    """With the links that pass; where they do not, everything is tested again with links as simulated."""
+    state, effects, banned = passed
     state, links = _links(found, state, steps)
     if links is None:
         state, effects, banned = _passing(found, state, banned, steps)

@@ -84,12 +84,19 @@ def test_an_effect_shows_in_its_direction_at_its_joint_alone(kind: type[Hidden],
         assert others.max() < 0.05 * np.sqrt(np.mean(left[:, J] ** 2))
 
 
-@pytest.mark.parametrize("kind", [Payload, LinkError, Tilt, Geometry, EncoderOffset, Elasticity, Backlash])
+@pytest.mark.parametrize("kind", [Payload, LinkError, Tilt, Geometry, EncoderOffset, Elasticity])
 def test_bodies_and_drives_leave_more_than_the_noise(kind: type[Hidden]) -> None:
     made = case(_drawn(kind))
     left, *_ = residual(made)
     assert np.sqrt(np.mean(left[:, J] ** 2)) > 0.2 * made.plan.noise.level[J]
     assert made.multiples[0] > 1
+
+
+def test_play_shows_where_the_load_changes_its_sign() -> None:
+    wide = case(_drawn(Backlash, "gap").sized(0.01))
+    assert wide.multiples[0] > 5
+    shut = case(_drawn(Backlash, "gap").sized(1e-6))
+    assert shut.multiples[0] < 0.1 * wide.multiples[0]  # its walls are no elasticity to speak of
 
 
 def test_a_payload_adds_its_weight_and_its_inertia() -> None:

@@ -1,59 +1,20 @@
 """Scores of verdicts that were written by hand."""
 
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
+from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
 from concealed.score.matching import category
-from concealed.score.measures import Measure, by_effect, confusion, detection, measures, wilson
-from concealed.score.reading import Judged
+from concealed.score.measures import Measure, measures, wilson
 from concealed.score.rows import Rows, rows
-
-
-def effect(
-    name: str, joint: int | None, multiple: float = 8.0, outside: bool = False, **values: float
-) -> dict[str, Any]:
-    parameters = {key: {"value": value, "unit": "1", "comparable": True} for key, value in values.items()}
-    about: dict[str, Any] = {"equivalent": []}
-    about |= {"form": "x", "obvious_form": True, "size": 1.0, "shape": {}, "target": multiple, "joints": [joint]}
-    return {"effect": name, "joint": joint, "outside": outside, "multiple": multiple, "parameters": parameters, **about}
-
-
-def truth(
-    *injected: dict[str, Any], kind: str = "single", background: tuple[dict[str, Any], ...] = (), cad: int = 0
-) -> dict[str, Any]:
-    return {
-        "case": "c",
-        "tier": "clean",
-        "kind": kind,
-        "arm": "irb120-arm",
-        "joints": 3,
-        "injected": list(injected),
-        "background": list(background),
-        "cad_errors": [{"effect": "inertial_parameter_error", "joint": link} for link in range(1, cad + 1)],
-        "absorbed_rotors": [1, 2],
-        "noise": {"kind": "white"},
-    }
-
-
-def judged(answer: dict[str, Any], said: dict[str, Any], name: str = "c") -> Judged:
-    return Judged({**answer, "case": name}, said, Path("none"), Path("none"), Path("none"), 2.0)
-
-
-def scored(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> Rows:
-    return rows([judged(answer, said, f"c{number}") for number, (answer, said) in enumerate(pairs)])
+from concealed.score.tables import by_effect, confusion, detection
 
 
 def measured(table: Rows, start: str) -> Measure:
     return next(each for each in measures(table, "clean") if each.name.startswith(start))
-
-
-NULL = truth(kind="null")
-COULOMB = truth(effect("coulomb_friction", 2, level=2.0))
-OUTSIDE = truth(effect("viscous_map", 1, outside=True), kind="outside")
 
 
 def test_perfect_verdicts_score_perfectly() -> None:

@@ -15,8 +15,9 @@ from concealed.cli import score as score_command
 from concealed.manifest import NAME, checked_manifest, digest
 from concealed.noise import JUDGED, USUAL
 from concealed.plan import DEVELOPMENT_SEEDS, SMALLEST, draw_plan, target_multiple
-from concealed.prove import FAILED, diagnose_all, judged_seed
+from concealed.prove import diagnose_all, judged_seed
 from concealed.score.command import score
+from concealed.score.reading import FAILED
 from concealed.sets import SetSettings, conceal, settings_for
 from problem.errors import InputError
 from recordings.load import load_recording

@@ -8,11 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from recording_folders import ARM, POSITION, RATE_HZ, TORQUE, frame, motion_at
+from scipy.signal import butter, sosfiltfilt
 
 from problem.regressor import observation_matrix, rigid_body_torque
 from recordings.cutoff import choose_cutoff
 from recordings.differentiate import differentiate
-from recordings.filters import Butterworth, LowPass, SmoothingSpline
+from recordings.filters import ORDER, Butterworth, LowPass, SmoothingSpline
 from recordings.periods import Harmonics, average_periods, find_period
 from recordings.resample import evened
 from recordings.run import Run
@@ -166,3 +167,11 @@ def test_the_scatter_of_the_periods_gives_the_covariance_of_the_averaged_torque(
     errors = np.concatenate([signals.torque - exact for signals in found])
     claimed = np.mean([signals.torque_covariance for signals in found], axis=0)
     assert_allclose(claimed, errors.T @ errors / len(errors), atol=0.1 * claimed.max())
+
+
+@pytest.mark.parametrize("shape", [(900,), (900, 3), (900, 3, 2)])
+def test_butterworth_is_scipys_sosfiltfilt_to_the_bit(shape: tuple[int, ...]) -> None:
+    signal = np.random.default_rng(1).normal(size=shape).cumsum(axis=0)
+    sections = butter(ORDER, 20, fs=250, output="sos")
+    theirs = sosfiltfilt(sections, signal, axis=0, padlen=38)
+    np.testing.assert_array_equal(Butterworth(250, 20, 900).smooth(signal), theirs)
