@@ -38,6 +38,7 @@ _COMMANDS = {
     "gains": "identification.cli:gains",
     "export-model": "diagnosis.cli:export_model",
     "real": "diagnosis.cli:real",
+    "real-concealed": "diagnosis.cli:real_concealed",
     "coverage": "identification.cli:coverage",
     "diagnose": "diagnosis.cli:diagnose",
     "confusability": "diagnosis.cli:confusability",

@@ -36,6 +36,7 @@ def _is_first(folder: int) -> bool:
 def _scattered(entries: Sequence[Entry]) -> Iterator[Entry]:
     chance = random.Random()  # unlike that of every other runner; no outcome depends on it
     starts = range(0, len(entries), _BLOCK)
-    for start in sorted(starts, key=lambda start: (2 * start < len(entries), chance.random())):  # where the first is not
+    late = sorted(starts, key=lambda start: (2 * start < len(entries), chance.random()))  # where the first is not yet
+    for start in late:
         block = entries[start : start + _BLOCK]
         yield from chance.sample(block, len(block))  # two runners in one block are not in step either

@@ -2,61 +2,78 @@
 
 import json
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from joblib import Parallel, delayed
+
 from concealed.manifest import NAME, digest
-from concealed.prove import FINISHED, development_proof, diagnose_all
-from concealed.score.command import score
+from concealed.prove import FINISHED, development_proof
+from concealed.score.command import counted
 from concealed.sets import conceal
 
-ALL_ON = "all guards on"
+DONE, ORDER = "done", "guards.txt"  # beside the verdicts: marks of finished cases, and the guards in their order
+TOLD = 10  # cases: how often it is said how far it is
 SHOWN = (
     "false claims on nulls",
     "false claims on decoys",
     "wrong names among claims",
     "right name or class of four, above 3 limits",
     "unknown on effects outside, above 3 limits",
-    "seconds a case (median)",
 )
+Verdicts = Callable[[Path], dict[str, dict[str, Any]]]
 
 
 @dataclass(frozen=True)
 class Ablation:
-    """A development set and the guards that are switched off in turn, as `armlab diagnose --without` names them."""
+    """A development set."""
 
     seed: int
     cases: int
     nulls: int
-    guards: tuple[str, ...]
 
 
-def ablate(settings: Ablation, work: Path, results: Path, jobs: int) -> Iterator[str]:
+def ablate(settings: Ablation, diagnose: Verdicts, work: Path, results: Path, jobs: int) -> Iterator[str]:
     """Does what is missing, tells how far it is, and writes guards.md and guards.json into `results`.
 
+    diagnose: given a recording folder, verdicts by the name of the guard that is off, the one with all on first.
     What was interrupted goes on; what was finished is diagnosed anew.
     """
     if (work / FINISHED).is_file():
         shutil.rmtree(work)
     proof = development_proof(settings.seed, settings.cases, settings.nulls)
     found: dict[str, dict[str, Any]] = {}
-    for guard in (ALL_ON, *settings.guards):
-        found[guard] = {}
-        for name, each in proof.sets.items():
-            folder, verdicts = work / name, work / "verdicts" / guard.replace(" ", "_") / name
-            list(conceal(each, folder, jobs))
-            cases = json.loads((folder / NAME).read_text(encoding="utf-8"))["cases"]
-            options = () if guard == ALL_ON else ("--without", guard)
-            list(diagnose_all(folder, verdicts, cases, jobs, options))
-            found[guard][name] = score(folder, verdicts, digest(folder / NAME), verdicts / "score")["tiers"]
-        yield f"{guard}: diagnosed {settings.cases + settings.nulls} cases"
+    for name, each in proof.sets.items():
+        folder, verdicts = work / name, work / "verdicts" / name
+        list(conceal(each, folder, jobs))
+        cases = json.loads((folder / NAME).read_text(encoding="utf-8"))["cases"]
+        missing = [case for case in cases if not (verdicts / DONE / case).is_file()]
+        todo = (delayed(_verdicts)(diagnose, folder / "observations" / case, verdicts) for case in missing)
+        for number, _ in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(todo), 1):
+            if number % TOLD == 0:
+                yield f"{name}: diagnosed {number} of {len(missing)}"
+        for guard in (verdicts / ORDER).read_text(encoding="utf-8").splitlines():
+            score = counted(folder, verdicts / guard, digest(folder / NAME))[2]
+            found.setdefault(guard, {})[name] = score["tiers"]
     results.mkdir(parents=True, exist_ok=True)
     (results / "guards.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
     (results / "guards.md").write_text(page(settings, found), encoding="utf-8")
     (work / FINISHED).touch()
     yield f"wrote {results / 'guards.md'}"
+
+
+def _verdicts(diagnose: Verdicts, observation: Path, verdicts: Path) -> None:
+    """Writes a case's verdicts, a folder a guard; the mark that it is done comes last."""
+    found = diagnose(observation)
+    for guard, verdict in found.items():
+        own = verdicts / guard / observation.name
+        own.mkdir(parents=True, exist_ok=True)
+        (own / "verdict.json").write_text(json.dumps(verdict) + "\n", encoding="utf-8")
+    (verdicts / ORDER).write_text("\n".join(found) + "\n", encoding="utf-8")
+    (verdicts / DONE).mkdir(exist_ok=True)
+    (verdicts / DONE / observation.name).touch()
 
 
 def page(settings: Ablation, found: dict[str, dict[str, Any]]) -> str:
@@ -72,8 +89,7 @@ def page(settings: Ablation, found: dict[str, dict[str, Any]]) -> str:
 
 
 def _row(guard: str, sets: dict[str, Any], tier: str) -> str:
-    name = ALL_ON if guard == ALL_ON else guard.replace("_", " ")
-    return f"| {name} | {' | '.join(_cell(what, sets, tier) for what in SHOWN)} |"
+    return f"| {guard.replace('_', ' ')} | {' | '.join(_cell(what, sets, tier) for what in SHOWN)} |"
 
 
 def _cell(what: str, sets: dict[str, Any], tier: str) -> str:

@@ -104,25 +104,20 @@ def prove(proof: Proof, work: Path, results: Path, jobs: int) -> Iterator[str]:
     (work / FINISHED).touch()
 
 
-def diagnose_all(
-    folder: Path, verdicts: Path, cases: list[str], jobs: int, options: tuple[str, ...] = ()
-) -> Iterator[str]:
-    """Diagnoses the cases that have no verdict yet, each in its own process; tells their names as they are done.
-
-    options: more of the command line, the same for every case.
-    """
+def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int) -> Iterator[str]:
+    """Diagnoses the cases that have no verdict yet, each in its own process; tells their names as they are done."""
     missing = [case for case in cases if not any((verdicts / case / name).is_file() for name in ("time.json", FAILED))]
-    work = (delayed(_diagnose)(folder / "observations" / case, verdicts / case, options) for case in missing)
+    work = (delayed(_diagnose)(folder / "observations" / case, verdicts / case) for case in missing)
     yield from Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(work)
 
 
-def _diagnose(observation: Path, out: Path, options: tuple[str, ...]) -> str:
+def _diagnose(observation: Path, out: Path) -> str:
     """One diagnosis; the time is written last and says that the verdict is whole."""
     out.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as desk:
         copy = shutil.copytree(observation, Path(desk) / observation.name)
         start = time.monotonic()
-        command = [sys.executable, "-m", "bench.cli", "diagnose", str(copy), "--out", str(out.resolve()), *options]
+        command = [sys.executable, "-m", "bench.cli", "diagnose", str(copy), "--out", str(out.resolve())]
         complaint = _complaint(command)
         seconds = time.monotonic() - start
     if complaint is not None:

@@ -68,6 +68,20 @@ real = click.Command(
 )
 
 
+@click.command("real-concealed")
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--only", multiple=True, help="Name of a public recording [default: all].")
+def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> None:
+    """Conceal something in public recordings of real arms, diagnose them, and judge: concealed.md, .csv and .svg."""
+    from diagnosis.real_concealed.command import conceal_in_real
+
+    with Progress() as progress:
+        for line in conceal_in_real(results, recordings, only, progress.tell):
+            progress.clear()
+            click.echo(line)
+
+
 @click.command()
 @click.argument("robot")
 @click.argument("trajectory")

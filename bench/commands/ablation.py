@@ -16,7 +16,7 @@ def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: i
     """Diagnose concealed cases with each guard off in turn: what is it worth? (extra `engines`)"""
     from concealed.ablation import Ablation
     from concealed.ablation import ablate as run
-    from diagnosis.settings import GUARDS
+    from diagnosis.ablation import verdicts_without_each
 
-    for line in run(Ablation(seed, cases, nulls, GUARDS), work, results, jobs):
+    for line in run(Ablation(seed, cases, nulls), verdicts_without_each, work, results, jobs):
         click.echo(line)

@@ -15,9 +15,27 @@ from problem.errors import InputError
 from recordings.run import Array
 
 KINDS = ("designed", "random", "condition")
-ATTEMPTS = 40
+ATTEMPTS = 25
 FIRST = "first"
 FAILURES = (InputError, ValueError, ArithmeticError)  # of what is judged
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What a design expects of a motion for one question: the names, and the chances to end right, wrong and open."""
+
+    names: frozenset[Place]
+    right: float
+    wrong: float
+    open: float
+
+
+@dataclass(frozen=True, eq=False)
+class Moved:
+    """A second motion, (samples, 1 + joints), s and rad, and what is expected of it."""
+
+    motion: Array
+    forecasts: tuple[Forecast, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -25,13 +43,22 @@ class Tools:
     """What is judged, reached through functions that see the folder of a recording and never the truth.
 
     diagnose: (recording, out) writes out/verdict.json. suspect: (verdict, robot, recording) tells groups of names that
-    may be taken for each other. move: (kind, verdict, robot, recording, seed) gives a second motion, (samples,
-    1 + joints), s and rad, None where none can help.
+    may be taken for each other. move: (kind, verdict, robot, recording, seed) gives a second motion, None where none
+    can help.
     """
 
     diagnose: Callable[[Path, Path], None]
     suspect: Callable[[Path, Path, Path], Sequence[Sequence[Any]]]
-    move: Callable[[str, Path, Path, Path, int], Array | None]
+    move: Callable[[str, Path, Path, Path, int], Moved | None]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a second motion ended; why: what went wrong, if anything; forecast: what was expected, where anything was."""
+
+    end: str
+    why: str = ""
+    forecast: Forecast | None = None
 
 
 @dataclass(frozen=True)
@@ -83,13 +110,20 @@ def play_case(seed: int, number: int, out: Path, tools: Tools) -> dict[str, Any]
             passed.append({"pair": drawn.pair, "start": start})
             continue
         found = {kind: _second(kind, recorded, folders, tools, truth, suspected, seed + number) for kind in KINDS}
-        ends = {kind: end for kind, (end, _) in found.items()}
-        failed = {kind: why for kind, (_, why) in found.items() if why}
         about = {"tier": drawn.plan.tier, "pair": drawn.pair, "multiple": recorded.simulated.multiples[0]}
-        names = sorted(suspected, key=str)
-        return {"case": number, "name": folders.name, **about, "start": start, "suspected": names, "ends": ends,
-                "failed": failed, "passed": passed}  # fmt: skip
+        return {"case": number, "name": folders.name, "attempt": attempt, "hidden": list(truth.hidden), **about,
+                "start": start, "suspected": sorted(suspected, key=str), **_told(found), "passed": passed}  # fmt: skip
     return {"case": number, "name": folders.name, "ends": {}, "passed": passed}
+
+
+def _told(found: dict[str, Ended]) -> dict[str, Any]:
+    """The ends, what failed, and what was expected: chances to end right, wrong and open."""
+    expected = {kind: each.forecast for kind, each in found.items()}
+    return {
+        "ends": {kind: each.end for kind, each in found.items()},
+        "failed": {kind: each.why for kind, each in found.items() if each.why},
+        "forecast": {kind: [each.right, each.wrong, each.open] for kind, each in expected.items() if each},
+    }
 
 
 def _first(recorded: Recorded, folders: Folders, tools: Tools) -> tuple[dict[str, Any], Truth]:
@@ -125,25 +159,26 @@ def _second(
     truth: Truth,
     suspected: frozenset[Place],
     seed: int,
-) -> tuple[str, str]:
-    """How it ended, and what went wrong: where the diagnosis or the design fails, the question stays open."""
+) -> Ended:
+    """How it ended: where the diagnosis or the design fails, the question stays open."""
     first = folders.observation(FIRST)
     try:
-        motion = tools.move(kind, folders.verdict(FIRST) / "verdict.json", first / "limits.yaml", first, seed)
+        moved = tools.move(kind, folders.verdict(FIRST) / "verdict.json", first / "limits.yaml", first, seed)
     except FAILURES as error:
-        return "open", str(error)
-    if motion is None:
-        return "open", ""  # the design says that no motion helps
+        return Ended("open", str(error))
+    if moved is None:
+        return Ended("open")  # the design says that no motion helps
+    forecast = next((each for each in moved.forecasts if truth.hidden in each.names), None)
     try:
-        both = second_recording(recorded, motion, kind)
+        both = second_recording(recorded, moved.motion, kind)
     except FloatingPointError:
-        return "ran away", ""
+        return Ended("ran away")
     write_recording(both, folders.observation(kind), folders.truth(kind))
     try:
         tools.diagnose(folders.observation(kind), folders.verdict(kind))
     except FAILURES as error:
-        return "open", str(error)
-    return end_of(_read(folders.verdict(kind) / "verdict.json"), truth, suspected), ""
+        return Ended("open", str(error), forecast)
+    return Ended(end_of(_read(folders.verdict(kind) / "verdict.json"), truth, suspected), "", forecast)
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -30,7 +30,7 @@ PAIRS = (  # (hidden, what it is taken for); what no motion can leave alone is n
 )
 TIERS: tuple[Tier, ...] = ("clean", "realistic")
 REALISTIC = 0.3  # of the draws
-MULTIPLES = (1.0, 4.0)  # detection limits that the hidden effect has in the first recording
+MULTIPLES = (1.0, 2.5)  # detection limits that the hidden effect has in the first recording
 
 
 @dataclass(frozen=True, eq=False)

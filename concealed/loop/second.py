@@ -21,7 +21,7 @@ from concealed.track import Track
 from problem.motion import Motion
 from recordings.run import Array
 
-CELL = 0.5
+CELL = 0.35  # of the speeds, accelerations and ranges: a narrow cell, alike for all kinds of second motion
 
 
 @dataclass(frozen=True, eq=False)

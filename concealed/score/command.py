@@ -11,7 +11,7 @@ from concealed.score.gallery import write_gallery
 from concealed.score.measures import Measure, measures
 from concealed.score.misses import misses
 from concealed.score.page import page, shown
-from concealed.score.reading import judged
+from concealed.score.reading import Judged, judged
 from concealed.score.rows import Rows, rows
 from concealed.score.tables import confusion, detection, detection_by_effect
 
@@ -24,19 +24,8 @@ def score(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> dict[s
     sealed: SHA-256 of the manifest as printed. Raises InputError for a set that was changed since, and where there
     is no verdict at all.
     """
-    manifest, found = checked_manifest(folder, sealed)
-    cases = judged(folder, verdicts, manifest["cases"])
-    table = rows(cases)
-    tiers = sorted(set(table.cases["tier"]))
-    result = {
-        "schema": "score/1",
-        "manifest": found,
-        "seed": manifest["seed"],
-        "kind": manifest["kind"],
-        "development": manifest["development"],
-        "cases": len(table.cases),
-        "tiers": {tier: [asdict(each) for each in measures(table, tier)] for tier in tiers},
-    }
+    cases, table, result = counted(folder, verdicts, sealed)
+    tiers = sorted(result["tiers"])
     out.mkdir(parents=True, exist_ok=True)
     (out / FILE).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     missed = misses(cases, table)
@@ -46,6 +35,23 @@ def score(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> dict[s
     drawn = [path.stem for path in draw_all(table, out)]
     (out / "score.md").write_text(page(table, result, missed, drawn), encoding="utf-8")
     return result
+
+
+def counted(folder: Path, verdicts: Path, sealed: str | None) -> tuple[list[Judged], Rows, dict[str, Any]]:
+    """The cases, their rows and what score.json holds; nothing is written. Raises InputError as `score` does."""
+    manifest, found = checked_manifest(folder, sealed)
+    cases = judged(folder, verdicts, manifest["cases"])
+    table = rows(cases)
+    result = {
+        "schema": "score/1",
+        "manifest": found,
+        "seed": manifest["seed"],
+        "kind": manifest["kind"],
+        "development": manifest["development"],
+        "cases": len(table.cases),
+        "tiers": {tier: [asdict(each) for each in measures(table, tier)] for tier in sorted(set(table.cases["tier"]))},
+    }
+    return cases, table, result
 
 
 def lines(result: dict[str, Any]) -> list[str]:

@@ -16,18 +16,16 @@ from recordings.run import Array
 def noise_floor(final: Array, made: Sequence[Features], observed: Observed) -> Array:
     """RMS (joints,), N m (N), of the noise of the filtered torque.
 
-    final: (rows, joints), what the model leaves. Where runs repeat their motion, the scatter between repetitions,
-    which owes nothing to any model. Else what the model leaves less what a surrogate can foretell of it: structure
-    that nobody has named yet is no noise.
+    final: (rows, joints), what the model leaves. What it leaves less what a surrogate can foretell of it: structure
+    that nobody has named yet is no noise. Where runs repeat their motion, the scatter between repetitions, which owes
+    nothing to any model; but noise is no more than what the model leaves (a disturbance may come at every other time).
     """
-    scatter = [each for each in map(period_scatter, observed.signals) if each is not None]
-    if scatter:
-        return np.asarray(np.sqrt(np.mean(np.square(scatter), axis=0)))
     floor = np.empty(final.shape[1])
     for joint, features in enumerate(made):
         left = final[:, joint] - predictable(final[:, joint], joint, features, observed)
         floor[joint] = np.sqrt(np.mean(left[rows_of(observed.used(joint), observed.rows)] ** 2))
-    return floor
+    scatter = [each for each in map(period_scatter, observed.signals) if each is not None]
+    return np.minimum(floor, np.sqrt(np.mean(np.square(scatter), axis=0))) if scatter else floor
 
 
 def period_scatter(signals: Signals) -> Array | None:

@@ -62,8 +62,13 @@ class LinkPrior:
         return self.grouping[:, 10 * link : 10 * link + 10]
 
 
+def are_bodies(inertial: Array) -> bool:
+    """Whether links with parameters (10 * joints,) all have a mass: those of a model of base parameters have not."""
+    return bool(np.all(inertial[::10] > 0))
+
+
 def link_prior(arm: Arm, base: BaseParameters, inertial: Array) -> LinkPrior:
-    """The prior about nominal links with parameters (10 * joints,)."""
+    """The prior about nominal links with parameters (10 * joints,), all of them bodies."""
     links = tuple(Link(float(ten[0]), tuple(ten[1:4]), tuple(ten[4:])) for ten in inertial.reshape(-1, 10))
     nominal = Arm(arm.name, arm.joints, links, arm.gravity)
     metric = information(regular_nominal(nominal))

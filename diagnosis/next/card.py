@@ -27,6 +27,8 @@ def lines(experiment: Experiment) -> Iterator[str]:
     for number, found in enumerate(experiment.chances):
         if found is not None:
             yield _told(found, experiment, number)
+    budget = experiment.budget
+    yield f"designed in {experiment.seconds:.1f} s with {budget.evaluations} evaluations of {budget.algorithm}"
 
 
 def runs_needed(pair: Pair) -> int:

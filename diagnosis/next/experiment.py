@@ -123,8 +123,7 @@ def _chances(
 ) -> Chances | None:
     if problem is None or point is None or not question.pairs:
         return None
-    rows = problem.samples // 2 * len(problem.arm)
-    return chances(prepared, question, problem.moments(point).gram, rows, generator("chances", budget))
+    return chances(prepared, question, problem.moments(point).gram, problem.rows, generator("chances", budget))
 
 
 def _pairs(

@@ -6,7 +6,8 @@ import numpy as np
 
 from diagnosis.effects.contract import Scene
 from diagnosis.engine.noise import noise_of
-from diagnosis.engine.observed import Observed, observe
+from diagnosis.engine.observed import WIDER, Observed, observe
+from diagnosis.engine.segments import CERTAIN, CREEP, HIGH
 from diagnosis.next.moments import Index, Moments
 from diagnosis.next.present import Present
 from diagnosis.next.question import Layout
@@ -14,8 +15,9 @@ from diagnosis.next.sampling import Sampling, kept_columns
 from diagnosis.next.whitening import Whitening
 from diagnosis.settings import Settings
 from problem.regressor import rigid_body_torque
+from recordings.cutoff import acceleration_spectrum, noise_level
 from recordings.recording import Recording
-from recordings.run import Array
+from recordings.run import Array, Role
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +30,13 @@ class FirstRun:
 
     @property
     def rows(self) -> int:
-        """Kept rows of all joints."""
-        return self.observed.rows * self.observed.joints
+        """Kept rows of all joints from which a diagnosis learns."""
+        return sum(each.stop - each.start for each in self.observed.of_role("identify")) * self.observed.joints
+
+    @property
+    def counted(self) -> float:
+        """Share of one more run from which a diagnosis will learn: where no run validates, stretches of all do."""
+        return 2 / 3 if self.observed.held_out_blocks else 1.0
 
     def columns(self, layout: Layout) -> Array:
         """All columns at the kept rows, (rows, joints, columns)."""
@@ -41,15 +48,29 @@ class FirstRun:
     def sampling(self, columns: Array, fitted: Index) -> Sampling:
         """The filter and the noise that is left when the fitted columns are taken out."""
         noise = noise_of(self._residual(columns[:, :, fitted]), self.observed, len(fitted) / self.observed.joints)
-        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, Whitening(noise.taps, noise.scales))
+        whitening = Whitening(noise.taps, noise.scales)
+        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, whitening, self._standing())
 
-    def moments(self, columns: Array, noise: Whitening) -> Moments:
-        """Of all runs, in the rows where a joint moves."""
+    def _standing(self) -> tuple[float, ...]:
+        """Speed of each joint (joints,) below which a diagnosis takes it as standing still, rad/s (m/s)."""
+        speed = np.quantile(np.abs(self.observed.motion.velocity), HIGH, axis=0)
+        highest = WIDER * self.observed.cutoff_hz
+        noise = []
+        for signals in self.observed.signals:
+            run = signals.run
+            frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
+            density = noise_level(frequency, spectrum, shape, run.rate_hz)
+            noise.append(2 * np.pi * np.sqrt(density * highest**3 / 3))
+        slow: list[float] = np.maximum(CERTAIN * np.max(noise, axis=0), CREEP * speed).tolist()
+        return tuple(slow)
+
+    def moments(self, columns: Array, noise: Whitening, role: Role) -> Moments:
+        """Of the rows of a role in which a joint moves."""
         size = columns.shape[2]
         whole = np.concatenate([columns, self.torque[:, :, None]], axis=2)
         gram = np.zeros((size + 1, size + 1))
         for joint in range(self.observed.joints):
-            for part in self.observed.used(joint):
+            for part in self.observed.of_role(role, joint):
                 rows = noise(whole[part.start : part.stop, joint], joint)
                 gram += rows.T @ rows
         return Moments(gram[:size, :size], gram[:size, size])

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 from diagnosis.effects.library import library
 from diagnosis.next.asked import Asked
-from diagnosis.next.moments import Moments
 from diagnosis.next.prepare import Links, Prepared, prepare
 from diagnosis.next.question import Name, Question
 from diagnosis.next.sizes import BEYOND_NOISE, explained
@@ -68,7 +67,7 @@ def _near(prepared: Prepared, question: Question) -> tuple[Name, float] | None:
     No rival is a name that physics refuses with the size that it would need, nor a larger law that holds the
     finding's as a part, unless it explains more by more than noise.
     """
-    seen = Moments(prepared.before.gram + prepared.layout.prior, prepared.before.vector)
+    seen = prepared.known
     found, other = question.rivals
     law = other.laws[0]
     gain = explained(seen, question.free, law.columns) - explained(seen, question.free, found.laws[0].columns)

@@ -50,12 +50,14 @@ def _headline(experiment: Experiment, pair: Pair) -> str:
 def _fill(axes: list[Axes], experiment: Experiment, pair: Pair) -> None:
     designed, other = _designed(experiment, pair), _other(experiment, pair)
     joint = int(np.argmax(np.sum(designed.torque**2, axis=0)))
+    drive = "force" if experiment.excitation.arm.joints[joint].kind == "prismatic" else "torque"
+    unit = "N" if drive == "force" else "N m"
     level = float(experiment.prepared.sampling.noise.level[joint])
     top = max(1.3 * level, *(1.1 * float(np.abs(each.torque[:, joint]).max()) for each in (designed, other)))
     for axis, seen, color in zip(axes, (other, designed), (BEFORE, AFTER), strict=False):
         axis.axhspan(-level, level, color=NOISE, alpha=0.6, label="noise of a sample")
         axis.plot(seen.time, seen.torque[:, joint], color=color, linewidth=1.1, label="difference of the rivals")
-        axis.set(title=seen.title, ylim=(-top, top), xlabel="time, s", ylabel=f"torque of joint {joint + 1}, N m")
+        axis.set(title=seen.title, ylim=(-top, top), xlabel="time, s", ylabel=f"{drive} of joint {joint + 1}, {unit}")
         axis.legend(loc="upper right", fontsize=8)
     _errors(axes[2], pair)
     _moved(axes[3], experiment)
@@ -80,7 +82,9 @@ def _moved(axis: Axes, experiment: Experiment) -> None:
     motion = problem.trajectory.motions(point[None], problem.times).motion
     for number, joint in enumerate(problem.arm.joints):
         axis.plot(problem.times, motion.position[0, :, number], color=JOINTS[number % len(JOINTS)], label=joint.name)
-    axis.set(title="the motion to record", xlabel="time, s", ylabel="joint position, rad")
+    units = {"prismatic": "m"}
+    told = dict.fromkeys(units.get(joint.kind, "rad") for joint in problem.arm.joints)
+    axis.set(title="the motion to record", xlabel="time, s", ylabel=f"joint position, {' or '.join(told)}")
     axis.legend(loc="upper right", fontsize=8, ncols=3)
 
 

@@ -14,7 +14,7 @@ from diagnosis.next.laws import Offered, alternatives, background, leaves_trace,
 from diagnosis.next.moments import Index, Moments, no_run
 from diagnosis.next.present import Part, Present
 from diagnosis.next.question import IN_LINKS, Layout, Name, Question, blindness, layout_of
-from diagnosis.next.sampling import Sampling, white
+from diagnosis.next.sampling import THINNED, Sampling, white
 from diagnosis.next.sizes import Choice, chosen_rivals
 from diagnosis.next.verdict_file import VerdictFile
 from diagnosis.settings import Settings
@@ -27,24 +27,41 @@ from recordings.run import Array
 
 Links = Literal["exact", "near", "free"]
 NEAR = 0.08  # width of the links' errors: about as far as drawings are off
+DRY = ("coulomb_friction", "stribeck_friction", "presliding_hysteresis", "asymmetric_friction",
+       "load_dependent_friction")  # fmt: skip
 RICH = 3  # random motions that show what any motion could show
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """before: what the first recording says of the columns of `layout`. rows: kept rows of it, all joints."""
+    """seen: what the first recording says of the columns of `layout`; before: its rows from which a diagnosis learns.
+
+    rows: those rows, of all joints. counted: share of a new run that will be among them, the rest is held out.
+    """
 
     present: Present
     layout: Layout
     questions: tuple[Question, ...]
     sampling: Sampling
+    seen: Moments
     before: Moments
     rows: int
+    counted: float
     first: FirstRun | None
 
     def moments(self, scene: Scene) -> Moments:
-        """What a designed motion would say."""
-        return self.layout.moments(scene, self.sampling.filter(len(scene.time)), self.sampling)
+        """What a diagnosis would learn from a designed motion."""
+        whole = self.layout.moments(scene, self.sampling.filter(len(scene.time)), self.sampling)
+        return Moments(self.counted * whole.gram, self.counted * whole.vector)
+
+    @property
+    def known(self) -> Moments:
+        """All that the first recording says, with what is known of the links beforehand."""
+        return Moments(self.seen.gram + self.layout.prior, self.seen.vector)
+
+    def rows_with(self, samples: int) -> float:
+        """Rows of both recordings from which a diagnosis learns, all joints; samples: of a designed motion."""
+        return self.rows + self.counted * (samples // THINNED) * len(self.present.arm)
 
     def together(self, gram: Array) -> Array:
         """Moments of both runs, and what is known of the links beforehand."""
@@ -101,38 +118,54 @@ class _Preparation:
 
     def prepared(self, groups: tuple[Asked, ...], offered: Offered) -> Prepared:
         """Chooses laws and sizes, and keeps the columns that are needed."""
-        sampling, before = self._recorded(groups)
+        sampling, whole, before = self._recorded(groups)
         shown = self._shown(sampling)
-        seen = before.gram if self.first else shown
+        seen = whole.gram if self.first else shown
         places = sum(map(len, offered.values()))
         questions = []
         for group in groups:
-            free = self._free(group)
-            known = Moments(seen + self.layout.prior, before.vector)
-            rivals = chosen_rivals(self._choices(group), free, known, shown, places, self.first is not None)
-            questions.append(Question(rivals, free, blindness(rivals, free, shown + self.layout.prior)))
-        return self._kept(tuple(questions), sampling, before)
+            free, found = self._free(group), self._found(group)
+            known = Moments(seen + self.layout.prior, whole.vector)
+            joints = len(self.present.arm)
+            rivals = chosen_rivals(self._choices(group), found, known, shown, places, self.first is not None, joints)
+            questions.append(Question(rivals, free, found, blindness(rivals, free, shown + self.layout.prior)))
+        return self._kept(tuple(questions), sampling, whole, before)
 
-    def _recorded(self, groups: tuple[Asked, ...]) -> tuple[Sampling, Moments]:
+    def _recorded(self, groups: tuple[Asked, ...]) -> tuple[Sampling, Moments, Moments]:
+        """The sampling, and moments of all rows and of those from which a diagnosis learns."""
         if self.first is None:
-            return self.white, no_run(self.layout.size)
+            return self.white, no_run(self.layout.size), no_run(self.layout.size)
         columns = self.first.columns(self.layout)
         found = [self.parts[group[0]][0] for group in groups if group[0] in self.parts]
         fitted = np.unique(np.concatenate([self._free(()), *(self.layout.of(each) for each in found)]))
         sampling = self.first.sampling(columns, fitted.astype(np.intp))
-        before = self.first.moments(columns, sampling.noise)
+        sampling = replace(sampling, standing=self._standing(sampling, groups))
+        before = self.first.moments(columns, sampling.noise, "identify")
+        whole = before + self.first.moments(columns, sampling.noise, "validate")
         for name in sorted({group[0] for group in groups if group[0].effect == IN_LINKS} & self.parts.keys(), key=str):
             candidate, values = self.parts[name]  # what the links of the model hold already is given back
-            before = Moments(before.gram, before.vector + before.gram[:, self.layout.of(candidate)] @ values)
-        return sampling, before
+            whole, before = (self._given_back(each, candidate, values) for each in (whole, before))
+        return sampling, whole, before
+
+    def _standing(self, sampling: Sampling, groups: tuple[Asked, ...]) -> tuple[float, ...]:
+        """Speeds below which a joint with dry friction, found or asked for, stands still; 0 for the others."""
+        named = {*self.parts, *(name for group in groups for name in group)}
+        sticky = {name.joint for name in named if name.effect in DRY}
+        return tuple(each if joint + 1 in sticky else 0.0 for joint, each in enumerate(sampling.standing))
+
+    def _given_back(self, moments: Moments, candidate: Candidate, values: Array) -> Moments:
+        return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.of(candidate)] @ values)
 
     def _free(self, group: Asked) -> Index:
-        """Columns that are fitted beside the rivals of a group."""
-        others = [part[0] for name, part in self.parts.items() if name not in group and name.effect != IN_LINKS]
+        """Columns that may be fitted beside the rivals of a group: what was found, and usual friction of all joints."""
         usual = [each for each in background(self.present.arm, self.rich) if name_of(each) not in group]
+        return np.unique(np.concatenate([self._found(group), *map(self.layout.of, usual)])).astype(np.intp)
+
+    def _found(self, group: Asked) -> Index:
+        """Columns of the other findings, and of the links where they are not known exactly."""
+        others = [part[0] for name, part in self.parts.items() if name not in group and name.effect != IN_LINKS]
         rigid = np.arange(0 if self.links == "exact" else len(self.layout.base))
-        known = [self.layout.of(each) for each in (*usual, *others)]
-        return np.unique(np.concatenate([rigid, *known])).astype(np.intp)
+        return np.unique(np.concatenate([rigid, *map(self.layout.of, others)])).astype(np.intp)
 
     def _choices(self, group: Asked) -> list[Choice]:
         out = []
@@ -147,11 +180,12 @@ class _Preparation:
         return out
 
     def _shown(self, sampling: Sampling) -> Array:
-        """What rich motions show."""
+        """What rich motions show, even while a joint stands still."""
+        sampling = replace(sampling, standing=())
         moments = [self.layout.moments(scene, sampling.filter(len(scene.time)), sampling) for scene in self.rich]
         return np.asarray(np.sum([each.gram for each in moments], axis=0))
 
-    def _kept(self, questions: tuple[Question, ...], sampling: Sampling, before: Moments) -> Prepared:
+    def _kept(self, questions: tuple[Question, ...], sampling: Sampling, *recorded: Moments) -> Prepared:
         """The same with only the columns that the questions need."""
         laws = [law.columns for question in questions for rival in question.rivals for law in rival.laws]
         needed = np.concatenate([np.arange(len(self.layout.base)), *(each.free for each in questions), *laws])
@@ -159,10 +193,10 @@ class _Preparation:
         chosen = [each for each, at in zip(self.layout.candidates, self.layout.places, strict=True) if at[0] in kept]
         count = len(self.layout.base)
         layout = layout_of(self.layout.base, chosen, self.rich[0], self.layout.prior[:count, :count])
-        moments = Moments(before.gram[np.ix_(kept, kept)], before.vector[kept])
-        rows = self.first.rows if self.first else 0
+        whole, before = (Moments(each.gram[np.ix_(kept, kept)], each.vector[kept]) for each in recorded)
+        rows, counted = (self.first.rows, self.first.counted) if self.first else (0, 1.0)
         moved = tuple(each.moved(kept) for each in questions)
-        return Prepared(self.present, layout, moved, sampling, moments, rows, self.first)
+        return Prepared(self.present, layout, moved, sampling, whole, before, rows, counted, self.first)
 
 
 def _prior(arm: Arm, base: BaseParameters, inertial: Array, links: Links) -> Array:

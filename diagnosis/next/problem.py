@@ -1,12 +1,12 @@
-"""The search for a discriminating motion as a problem of the benchmark: minimise one over the smallest separation."""
+"""The search for a discriminating motion as a problem of the benchmark: minimise the doubt that it leaves."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.next.deciding import strength
 from diagnosis.next.moments import Moments
 from diagnosis.next.prepare import Prepared
-from diagnosis.next.question import soft_smallest
 from problem.excitation_problem import ExcitationProblem
 from problem.motion import Motion
 from problem.transforms import Array
@@ -16,18 +16,22 @@ NOTHING = 1e-6  # standard errors: less is none
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TellApartProblem(ExcitationProblem):
-    """Find the motion on which rivals differ most, together with what was recorded before.
+    """Find the motion that decides best between rivals, together with what was recorded before.
 
-    A point's value is one over its softened smallest separation: the standard error of the decision, in units of the
-    effect.
+    A point's value is one over its strength, in standard errors.
     """
 
     prepared: Prepared
 
-    def separation(self, point: Array) -> float:
-        """Softened smallest separation of a point (dimension,), standard errors."""
+    def strength(self, point: Array) -> float:
+        """How well the motion of a point (dimension,) decides, standard errors."""
         motion = self.trajectory.motions(point[None], self.times).motion
-        return self._smallest(motion.select(np.intp(0)))
+        return self._strength(motion.select(np.intp(0)))
+
+    @property
+    def rows(self) -> float:
+        """Rows of both recordings from which a diagnosis learns, all joints."""
+        return self.prepared.rows_with(self.samples)
 
     def moments(self, point: Array) -> Moments:
         """What the motion of a point (dimension,) would say."""
@@ -36,14 +40,13 @@ class TellApartProblem(ExcitationProblem):
 
     def _judge(self, motion: Motion) -> tuple[Array, Array]:
         """Value of motions (points, samples, joints), (points,), twice: it is also what is minimised."""
-        smallest = np.array([self._smallest(motion.select(np.intp(number))) for number in range(len(motion.position))])
-        value = 1 / np.maximum(smallest, NOTHING)
+        found = np.array([self._strength(motion.select(np.intp(number))) for number in range(len(motion.position))])
+        value = 1 / np.maximum(found, NOTHING)
         return value, value
 
-    def _smallest(self, motion: Motion) -> float:
+    def _strength(self, motion: Motion) -> float:
         found = self.prepared.moments(self.prepared.present.scene(motion, self.times))
-        gram = self.prepared.together(found.gram)
-        return soft_smallest([each for question in self.prepared.questions for each in question.separations(gram)])
+        return strength(self.prepared.questions, self.prepared.together(found.gram), self.rows)
 
 
 def tell_apart_problem(prepared: Prepared, excitation: ExcitationProblem, name: str = "tell-apart") -> TellApartProblem:

@@ -29,39 +29,57 @@ class Name:
 @dataclass(frozen=True, eq=False)
 class Law:
     """A rival in one shape. columns: its places among all columns. freedom: how many parameters it adds to what is free
-    anyway. looks: among how many alternatives it was picked.
+    anyway. looks: among how many alternatives it was picked. share: of all joints, those whose torque it changes.
     """
 
     candidate: Candidate
     columns: Index
     freedom: int
     looks: int
+    share: float
 
-    def price(self, rows: int) -> float:
-        """Its price in units of log likelihood, as the search of a diagnosis counts it; nothing new costs nothing."""
+    def price(self, rows: float) -> float:
+        """Its price in units of log likelihood, as the search of a diagnosis counts it; nothing new costs nothing.
+
+        rows: of all joints.
+        """
         if not self.freedom:
             return 0.0
-        return float(0.5 * self.freedom * np.log(max(rows, 2)) + np.log(self.looks))
+        return float(0.5 * self.freedom * np.log(max(rows * self.share, 2)) + np.log(self.looks))
 
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A name that may be right, and the law that it then is: laws[0] with these values. The others are its shapes."""
+    """A name that may be right, and the law that it then is: laws[0] with these values. The others are its shapes.
+
+    weight: how well it fits what was recorded, beside the others. sizes: for each law the coefficients that it may have
+    after what was recorded, (draws, columns); none where nothing was.
+    """
 
     name: Name
     laws: tuple[Law, ...]
     values: Array
+    weight: float = 1.0
+    sizes: tuple[Array, ...] = ()
+
+    @property
+    def possible(self) -> list[tuple[Law, Array]]:
+        """Laws and coefficients (draws, columns) that it may have."""
+        found = [(law, sizes) for law, sizes in zip(self.laws, self.sizes, strict=False) if len(sizes)]
+        return found or [(self.laws[0], self.values[None])]
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Rivals of which one is right. free: columns that are fitted beside any of them.
+    """Rivals of which one is right. free: columns that may be fitted beside any of them; found: those that surely are.
 
+    The rest of what is free, usual friction that no diagnosis has found yet, costs a price.
     blind: (rivals, rivals), true where no motion shows, were the first right, that it is not the second.
     """
 
     rivals: tuple[Rival, ...]
     free: Index
+    found: Index
     blind: Array
 
     def moved(self, kept: Index) -> "Question":
@@ -70,7 +88,12 @@ class Question:
             replace(each, laws=tuple(replace(law, columns=np.searchsorted(kept, law.columns)) for law in each.laws))
             for each in self.rivals
         )
-        return Question(rivals, np.searchsorted(kept, self.free), self.blind)
+        return Question(rivals, np.searchsorted(kept, self.free), np.searchsorted(kept, self.found), self.blind)
+
+    @property
+    def extras(self) -> Index:
+        """Columns that may be fitted at a price."""
+        return np.setdiff1d(self.free, self.found)
 
     @property
     def pairs(self) -> list[tuple[int, int]]:
@@ -127,7 +150,8 @@ class Layout:
 
     def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> Moments:
         """What a motion without any torque recorded yet would say."""
-        rows = sampling.whitened(kept_columns(self.base, self.candidates, scene, keep, smooth=True))
+        columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
+        rows = sampling.whitened(columns, scene.motion.velocity)
         return Moments(rows.T @ rows, np.zeros(self.size))
 
 
@@ -144,18 +168,6 @@ def layout_of(base: BaseParameters, candidates: list[Candidate], scene: Scene, p
     return Layout(base, tuple(unique), tuple(places), whole)
 
 
-def soft_smallest(separations: list[float]) -> float:
-    """The smallest separation, standard errors, softened: equal chances of a wrong choice, equal values.
-
-    The chance to take one of two rivals for the other is at most exp(-d^2 / 8) / 2 (Bhattacharyya 1943; Kailath 1967).
-    What is told is the separation that all pairs would need to have the same mean bound. One pair that no motion
-    moves does not hide what it does for the others.
-    """
-    exponents = -np.square(separations) / 8
-    top = float(np.max(exponents))
-    return float(np.sqrt(max(-8 * (top + np.log(np.mean(np.exp(exponents - top)))), 0.0)))
-
-
 def in_free_links(name: Name, free: Index) -> bool:
     """Whether a name is part of what is free anyway: a link that is off, where the links are not known exactly."""
     return name.effect == IN_LINKS and 0 in free
@@ -168,7 +180,7 @@ def blindness(rivals: tuple[Rival, ...], free: Index, gram: Array) -> Array:
     """
     count = len(rivals)
     out = np.zeros((count, count), dtype=bool)
-    question = Question(rivals, free, out)
+    question = Question(rivals, free, free, out)
     for one, right in enumerate(rivals):
         own = right.laws[0].columns
         whole = float(right.values @ gram[np.ix_(own, own)] @ right.values)

@@ -87,7 +87,7 @@ def _moved(rival: Rival, layout: Layout) -> Rival:
 
 
 def _separation(rivals: tuple[Rival, ...], free: Index, gram: Array) -> float:
-    question = Question(rivals, free, blindness(rivals, free, gram))
+    question = Question(rivals, free, free, blindness(rivals, free, gram))
     return question.separation(gram, 0, 1)
 
 

@@ -3,14 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
 
 from diagnosis.effects.contract import Candidate, Scene
+from diagnosis.engine.segments import MARGIN, Segment, parts, rows_of
 from diagnosis.next.whitening import Whitening
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
 from recordings.filters import Butterworth, Filter
 from recordings.run import Array
 
+SHORT = 0.5  # of what a row is worth is left in a stretch between standstills that is too short for a diagnosis
 THINNED = 2  # samples of a designed motion for each kept row
 ROWS_PER_CUTOFF = 3.0  # as a diagnosis keeps them
 INDEPENDENT = 2.0  # numbers a second that a low-pass leaves independent, for each hertz of its cut-off
@@ -18,11 +22,15 @@ INDEPENDENT = 2.0  # numbers a second that a low-pass leaves independent, for ea
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """kept_hz: rows a second after the filter. noise: of those rows."""
+    """kept_hz: rows a second after the filter. noise: of those rows. standing: (joints,), slower is standing
+    still, where friction takes any value: such rows tell no law, and short stretches between them less of it. Zero
+    for a joint without such friction; none where nothing was recorded.
+    """
 
     kept_hz: float
     cutoff_hz: float
     noise: Whitening
+    standing: tuple[float, ...] = ()
 
     @property
     def rate_hz(self) -> float:
@@ -37,9 +45,32 @@ class Sampling:
         """The filter of a designed motion."""
         return Butterworth(self.rate_hz, self.cutoff_hz, samples, THINNED)
 
-    def whitened(self, columns: Array) -> Array:
-        """Whitened rows of kept columns (rows, joints, columns): (rows of all joints, columns)."""
-        return np.concatenate([self.noise(columns[:, joint], joint) for joint in range(columns.shape[1])])
+    def whitened(self, columns: Array, velocity: Array) -> Array:
+        """Whitened rows of kept columns (rows, joints, columns), as much as they count: (rows of all joints, columns).
+
+        velocity: (samples, joints), of the whole motion.
+        """
+        moves = self._moves(velocity)[::THINNED]
+        kept = []
+        for joint in range(columns.shape[1]):
+            rows = self.noise(columns[:, joint], joint)
+            kept.append(rows * _worth(moves[:, joint])[len(moves) - len(rows) :, None])
+        return np.concatenate(kept)
+
+    def _moves(self, velocity: Array) -> NDArray[np.bool_]:
+        """Instants (samples, joints) that are far enough from standing still for the filter."""
+        if not self.standing:
+            return np.ones(velocity.shape, dtype=bool)
+        still = np.abs(velocity) < np.array(self.standing)
+        reach = round(MARGIN / self.cutoff_hz * self.rate_hz)
+        return np.asarray(~binary_dilation(still, structure=np.ones((2 * reach + 1, 1))))
+
+
+def _worth(moves: NDArray[np.bool_]) -> Array:
+    """What rows count, (rows,): nothing near a standstill, less in stretches too short for a diagnosis."""
+    whole = Segment(0, "identify", 0, len(moves))
+    long = rows_of(parts(whole, moves), len(moves)) if not moves.all() else moves
+    return np.asarray(np.where(long, 1.0, np.where(moves, np.sqrt(SHORT), 0.0)))
 
 
 def white(levels: Array, cutoff_hz: float) -> Sampling:

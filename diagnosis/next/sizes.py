@@ -1,17 +1,20 @@
 """How large each rival would have to be: as found, or so that it imitates what was found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.effects.contract import Candidate
 from diagnosis.engine.solver import EXPECTED
 from diagnosis.next.moments import Index, Moments, independent, left_over, solved
+from diagnosis.next.posterior import coefficients
 from diagnosis.next.question import Law, Name, Rival, in_free_links
 from recordings.run import Array
 
 LAWS = 3  # shapes of a rival that are kept: those that come closest
 BEYOND_NOISE = 2.0  # standard errors
+DRAWS = 12  # sizes that a rival may have
+DOUBT = 0.1  # of the weight is shared by all rivals alike: no likelihood is that sure
 LARGEST_SHARE = 0.3  # of the finding's torque on rich motions: by how much a rival may differ from it
 
 
@@ -25,7 +28,7 @@ class Choice:
 
 
 def chosen_rivals(
-    choices: list[Choice], free: Index, seen: Moments, rich: Array, library_places: int, recorded: bool
+    choices: list[Choice], free: Index, seen: Moments, rich: Array, library_places: int, recorded: bool, joints: int
 ) -> tuple[Rival, ...]:
     """Rivals with the laws that come closest, and the sizes with which they do.
 
@@ -33,7 +36,29 @@ def chosen_rivals(
     motions. library_places: for the price of a law.
     """
     signal = _signal(choices, free, seen)
-    return tuple(_rival(each, free, seen, rich, signal, library_places, recorded) for each in choices)
+    rivals = tuple(_rival(each, free, seen, rich, signal, library_places, recorded, joints) for each in choices)
+    return _weighted(rivals, free, seen) if recorded else rivals
+
+
+def _weighted(rivals: tuple[Rival, ...], free: Index, seen: Moments) -> tuple[Rival, ...]:
+    """The same with what the recording says of each: likelihood, less what parameters gain by chance, and sizes."""
+    fits = [[0.5 * explained(seen, free, law.columns) for law in rival.laws] for rival in rivals]
+    likely = np.array([max(fit) - rival.laws[0].freedom for fit, rival in zip(fits, rivals, strict=True)])
+    weights = np.exp(likely - likely.max())
+    weights = (1 - DOUBT) * weights / weights.sum() + DOUBT / len(weights)
+    out = zip(rivals, fits, weights.tolist(), strict=True)
+    return tuple(replace(rival, weight=weight, sizes=_sizes(rival, fit, free, seen)) for rival, fit, weight in out)
+
+
+def _sizes(rival: Rival, fits: list[float], free: Index, seen: Moments) -> tuple[Array, ...]:
+    """Sizes for each law, more of those that fit better."""
+    share = np.exp(np.array(fits) - max(fits))
+    counts = np.round(DRAWS * share / share.sum()).astype(int).tolist()
+    rng = np.random.default_rng(0)  # the same sizes for every motion that is judged
+    return tuple(
+        coefficients(seen, free, law.columns, law.candidate, count, rng)[1][len(free) :].T
+        for law, count in zip(rival.laws, counts, strict=True)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +87,14 @@ def explained(seen: Moments, free: Index, columns: Index) -> float:
 
 
 def _rival(
-    choice: Choice, free: Index, seen: Moments, rich: Array, signal: _Signal, library_places: int, recorded: bool
+    choice: Choice,
+    free: Index,
+    seen: Moments,
+    rich: Array,
+    signal: _Signal,
+    library_places: int,
+    recorded: bool,
+    joints: int,
 ) -> Rival:
     if recorded:
         left = [-explained(seen, free, columns) for _, columns in choice.laws]
@@ -72,7 +104,8 @@ def _rival(
     if choice.values is not None:
         order = [0, *(number for number in order if number != 0)]
     known = in_free_links(choice.name, free)
-    laws = tuple(_law(*choice.laws[number], free, seen.gram, 0 if known else library_places) for number in order[:LAWS])
+    places = 0 if known else library_places
+    laws = tuple(_law(*choice.laws[number], free, seen.gram, places, joints) for number in order[:LAWS])
     values = choice.values
     if values is None:
         values = _size(laws[0].columns, free, seen, rich, signal, recorded)
@@ -97,8 +130,9 @@ def _size(columns: Index, free: Index, seen: Moments, rich: Array, signal: _Sign
     return imitation
 
 
-def _law(candidate: Candidate, columns: Index, free: Index, gram: Array, library_places: int) -> Law:
+def _law(candidate: Candidate, columns: Index, free: Index, gram: Array, library_places: int, joints: int) -> Law:
     """A law; what every arm has is no surprise, everything else was looked for in many places, if in any."""
     own = independent(gram, columns, free) if library_places else 0
     looks = 1 if candidate.effect in EXPECTED else library_places * candidate.looks
-    return Law(candidate, columns, own + len(candidate.shape) if own else 0, looks)
+    freedom = own + len(candidate.shape) if own else 0
+    return Law(candidate, columns, freedom, looks, len(candidate.rows) / joints)

@@ -128,7 +128,7 @@ def test_two_runners_on_one_store_share_the_work(small: Path, plug_in: PlugIn) -
     commands = [[sys.executable, "-m", "bench.cli", "run", small.name, "--workers", "1", "--results", f"r{k}"]
                 for k in range(2)]  # fmt: skip
     running = [subprocess.Popen(command, cwd=small.parent, stdout=subprocess.DEVNULL) for command in commands]
-    assert [one.wait(60) for one in running] == [0, 0]
+    assert [one.wait(300) for one in running] == [0, 0]
     assert _count(small.parent / ".armlab" / "runs.sqlite") == 200
     tables = [(small.parent / f"r{k}" / "small.csv").read_bytes() for k in range(2)]
     assert tables[0] == tables[1]

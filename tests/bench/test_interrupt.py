@@ -63,7 +63,7 @@ def _stopped_after_three(
     while len(_kept(folder)) < 3 and running.poll() is None:
         time.sleep(0.02)
     os.killpg(running.pid, how)  # a terminal, too, sends it to the workers as well
-    said = running.communicate(timeout=30)[1]
+    said = running.communicate(timeout=120)[1]
     return said, running.returncode
 
 

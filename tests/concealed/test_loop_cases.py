@@ -12,10 +12,11 @@ from refusals import refusal
 
 from concealed.arms import machine
 from concealed.loop import case
-from concealed.loop.case import Tools, play_case
+from concealed.loop.answers import NAME
+from concealed.loop.case import Forecast, Moved, Tools, play_case
 from concealed.loop.draw import draw
 from concealed.loop.poor import poor_reference
-from concealed.loop.run import LoopSettings, play_all, results, seal
+from concealed.loop.run import LoopSettings, closed, play_all, results, sealed
 from concealed.loop.second import first_recording, second_recording, write_recording
 from concealed.manifest import checked_manifest
 from recordings.load import load_recording
@@ -46,9 +47,10 @@ def suspect(verdict: Path, robot: Path, recording: Path) -> list[list[Any]]:
     return []
 
 
-def move(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> Array | None:
+def move(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> Moved:
     """The same motion for every kind."""
-    return gentle()
+    names = frozenset({("time_delay", None), ("viscous_friction", 2)})
+    return Moved(gentle(), (Forecast(names, 0.7, 0.1, 0.2),))
 
 
 TOOLS = Tools(diagnose, suspect, move)
@@ -88,13 +90,14 @@ def test_the_limits_for_second_motions_lie_within_those_of_the_arm(tmp_path: Pat
     write_recording(first_recording(draw(1700, 0, 0)).simulated, tmp_path / "first", tmp_path / "first.json")
     limits = yaml.safe_load((tmp_path / "first/limits.yaml").read_text())["joints"]
     made = machine("irb120-arm")
-    assert [joint["velocity_limit"] for joint in limits] == pytest.approx((0.5 * made.speed).tolist())
+    assert [joint["velocity_limit"] for joint in limits] == pytest.approx((0.35 * made.speed).tolist())
     assert all(joint["position_limits"][0] > low for joint, low in zip(limits, made.range[0], strict=True))
 
 
 def test_draws_without_doubt_are_passed_over_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(case, "ATTEMPTS", 1)
     settings = LoopSettings(1, 1700)
+    sealed(settings, tmp_path / "loop")
     list(play_all(settings, tmp_path / "loop", TOOLS, 1))
     assert [each["start"] for each in results(settings, tmp_path / "loop")[0]["passed"]] == ["another class"]
 
@@ -110,21 +113,32 @@ def test_an_ambiguous_case_is_played_with_all_three_second_motions(tmp_path: Pat
         (out / "verdict.json").write_text(json.dumps({"findings": [{**truth, "rivals": rivals}]}))
 
     settings, out = LoopSettings(1, 1700), tmp_path / "loop"
+    answers = sealed(settings, out)
     list(play_all(settings, out, Tools(told, suspect, move), 1))
     found = results(settings, out)[0]
     assert found["start"] == "told"
     assert found["ends"] == {"designed": "right", "random": "right", "condition": "right"}
-    seal(settings, out)
+    assert found["forecast"] == {kind: [0.7, 0.1, 0.2] for kind in ("designed", "random", "condition")}
+    closed(settings, out, answers)
     assert checked_manifest(out)[0]["cases"] == [found["name"]]
+    assert sealed(settings, out) == answers
     assert not list(play_all(settings, out, Tools(told, suspect, move), 1))  # nothing is left to do
 
 
 def test_a_folder_of_another_seed_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "loop"
     (out / "cases").mkdir(parents=True)
-    (out / "settings.json").write_text('{"seed": 1}\n')
-    message = refusal(lambda: list(play_all(LoopSettings(1, 2), out, TOOLS, 1)))
-    assert "another seed" in message
+    (out / "settings.json").write_text('{"cases": 1, "seed": 1}\n')
+    assert "other settings" in refusal(sealed, LoopSettings(1, 2), out)
+
+
+def test_answers_that_were_changed_after_the_seal_are_refused(tmp_path: Path) -> None:
+    settings = LoopSettings(1, 1700)
+    answers = sealed(settings, tmp_path)
+    path = tmp_path / "truth" / NAME
+    path.write_text(path.read_text().replace('"attempt": 0', '"attempt": 1'))
+    assert "was changed" in refusal(closed, settings, tmp_path, answers)
+    assert "other answers" in refusal(sealed, settings, tmp_path)
 
 
 def test_a_design_that_cannot_help_leaves_the_question_open(tmp_path: Path) -> None:
@@ -151,7 +165,7 @@ def test_a_design_that_fails_leaves_the_question_open_and_is_told(tmp_path: Path
         rivals = [{"effect": "torque_ripple", "joint": 1}]
         (out / "verdict.json").write_text(json.dumps({"findings": [{**truth, "rivals": rivals}]}))
 
-    def broken(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> Array | None:
+    def broken(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> Moved:
         raise ValueError("no columns")
 
     for part in ("truth", "observations", "verdicts"):

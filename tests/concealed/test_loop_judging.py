@@ -6,8 +6,10 @@ from typing import Any
 import pytest
 
 from concealed.loop.judge import Truth, end_of, start_of, suspects, truth_of
+from concealed.loop.page import Seal, text, write
+from concealed.loop.reliability import brier, on_average, reliability
 from concealed.loop.run import LoopSettings
-from concealed.loop.table import Share, rows, shares, text, write
+from concealed.loop.table import Share, Versus, rows, shares, versus
 
 LATE = ("time_delay", None)
 VISCOUS = ("viscous_friction", 2)
@@ -82,6 +84,7 @@ def result(number: int, start: str, designed: str, random: str, condition: str) 
     return {
         "case": number, "name": f"case{number}", "tier": "clean", "pair": pair, "multiple": 2.0, "start": start,
         "suspected": suspected, "ends": ends, "passed": [{"pair": pair, "start": "nothing"}],
+        "forecast": {"designed": [0.9, 0.0, 0.1], "random": [0.3, 0.2, 0.5]},
     }  # fmt: skip
 
 
@@ -107,11 +110,31 @@ def test_a_share_is_told_with_wilsons_interval() -> None:
     assert str(Share(0, 0)) == "-"
 
 
-def test_the_page_tells_shares_comparisons_and_draws_that_were_passed_over(tmp_path: Path) -> None:
-    page = text(LoopSettings(4, 1001), FOUND, "abc")
-    assert "Seed 1001, 2 ambiguous cases of 4, manifest SHA-256 abc" in page
+def test_a_motion_is_compared_case_by_case() -> None:
+    assert versus(rows(FOUND), "random") == Versus(1, 0)
+    assert versus(rows(FOUND), "condition") == Versus(2, 0)
+    assert Versus(5, 0).p_value == pytest.approx(2 * 0.5**5)
+    assert Versus(0, 0).p_value == 1.0
+
+
+def test_forecasts_are_held_against_what_came() -> None:
+    table = rows(FOUND)
+    low, high = reliability(table)
+    assert (low.expected, low.came) == (pytest.approx(0.3), Share(1, 2))
+    assert (high.expected, high.came) == (pytest.approx(0.9), Share(2, 2))
+    assert on_average(table)["right"] == (pytest.approx(0.6), 0.75)
+    assert brier(table)[0] == pytest.approx((0.01 + 0.01 + 0.09 + 0.49) / 4)
+
+
+def test_the_page_tells_shares_comparisons_forecasts_and_draws_that_were_passed_over(tmp_path: Path) -> None:
+    seal = Seal("abc", "def")
+    page = text(LoopSettings(4, 1001), FOUND, seal)
+    assert "Seed 1001, 2 ambiguous cases of 4" in page
+    assert "told before the first diagnosis: abc" in page
     assert "| designed motion | 100 % (34-100) |" in page
-    assert "only the designed motion decided rightly in 1 cases, only the other one in 0" in page
+    assert "| random motion | decided rightly | 1 | 0 | 1 |" in page
+    assert "| time_delay | viscous_friction | 2 | 2, 0, 0 | 1, 0, 1 | 0, 1, 1 |" in page
+    assert "| 0.8 to 1.0 | 2 | 90 % | 100 % (34-100) |" in page
     assert "- nothing: 3" in page
-    names = [path.name for path in write(LoopSettings(4, 1001), FOUND, "abc", tmp_path)]
+    names = [path.name for path in write(LoopSettings(4, 1001), FOUND, seal, tmp_path)]
     assert names == ["loop.md", "loop.csv", "loop.png"]

@@ -3,11 +3,11 @@
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from made_verdicts import finding, verdict, write
 
-from concealed import ablation
 from concealed import prove as proving
 from concealed.ablation import Ablation, ablate
 from concealed.prove import LOG, Proof, chosen_proof, prove
@@ -22,7 +22,7 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Stands in for all diagnoses; lists the cases that were looked at."""
     looked: list[str] = []
 
-    def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int, options: object = ()) -> Iterator[str]:
+    def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int) -> Iterator[str]:
         for case in cases:
             write(verdicts, case, verdict())
             looked.append(case)
@@ -69,26 +69,17 @@ def test_a_development_proof_has_a_development_seed_and_no_commit() -> None:
         chosen_proof(False, 5000, 4, 0)
 
 
-def test_an_ablation_diagnoses_the_same_cases_with_each_guard_off(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    asked: list[tuple[str, tuple[str, ...]]] = []
+def test_an_ablation_scores_the_same_cases_with_each_guard_off(tmp_path: Path) -> None:
+    asked: list[str] = []
 
-    def diagnose_all(
-        folder: Path, verdicts: Path, cases: list[str], jobs: int, options: tuple[str, ...]
-    ) -> Iterator[str]:
-        for case in cases:
-            claim = finding("viscous_friction", 2)
-            write(verdicts, case, verdict("mismatch", (claim,)) if options else verdict())
-            asked.append((case, options))
-            yield case
+    def diagnose(observation: Path) -> dict[str, dict[str, Any]]:
+        asked.append(observation.name)
+        wrong = verdict("mismatch", (finding("viscous_friction", 2),))
+        return {"all guards on": verdict(), "robust_variance": verdict(), "correction": wrong}
 
-    monkeypatch.setattr(ablation, "diagnose_all", diagnose_all)
-    settings = Ablation(1300, 1, 1, ("correction",))
-    list(ablate(settings, tmp_path / "work", tmp_path / "results", 1))
-    with_all, without = asked[:2], asked[2:]
-    assert [case for case, _ in with_all] == [case for case, _ in without]
-    assert {options for _, options in without} == {("--without", "correction")}
+    told = list(ablate(Ablation(1300, 1, 1), diagnose, tmp_path / "work", tmp_path / "results", 1))
+    assert len(set(asked)) == len(asked) == 2
+    assert told[-1] == f"wrote {tmp_path / 'results' / 'guards.md'}"
     rows = (tmp_path / "results" / "guards.md").read_text().splitlines()
     shares = {row.split(" | ")[0]: row.split(" | ")[1] for row in rows if " of 1" in row}
-    assert shares == {"| all guards on": "0 of 1", "| correction": "1 of 1"}
+    assert shares == {"| all guards on": "0 of 1", "| robust variance": "0 of 1", "| correction": "1 of 1"}

@@ -14,6 +14,7 @@ from diagnosis.files import write_verdict
 from diagnosis.result import Diagnosis
 from diagnosis.run import diagnose
 from diagnosis.verdict import verdict
+from identification.identifier import Identifier
 from problem.motion import Motion
 from problem.robot_file import load_arm
 from recordings.run import Array
@@ -129,3 +130,11 @@ def test_an_arm_that_never_moves_is_inconclusive() -> None:
 
 def test_a_recording_of_a_second_is_inconclusive() -> None:
     assert diagnose(cases.recording(seconds=0.9)).status == "inconclusive"
+
+
+def test_a_model_of_base_parameters_alone_can_be_the_simulation(tmp_path: Path) -> None:
+    plain = cases.recording()
+    identified = Identifier(plain.arm, (), "weighted", robot="irb120-arm").fit(plain.with_role("identify"))
+    path = identified.model_.save(tmp_path / "model.yaml")
+    found = diagnose(replace(cases.recording(viscous), simulation=path))
+    assert [(each.effect, each.joint) for each in found.claims] == [("viscous_friction", 3)]

@@ -1,8 +1,12 @@
 """Guards of the diagnosis as switches."""
 
+import engine_cases as cases
 import pytest
 
-from diagnosis.settings import GUARDS, Guards, guards_without
+from diagnosis.ablation import AFTER_THE_SEARCH, ALL_ON, IN_THE_SEARCH, without_each
+from diagnosis.result import Diagnosis
+from diagnosis.run import diagnose
+from diagnosis.settings import GUARDS, Guards, Settings, guards_without
 from problem.errors import InputError
 
 
@@ -16,3 +20,17 @@ def test_a_guard_that_is_named_is_off_and_all_others_are_on() -> None:
 def test_a_guard_that_there_is_not_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(InputError, match=r"--without held_out_gain: no such guard.*heldout_gain"):
         guards_without(["held_out_gain"])
+
+
+def _told(found: Diagnosis) -> list[tuple[str, int | None, str]]:
+    return [(each.effect, each.joint, each.equation) for each in found.claims]
+
+
+def test_stages_that_a_guard_has_no_part_in_need_not_be_done_again() -> None:
+    recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
+    found = dict(without_each(recording))
+    assert list(found) == [ALL_ON, *GUARDS]
+    assert _told(found[ALL_ON]) == _told(diagnose(recording))
+    for guard in (AFTER_THE_SEARCH[2], IN_THE_SEARCH[0]):
+        alone = diagnose(recording, settings=Settings(guards=guards_without([guard])))
+        assert _told(found[guard]) == _told(alone), guard

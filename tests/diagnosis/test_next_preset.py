@@ -16,10 +16,10 @@ class TestTellApart(ProblemContract):
     settings = TellApartSettings(duration=4.0, harmonics=4, cutoff_hz=10.0)
 
 
-def test_its_value_is_one_over_the_smallest_separation() -> None:
+def test_its_value_is_one_over_its_strength() -> None:
     problem = told_apart()
     drawn = points(problem, 3)
-    assert problem.evaluate(drawn).value == pytest.approx([1 / problem.separation(point) for point in drawn])
+    assert problem.evaluate(drawn).value == pytest.approx([1 / problem.strength(point) for point in drawn])
 
 
 def test_its_settings_have_a_hash_as_the_runner_needs_it() -> None:
@@ -44,8 +44,8 @@ def test_rivals_without_any_size_are_refused() -> None:
 def test_registered_algorithms_find_motions_that_tell_more_than_random_ones(algorithm: str) -> None:
     problem = told_apart()
     budget = Budget(4.0, 4, algorithm, 250, seed=3)
-    others = [problem.separation(random_point(problem, Budget(seed=seed))) for seed in range(12)]
-    assert problem.separation(searched(problem, budget)) > np.median(others)
+    others = [problem.strength(random_point(problem, Budget(seed=seed))) for seed in range(12)]
+    assert problem.strength(searched(problem, budget)) > np.median(others)
 
 
 def test_an_unknown_algorithm_is_refused_with_the_nearest_name() -> None:

@@ -52,9 +52,9 @@ def test_the_noise_is_that_of_the_recording(tmp_path: Path) -> None:
 def test_a_rival_has_the_size_that_fits_the_recording(tmp_path: Path) -> None:
     found = prepared(tmp_path, recording(level))
     rival = found.questions[0].rivals[1]
-    chosen = np.append(found.questions[0].free, rival.laws[0].columns)
-    gram = found.before.gram[np.ix_(chosen, chosen)]
-    wanted = np.linalg.lstsq(gram, found.before.vector[chosen])[0][-1]
+    chosen = np.append(found.questions[0].found, rival.laws[0].columns)
+    gram = found.seen.gram[np.ix_(chosen, chosen)]
+    wanted = np.linalg.lstsq(gram, found.seen.vector[chosen])[0][-1]
     assert rival.values[0] == pytest.approx(wanted, rel=0.05)
 
 
@@ -65,8 +65,8 @@ def test_what_is_known_already_adds_to_what_a_motion_shows(tmp_path: Path) -> No
     question, problem = known.questions[0], tell_apart_problem(known, plain)
     point = random_point(plain, BUDGET)
     before = question.separation(known.before.gram, 0, 1)
-    alone = question.separation(problem.moments(point).gram, 0, 1)
-    both = problem.separation(point)
+    new = problem.moments(point).gram
+    alone, both = question.separation(new, 0, 1), question.separation(known.together(new), 0, 1)
     assert before > 1
     assert both**2 >= 0.999 * (before**2 + alone**2)  # common parameters can only help
 
@@ -78,6 +78,28 @@ def test_twice_the_recording_holds_twice_the_information(tmp_path: Path) -> None
     twice = prepared(tmp_path, of_runs(arm, (*runs, *(replace(each, file=f"again-{each.file}") for each in runs))))
     ratio = np.trace(twice.before.gram) / np.trace(once.before.gram)
     assert ratio == pytest.approx(2.0, rel=0.1)
+
+
+def test_only_rows_from_which_a_diagnosis_learns_count_for_its_score(tmp_path: Path) -> None:
+    found = prepared(tmp_path, recording(level))
+    assert {each.role for each in recording(level).runs} == {"identify", "validate"}
+    assert np.trace(found.before.gram) < 0.9 * np.trace(found.seen.gram)
+    assert found.counted == 1.0
+
+
+def test_rivals_count_by_how_well_they_fit_the_recording(tmp_path: Path) -> None:
+    finding, load = (rival.weight for rival in prepared(tmp_path, recording(level)).questions[0].rivals)
+    assert finding > 0.9
+    assert load >= 0.05 - 1e-9
+
+
+def test_sizes_are_drawn_about_the_fit_and_keep_the_laws_of_physics(tmp_path: Path) -> None:
+    rival = prepared(tmp_path, recording(level)).questions[0].rivals[0]
+    (law, sizes), *_ = rival.possible
+    assert len(sizes) == 12
+    assert law.candidate.effect == "coulomb_friction"
+    assert sizes.mean() == pytest.approx(0.4, rel=0.1)
+    assert (sizes > 0).all()
 
 
 def test_limits_that_the_robot_does_not_give_are_what_the_recording_shows() -> None:

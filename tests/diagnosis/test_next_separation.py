@@ -1,18 +1,24 @@
 """How far rivals are apart on a motion: against least squares on the whole rows, and in cases known beforehand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from next_questions import points, told_apart
 from refusals import refusal
 
-from diagnosis.next.chances import _decided, chances
+from diagnosis.effects.friction import ViscousFriction
+from diagnosis.engine.rivals import AS_GOOD
+from diagnosis.next.chances import chances, decided
+from diagnosis.next.deciding import gained, log_doubt, need, strength
 from diagnosis.next.moments import left_over, solved
 from diagnosis.next.preset import RivalSettings, TellApartSettings
 from diagnosis.next.problem import TellApartProblem
-from diagnosis.next.question import soft_smallest
-from diagnosis.next.sampling import kept_columns
+from diagnosis.next.question import Law, Name, Question, Rival
+from diagnosis.next.sampling import kept_columns, white
 from diagnosis.next.within import fourier_within
 from problem.arm import Limits
+from problem.robot_file import load_arm
 from recordings.run import Array
 
 COULOMB = RivalSettings(effect="coulomb_friction", joint=2, parameters=(("level", 0.3),))
@@ -29,7 +35,14 @@ def rows_of(problem: TellApartProblem, point: Array) -> Array:
     motion = problem.trajectory.motions(point[None], problem.times).motion.select(np.intp(0))
     scene = prepared.present.scene(motion, problem.times)
     keep = prepared.sampling.filter(len(problem.times))
-    return prepared.sampling.whitened(kept_columns(prepared.layout.base, prepared.layout.candidates, scene, keep, True))
+    columns = kept_columns(prepared.layout.base, prepared.layout.candidates, scene, keep, True)
+    return prepared.sampling.whitened(columns, scene.motion.velocity)
+
+
+def separation(problem: TellApartProblem, point: Array) -> float:
+    """Standard errors between the two rivals of a problem."""
+    gram = problem.prepared.together(problem.moments(point).gram)
+    return problem.prepared.questions[0].separation(gram, 0, 1)
 
 
 def test_what_an_orthogonal_column_cannot_explain_is_the_whole_signal() -> None:
@@ -61,20 +74,54 @@ def test_separation_is_the_error_that_the_best_fit_of_the_other_rival_leaves(see
         fits = [rows[:, np.append(question.free, law.columns)] for law in question.rivals[other].laws]
         scaled = [fit / np.linalg.norm(fit, axis=0) for fit in fits]
         ways.append(min(np.linalg.norm(signal - fit @ np.linalg.lstsq(fit, signal)[0]) for fit in scaled))
-    assert problem.separation(point) == pytest.approx(min(ways), rel=1e-4)
+    assert separation(problem, point) == pytest.approx(min(ways), rel=1e-4)
 
 
-def test_one_pair_is_as_far_apart_as_it_is() -> None:
-    assert soft_smallest([3.0]) == pytest.approx(3.0)
-    assert soft_smallest([100.0]) == pytest.approx(100.0)
+def pair_question(*weights: float) -> Question:
+    """Rivals that are one column each, of size one, with nothing beside them."""
+    viscous = ViscousFriction.at(load_arm("irb120-arm"), 2)
+    laws = [Law(viscous, np.array([number]), 1, 1, 1.0) for number in range(len(weights))]
+    names = [Name("viscous_friction", number + 1) for number in range(len(weights))]
+    rivals = tuple(
+        Rival(name, (law,), np.ones(1), weight) for name, law, weight in zip(names, laws, weights, strict=True)
+    )
+    none = np.empty(0, dtype=np.intp)
+    return Question(rivals, none, none, np.zeros((len(weights),) * 2, dtype=bool))
 
 
-def test_a_pair_that_stays_alike_does_not_hide_what_a_motion_does_for_others() -> None:
-    assert soft_smallest([0.1, 3.0]) > 1.2 * soft_smallest([0.1, 1.0]) > soft_smallest([0.1, 0.1])
+def test_the_doubt_of_a_pair_is_the_chance_that_the_lead_is_too_small() -> None:
+    gram = np.diag([25.0, 25.0])  # each explains nothing of the other, five standard errors
+    lead = np.random.default_rng(0).normal(12.5, 5.0, 400_000)
+    assert np.exp(log_doubt(pair_question(1.0, 1.0), gram, 100)) == pytest.approx(np.mean(lead < AS_GOOD), rel=0.02)
 
 
-def test_the_smallest_of_clear_separations_decides() -> None:
-    assert soft_smallest([8.0, 20.0]) == pytest.approx(8.0, rel=0.05)
+def test_a_rival_that_hardly_fits_hardly_counts() -> None:
+    gram = np.diag([100.0, 4.0])
+    sure, unsure = pair_question(0.99, 0.01), pair_question(0.01, 0.99)
+    assert log_doubt(sure, gram, 100) < log_doubt(unsure, gram, 100) - 3
+
+
+def test_farther_apart_is_stronger_and_a_pair_that_stays_alike_hides_nothing() -> None:
+    question = pair_question(1.0, 1.0, 1.0)
+    alike = np.diag([16.0, 16.0, 16.0])
+    alike[0, 1] = alike[1, 0] = 15.99
+    better = alike.copy()
+    better[2, 2] = 36.0
+    assert strength((question,), better, 100) > strength((question,), alike, 100) + 0.05
+    assert strength((question,), 4 * alike, 100) > strength((question,), alike, 100)
+
+
+def test_a_special_law_of_friction_has_to_gain_on_held_out_data_too() -> None:
+    problem = told_apart(STRIBECK, RivalSettings(effect="coulomb_friction", joint=2))
+    special, usual = (rival.laws[0] for rival in problem.prepared.questions[0].rivals)
+    assert need(special, usual, 9000) == pytest.approx(0.5 * 0.03 * 3000)
+    assert need(usual, special, 9000) < AS_GOOD
+
+
+def test_one_usual_term_more_explains_at_its_price() -> None:
+    left, products = np.eye(3), np.array([[0.0], [5.0], [1.0]])
+    assert gained(products, left, np.array([1, 2]), 100) == pytest.approx([12.5 - 0.5 * np.log(100)])
+    assert gained(products, left, np.array([2]), 100) == pytest.approx([0.0])
 
 
 def test_twice_the_effect_is_twice_as_far_apart() -> None:
@@ -83,13 +130,13 @@ def test_twice_the_effect_is_twice_as_far_apart() -> None:
     once, twice = told_apart(links="free"), told_apart(double, late, links="free")
     point = points(once, 1)[0]
     # the late torque of a model with more friction is another torque, so twice only nearly
-    assert twice.separation(point) == pytest.approx(2 * once.separation(point), rel=0.1)
+    assert separation(twice, point) == pytest.approx(2 * separation(once, point), rel=0.1)
 
 
 def test_half_the_noise_is_twice_as_far_apart() -> None:
     loud, still = told_apart(links="free", noise=0.1), told_apart(links="free", noise=0.05)
     point = points(loud, 1)[0]
-    assert still.separation(point) == pytest.approx(2 * loud.separation(point), rel=1e-6)
+    assert separation(still, point) == pytest.approx(2 * separation(loud, point), rel=1e-6)
 
 
 def test_a_rotor_and_the_inertia_of_link_one_are_separated_by_no_motion() -> None:
@@ -116,18 +163,22 @@ def test_chances_are_those_of_noisy_rows_that_are_fitted_whole() -> None:
     question, rng = problem.prepared.questions[0], np.random.default_rng(1)
     rows = rows_of(problem, points(problem, 1)[0])
     found = chances(problem.prepared, question, rows.T @ rows, len(rows), rng)
-    counts = np.zeros(3)
-    for right in range(2):
-        rival, scores = question.rivals[right], []
+    shares = []
+    for right, rival in enumerate(question.rivals):
         torque = (rows[:, rival.laws[0].columns] @ rival.values)[:, None] + rng.normal(size=(len(rows), 400))
-        for each in question.rivals:
-            fits = [rows[:, np.append(question.free, law.columns)] for law in each.laws]
-            prices = [law.price(len(rows)) for law in each.laws]
-            explained = [np.sum((np.linalg.qr(fit)[0].T @ torque) ** 2, axis=0) for fit in fits]
-            scores.append(np.max([0.5 * a - b for a, b in zip(explained, prices, strict=True)], axis=0))
-        counts += _decided(np.array(scores), right)
-    assert [found.right, found.wrong, found.open] == pytest.approx((counts / counts.sum()).tolist(), abs=0.08)
-    assert min(found.right, found.wrong, found.open) > 0.05
+        explained = [np.array([best_fit(question, rows, law, torque) for law in each.laws]) for each in question.rivals]
+        ended = decided(question, explained, right, len(rows))
+        shares.append([ended.right, ended.wrong, ended.open])
+    assert [found.right, found.wrong, found.open] == pytest.approx(np.mean(shares, axis=0).tolist(), abs=0.08)
+    assert found.right > 0.05
+
+
+def best_fit(question: Question, rows: Array, law: Law, torque: Array) -> Array:
+    """Half of what a law explains with the best term of usual friction, or without, less the price of that term."""
+    plain = np.append(question.found, law.columns)
+    fits = [(plain, 0.0)]
+    fits += [(np.append(plain, extra), 0.5 * np.log(len(rows))) for extra in question.extras]
+    return np.max([0.5 * np.sum((np.linalg.qr(rows[:, at])[0].T @ torque) ** 2, axis=0) - p for at, p in fits], axis=0)
 
 
 def test_a_law_that_every_arm_has_costs_less_than_one_that_was_looked_for() -> None:
@@ -156,6 +207,19 @@ def test_a_small_swing_stays_as_it_is() -> None:
     times = np.linspace(0, 5.0, 50)
     own = trajectory.series.motions(small[None], times).motion
     assert np.array_equal(trajectory.motions(small[None], times).motion.velocity, own.velocity)
+
+
+def test_rows_in_which_a_joint_stands_still_tell_nothing() -> None:
+    sampling = replace(white(np.ones(2), 10.0), standing=(0.1, 0.1))
+    velocity = np.ones((301, 2))  # 60 samples a second, every other one kept
+    velocity[60, 1] = 0.0
+    rows = sampling.whitened(np.ones((151, 2, 1)), velocity)
+    worth = (rows[151:, 0] / rows[0, 0]) ** 2
+    assert np.count_nonzero(worth == 0) == 9  # a period and a half of 10 Hz to both sides
+    assert worth[:26] == pytest.approx(0.5)  # fewer rows than a diagnosis asks for
+    assert worth[35:] == pytest.approx(1.0)
+    free = replace(sampling, standing=(0.1, 0.0)).whitened(np.ones((151, 2, 1)), velocity)
+    assert free == pytest.approx(free[0, 0])
 
 
 def test_a_joint_without_a_limit_of_speed_is_refused() -> None:
