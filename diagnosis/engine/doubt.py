@@ -1,8 +1,8 @@
 """Is the name of a law right? What it leaves at its joint tells: a law that only resembles it leaves much structure.
 
-One bound serves both ways. Where a surrogate finds more than this share of what a law explains, the law only resembles
-what is there, and its name is withdrawn. Where it finds less, the law is the right one in another form, and what it
-leaves is no finding of its own.
+Where a surrogate finds more than the law itself explains, the law only resembles what is there, and its name is
+withdrawn. Less may be something else at the same joint. Where the surrogate finds little beside what a law explains,
+the law is the right one in another form, and what it leaves is no finding of its own.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,8 @@ from diagnosis.engine.evidence import Evidence
 from diagnosis.engine.remaining import structured
 from diagnosis.engine.surrogate import Structure
 
-DOUBT = 0.25  # of the held-out error power that a law explains
+DOUBT = 1.0  # of the held-out error power that a law explains
+INEXACT = 0.25  # of the same: what the form of a law may be wrong by
 
 
 def doubted(effects: Mapping[int, Evidence], left: Sequence[Structure]) -> frozenset[int]:
@@ -25,7 +26,7 @@ def doubted(effects: Mapping[int, Evidence], left: Sequence[Structure]) -> froze
 def inexact(each: Structure, effects: Mapping[int, Evidence]) -> bool:
     """Whether structure is what the form of a law that is named at this joint leaves."""
     explained = [own.gain for own in effects.values() if own.joint == each.joint and not own.usual]
-    return _power(each) <= DOUBT * max(explained, default=0.0)
+    return _power(each) <= INEXACT * max(explained, default=0.0)
 
 
 def _power(each: Structure) -> float:
