@@ -31,6 +31,7 @@ class DahlFriction(Term):
     effect = "presliding_hysteresis"
     form = "Dahl"
     names = ("level", "stiffness")
+    replaces = ("coulomb_friction",)
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -71,7 +72,7 @@ class LuGreFriction(Term):
     effect = "presliding_hysteresis"
     form = "LuGre"
     names = ("level", "stiffness", "static_level", "velocity")
-    replaces = ("stribeck_friction",)
+    replaces = ("coulomb_friction", "stribeck_friction")
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.pseudo_inertia import information, regular_nominal
+from identification.pseudo_inertia import information, pseudo_inertias, regular_nominal
 from problem.arm import Arm, Link
 from problem.base_parameters import BaseParameters
 from recordings.run import Array
@@ -63,8 +63,8 @@ class LinkPrior:
 
 
 def are_bodies(inertial: Array) -> bool:
-    """Whether links with parameters (10 * joints,) all have a mass: those of a model of base parameters have not."""
-    return bool(np.all(inertial[::10] > 0))
+    """Whether each link with parameters (10 * joints,) is something: base parameters alone leave links out."""
+    return bool(np.all(np.linalg.eigvalsh(pseudo_inertias(inertial))[:, -1] > 0))
 
 
 def link_prior(arm: Arm, base: BaseParameters, inertial: Array) -> LinkPrior:
