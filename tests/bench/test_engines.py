@@ -3,7 +3,6 @@
 import os
 import signal
 import socket
-import sqlite3
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from stored_trials import kept as stored
 
 ROOT = Path(__file__).parents[2]
 TRIALS = 24
@@ -141,16 +141,6 @@ def _run(start: Callable[..., Any], folder: Path, options: list[str]) -> "subpro
         return start(*command, cwd=folder, stdout=said, stderr=said)
 
 
-def _kept(folder: Path) -> dict[str, float]:
-    """The seconds of each trial in the store."""
-    store = folder / ".armlab" / "runs.sqlite"
-    if not store.exists():
-        return {}
-    with closing(sqlite3.connect(store, timeout=30)) as connection:
-        tables = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'trials'").fetchall()
-        return dict(connection.execute("SELECT key, seconds FROM trials").fetchall()) if tables else {}
-
-
 def _started(site: Path) -> list[int]:
     """The process of each run that was started."""
     return [int(line) for line in (site / "notes.txt").read_text().split()]
@@ -161,13 +151,13 @@ def test_a_worker_killed_in_the_middle_costs_no_trial_and_changes_no_byte(
 ) -> None:
     before = len(_started(site))
     run = _run(start, tmp_path, engine)
-    _wait(lambda: len(_kept(tmp_path)) >= 5)
+    _wait(lambda: len(stored(tmp_path)) >= 5)
     victim = _started(site)[-1]
-    kept = _kept(tmp_path)
+    kept = stored(tmp_path)
     os.kill(victim, signal.SIGKILL)
     assert run.wait(300) == 0, (tmp_path / "said.txt").read_text()
     assert (tmp_path / "results" / "sweep.csv").read_bytes() == expected
-    assert kept.items() <= _kept(tmp_path).items()  # the same seconds: not run again
+    assert kept.items() <= stored(tmp_path).items()  # the same seconds: not run again
     assert TRIALS <= len(_started(site)) - before <= TRIALS + 8  # besides, at most what was under way
 
 
@@ -175,15 +165,15 @@ def test_a_killed_driver_loses_nothing_finished_and_a_restart_computes_exactly_w
     engine: list[str], start: Callable[..., Any], site: Path, expected: bytes, tmp_path: Path
 ) -> None:
     run = _run(start, tmp_path, engine)
-    _wait(lambda: len(_kept(tmp_path)) >= 5)
+    _wait(lambda: len(stored(tmp_path)) >= 5)
     run.kill()
     run.wait()
     _wait(lambda: _is_quiet(site))
-    kept, before = _kept(tmp_path), len(_started(site))
+    kept, before = stored(tmp_path), len(_started(site))
     assert 5 <= len(kept) < TRIALS
     assert _run(start, tmp_path, engine).wait(300) == 0, (tmp_path / "said.txt").read_text()
     assert (tmp_path / "results" / "sweep.csv").read_bytes() == expected
-    assert kept.items() <= _kept(tmp_path).items()
+    assert kept.items() <= stored(tmp_path).items()
     assert len(_started(site)) - before == TRIALS - len(kept)
 
 

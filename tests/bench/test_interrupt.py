@@ -2,15 +2,14 @@
 
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 
 import pytest
+from stored_trials import kept as stored
 
 
 @pytest.fixture
@@ -27,7 +26,7 @@ def test_ctrl_c_keeps_what_is_finished_and_a_second_start_does_the_rest(
     tmp_path: Path, slow: Path, armlab: Callable[..., object], workers: str
 ) -> None:
     said, code = _stopped_after_three(tmp_path, slow, workers)
-    kept = _kept(tmp_path)
+    kept = stored(tmp_path)
     assert 3 <= len(kept) < 12
     assert code == 130
     assert said.splitlines() == [
@@ -36,8 +35,8 @@ def test_ctrl_c_keeps_what_is_finished_and_a_second_start_does_the_rest(
     ]
     assert not (tmp_path / "results" / "small.csv").exists()
     armlab("run", slow, "--workers", workers)
-    assert len(_kept(tmp_path)) == 12
-    assert kept.items() <= _kept(tmp_path).items()  # the same seconds: not run again
+    assert len(stored(tmp_path)) == 12
+    assert kept.items() <= stored(tmp_path).items()  # the same seconds: not run again
     assert (tmp_path / "results" / "small.csv").exists()
 
 
@@ -45,11 +44,11 @@ def test_a_killed_run_leaves_a_sound_store_and_a_second_start_does_the_rest(
     tmp_path: Path, slow: Path, armlab: Callable[..., object]
 ) -> None:
     _stopped_after_three(tmp_path, slow, "1", signal.SIGKILL)
-    kept = _kept(tmp_path)
+    kept = stored(tmp_path)
     assert 3 <= len(kept) < 12
     armlab("run", slow, "--workers", "1")
-    assert len(_kept(tmp_path)) == 12
-    assert kept.items() <= _kept(tmp_path).items()
+    assert len(stored(tmp_path)) == 12
+    assert kept.items() <= stored(tmp_path).items()
 
 
 def _stopped_after_three(
@@ -60,7 +59,7 @@ def _stopped_after_three(
     running = subprocess.Popen(
         command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear_ctrl_c
     )
-    while len(_kept(folder)) < 3 and running.poll() is None:
+    while len(stored(folder)) < 3 and running.poll() is None:
         time.sleep(0.02)
     os.killpg(running.pid, how)  # a terminal, too, sends it to the workers as well
     said = running.communicate(timeout=120)[1]
@@ -70,13 +69,3 @@ def _stopped_after_three(
 def _hear_ctrl_c() -> None:
     """In the child: a test run in the background passes on that Ctrl-C is ignored."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-def _kept(folder: Path) -> dict[str, float]:
-    """The seconds of each trial in the store."""
-    store = folder / ".armlab" / "runs.sqlite"
-    if not store.exists():
-        return {}
-    with closing(sqlite3.connect(store, timeout=30)) as connection:
-        tables = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'trials'").fetchall()
-        return dict(connection.execute("SELECT key, seconds FROM trials").fetchall()) if tables else {}
