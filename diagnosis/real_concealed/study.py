@@ -53,10 +53,15 @@ def study_of(reference: Reference, cases: tuple[Case, ...], kept: Kept, looks: L
         if outcome is None:
             for run in reference.recording.with_role("validate"):
                 looks.note(reference.recording.arm.name, run.name, f"concealed: {case.name}")
-            outcome = examine(reference, case, path, lambda message, told=told: progress(f"{told}: {message}"))  # type: ignore[misc]
+            outcome = examine(reference, case, path, _headed(told, progress))
             kept.write(case, reference.recording, outcome)
         outcomes.append(outcome)
     control = next(each for case, each in zip(cases, outcomes, strict=True) if case.control)
     pairs = [(case, each) for case, each in zip(cases, outcomes, strict=True) if not case.control]
     verdicts = tuple(verdict_on(case, each, sought(reference, case), control) for case, each in pairs)
     return Study(reference, control, verdicts)
+
+
+def _headed(told: str, progress: Progress) -> Progress:
+    """Tells what is being done under a heading."""
+    return lambda message: progress(f"{told}: {message}")
