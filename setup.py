@@ -1,5 +1,5 @@
-"""Compiles the C kernel of the observation matrix; everything else stands in pyproject.toml."""
+"""Compiles what is too slow in Python, the observation matrix and drive trains; all else is in pyproject.toml."""
 
 from setuptools import setup
 
-setup(cffi_modules=["problem/kernel_build.py:ffibuilder"])
+setup(cffi_modules=["problem/kernel_build.py:ffibuilder", "diagnosis/effects/drive_train_build.py:ffibuilder"])

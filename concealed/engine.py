@@ -6,6 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from problem.arm import Arm, Joint, Link
@@ -30,6 +31,14 @@ class Spring:
     damping: float
     hardening: float = 0.0
     gap: float = 0.0
+
+    def at_rest(self, load: float) -> float:
+        """Twist of the link against its motor, rad, where it carries a load, N m; at the wall where there is play."""
+        if self.gap > 0:
+            return -float(np.copysign(self.gap / 2, load))
+        soft = abs(load) / self.stiffness
+        twist = brentq(lambda twist: twist * (self.stiffness + self.hardening * twist**2) - abs(load), 0.0, 1.01 * soft)
+        return -float(np.copysign(twist, load))
 
 
 @dataclass(frozen=True)

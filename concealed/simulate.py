@@ -108,7 +108,7 @@ def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Referenc
     gains = controller.position_gain * wanted.position + controller.velocity_gain * wanted.velocity
     width = round(INNER_LOOP_S / step)
     control = gains + forward - boxed(boxed(taken, width), width)
-    states = _rolled(made, wanted, control)
+    states = _rolled(made, wanted, control, _twists(arm, parts, wanted))
     return _track(made, controller, reference.time, states, control)
 
 
@@ -117,10 +117,19 @@ def _derivatives(position: Array, step: float) -> tuple[Array, Array]:
     return velocity, np.gradient(velocity, step, axis=0)
 
 
-def _rolled(made: Plant, wanted: Motion, control: Array) -> Array:
+def _twists(arm: Arm, parts: Parts, wanted: Motion) -> dict[str, float]:
+    """Springs by name with the twist that carries the first load: a start without it would ring for seconds."""
+    first = Motion(wanted.position[:1], wanted.velocity[:1], wanted.acceleration[:1])
+    load = rigid_body_torque(arm, first)[0]
+    return {f"spring{spring.joint}": spring.at_rest(float(load[spring.joint])) for spring in parts.springs}
+
+
+def _rolled(made: Plant, wanted: Motion, control: Array, twists: dict[str, float]) -> Array:
     """States (steps, time and positions and velocities) before each step."""
     data = mujoco.MjData(made.model)
     data.qpos[made.places], data.qvel[made.dofs] = wanted.position[0], wanted.velocity[0]
+    for name, twist in twists.items():
+        data.qpos[made.model.joint(name).qposadr[0]] = twist
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     first = np.empty(mujoco.mj_stateSize(made.model, kind))
     mujoco.mj_getState(made.model, data, first, kind)

@@ -19,10 +19,11 @@ class Candidate(ABC):
     joints, from 0, whose torque its columns change. form: which of an effect's laws, where it has several.
     shape: values of the nonlinear parameters, in their order; bounds: one (lowest, highest) a value.
     follows_model: whether its columns depend on `Scene.torque` or `Scene.inertial` and have to be computed anew
-    when the model changes. of_channel: whether it falsifies the torque of all others (a gain, a delay, a limit);
-    `Scene.torque` leaves those out, or they would act on themselves. replaces: effects at the same joint that its
-    columns contain (Stribeck friction those of Coulomb's); a model has either them or it. looks: among how many
-    alternatives a scan of the residual has picked it, for the correction of what was tried.
+    when the model changes. closely: whether they do so on the motion as the filter of the torque leaves it, noise
+    included, and not on a calmer one. of_channel: whether it falsifies the torque of all others (a gain, a delay, a
+    limit); `Scene.torque` leaves those out, or they would act on themselves. replaces: effects at the same joint
+    that its columns contain (Stribeck friction those of Coulomb's); a model has either them or it. looks: among how
+    many alternatives a scan of the residual has picked it, for the correction of what was tried.
     """
 
     effect: str
@@ -33,6 +34,7 @@ class Candidate(ABC):
     shape: tuple[float, ...] = ()
     bounds: tuple[tuple[float, float], ...] = ()
     follows_model: bool = False
+    closely: bool = False
     replaces: tuple[str, ...] = ()
     of_channel: bool = False
     looks: int = 1

@@ -6,25 +6,32 @@ its velocity and acceleration count, too, and the other joints feel it through t
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
-from diagnosis.effects.contract import Scene, Value
+from diagnosis.effects.contract import Candidate, Scene, Value
+from diagnosis.effects.drive_train import Twist, own_inertia, twisted
 from diagnosis.effects.sensitivity import along, change_of_joint
-from diagnosis.effects.term import EveryJoint, Term, number
+from diagnosis.effects.term import EveryJoint, Term, moves, number
 from problem.arm import Arm
+from problem.motion import Motion
 from recordings.run import Array
 
-CROSSINGS = (0.005, 0.02, 0.06)  # s that the bodies take to cross a gap, for a first look
-CROSSING_RANGE = (0.002, 0.15)
+RIGID_HZ = 200.0  # a resonance that no recording shows: the twist follows the load at once
+LOWEST_HZ = 3.0
+RESONANCES_HZ = (RIGID_HZ, 25.0)  # for a first look
+DAMPING_TIME = 3e-4  # s, of steel gears: a fiftieth of the critical damping at 20 Hz
+GAPS = (1e-4, 6e-4, 4e-3)  # rad, for a first look
+GAP_RANGE = (1e-5, 5e-2)
+SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 16)
+KEPT = 2  # gaps of a scan
 
 
 @dataclass(frozen=True)
 class Transmission(Term):
-    """delta = coefficient x `give`, a law of the load that the drive train carries; all joints feel it.
+    """A twist of the drive train by the load that it carries, per unit of the coefficient; all joints feel it.
 
     measured: factor of the recorded difference between link and motor, where there is one: then the columns
     follow the difference itself, scaled to the law.
@@ -43,49 +50,69 @@ class Transmission(Term):
         """The joint that gives, from 0."""
         return self.joints[0] - 1
 
+    @property
     @abstractmethod
-    def give(self, scene: Scene) -> Array:
-        """Change of the link's angle for a coefficient of one, (samples,)."""
+    def law(self) -> tuple[Twist, float]:
+        """The drive train of this shape, and the coefficient that it has."""
 
-    def columns(self, scene: Scene) -> Array:
-        """Derivative of the rigid torque along the change."""
-        change = self.give(scene)
-        recorded = recorded_difference(scene, self.index)
-        if self.measured and recorded is not None:
-            change = change.mean() + recorded / self.measured  # zeros of the two encoders may differ
-        return along(scene, change_of_joint(scene, self.index, change))[:, :, None]
-
-    @classmethod
-    def factor(cls, candidate: Self, scenes: Sequence[Scene]) -> float | None:
-        """Coefficient that the recorded differences have over the law, and a constant; None without them."""
-        pairs = [(candidate.give(scene), recorded_difference(scene, candidate.index)) for scene in scenes]
+    def with_recorded(self, scenes: Sequence[Scene]) -> Self:
+        """With the coefficient that the recorded differences have over the law; as it is without them."""
+        pairs = [(self.twist(scene)[0], recorded_difference(scene, self.index)) for scene in scenes]
         if any(recorded is None for _, recorded in pairs):
-            return None
+            return self
         law, recorded = (np.concatenate([np.asarray(pair[side]) for pair in pairs]) for side in (0, 1))
         law = law - law.mean()
         factor = float(law @ recorded / (law @ law)) if law.any() else 0.0
-        return factor or None
+        return replace(self, measured=factor or None)
+
+    def twist(self, scene: Scene, inertia: Array | None = None) -> Array:
+        """Twist, its speed and its acceleration for a coefficient of one, (3, samples)."""
+        law, coefficient = self.law
+        return twisted(scene, self.index, law, inertia) / coefficient
+
+    def columns(self, scene: Scene) -> Array:
+        """Derivative of the rigid torque along the change."""
+        twist, recorded = self.twist(scene), recorded_difference(scene, self.index)
+        if self.measured and recorded is not None:  # zeros of the two encoders may differ
+            change = change_of_joint(scene, self.index, twist[0].mean() + recorded / self.measured)
+        else:
+            moved = np.zeros((3, *scene.motion.position.shape))
+            moved[:, :, self.index] = twist
+            change = Motion(*moved)
+        return along(scene, change)[:, :, None]
 
 
 @dataclass(frozen=True)
 class JointElasticity(Transmission):
-    """delta = -tau_rigid / stiffness (Spong 1987)."""
+    """A spring (Spong 1987). Coefficient: the compliance that the torque shows.
+
+    shape: the stiffness that its resonance has, N m/rad.
+    """
 
     effect = "joint_elasticity"
     names = ("stiffness",)
 
+    @property
+    def law(self) -> tuple[Twist, float]:
+        """The spring, and its compliance."""
+        return Twist(self.shape[0], DAMPING_TIME), 1 / self.shape[0]
+
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
-        """One candidate, by the recorded difference where there is one."""
-        return [cls.at(arm, joint, measured=cls.factor(cls.at(arm, joint), scenes))]
-
-    def give(self, scene: Scene) -> Array:
-        """The twist of a spring of one N m/rad."""
-        return -scene.rigid_torque[:, self.index]
+        """Resonances beyond and within what a recording shows, by the recorded difference where there is one."""
+        inertia = float(np.mean([own_inertia(scene, joint - 1).mean() for scene in scenes]))
+        lowest, *looks = (inertia * (2 * np.pi * hertz) ** 2 for hertz in (LOWEST_HZ, *RESONANCES_HZ))
+        bounds = ((lowest, looks[0]),)
+        return [cls.at(arm, joint, shape=(each,), bounds=bounds).with_recorded(scenes) for each in looks]
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """The stiffness: the coefficient is its inverse."""
-        return {"stiffness": float(1 / coefficients[0]) if coefficients[0] else float("inf")}
+        stiffness = float(1 / coefficients[0]) if coefficients[0] else float("inf")
+        return {"stiffness": stiffness, "resonant_stiffness": self.shape[0]}
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter: both are stiffnesses."""
+        return super().unit("stiffness")
 
     def equation(self, coefficients: Array) -> str:
         """The law with its number."""
@@ -94,31 +121,55 @@ class JointElasticity(Transmission):
 
     @classmethod
     def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a stiffness."""
-        return cls.at(arm, joints[0]), np.array([1 / float(parameters["stiffness"])])
+        """The spring with these parameters; its resonance follows its stiffness where no other is known."""
+        stiffness = float(parameters["stiffness"])
+        resonant = float(parameters.get("resonant_stiffness", stiffness))
+        spring = cls.at(arm, joints[0], shape=(resonant,), bounds=((resonant / 2, resonant * 2),))
+        return spring, np.array([1 / stiffness])
 
 
 @dataclass(frozen=True)
 class Backlash(Transmission):
-    """delta = -gap / 2 sgn(load), smoothed over the time that the bodies take to cross; shape: that time, s."""
+    """Play between two walls that do not bounce. Coefficient: the gap that the torque shows.
+
+    shape: the gap that is crossed, rad.
+    """
 
     effect = "backlash"
     names = ("gap",)
+    closely = True
+
+    @property
+    def law(self) -> tuple[Twist, float]:
+        """The play, and its gap."""
+        return Twist(gap=self.shape[0]), self.shape[0]
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
-        """Quick and slow crossings."""
-        looks = [cls.at(arm, joint, shape=(time,), bounds=(CROSSING_RANGE,)) for time in CROSSINGS]
-        return [cls.at(arm, joint, shape=x.shape, bounds=x.bounds, measured=cls.factor(x, scenes)) for x in looks]
+        """A few gaps, by the recorded difference where there is one."""
+        return [each.with_recorded(scenes) for each in cls._gaps(arm, joint, GAPS)]
 
-    def give(self, scene: Scene) -> Array:
-        """Half a gap towards the side that carries the load."""
-        side = np.sign(scene.rigid_torque[:, self.index])
-        return np.asarray(-0.5 * gaussian_filter1d(side, max(self.shape[0] / scene.step, 0.5), mode="nearest"))
+    @classmethod
+    def scanned(cls, arm: Arm, joint: int, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[Self]:
+        """The gaps whose torque at the joint resembles most what is left there; first looks with a recorded one."""
+        looks = cls.first_looks(arm, joint, scenes)
+        if looks[0].measured is not None:
+            return looks
+        gaps = cls._gaps(arm, joint, SCANNED_GAPS.tolist())
+        alike = _resemblance(gaps, scenes, residuals, joint - 1)
+        return [replace(gaps[place], looks=len(gaps)) for place in np.argsort(-alike)[:KEPT]]
+
+    @classmethod
+    def _gaps(cls, arm: Arm, joint: int, gaps: Sequence[float]) -> list[Self]:
+        return [cls.at(arm, joint, shape=(gap,), bounds=(GAP_RANGE,)) for gap in gaps]
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """The whole gap."""
-        return {"gap": float(coefficients[0])}
+        return {"gap": float(coefficients[0]), "crossed_gap": self.shape[0]}
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter: both are gaps."""
+        return super().unit("gap")
 
     def equation(self, coefficients: Array) -> str:
         """The law with its number."""
@@ -127,8 +178,23 @@ class Backlash(Transmission):
 
     @classmethod
     def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a gap that is crossed in a middling time."""
-        return cls.at(arm, joints[0], shape=(CROSSINGS[1],), bounds=(CROSSING_RANGE,)), np.array([parameters["gap"]])
+        """The play with its gap."""
+        gap = float(parameters["gap"])
+        crossed = float(parameters.get("crossed_gap", gap))
+        return cls.at(arm, joints[0], shape=(crossed,), bounds=(GAP_RANGE,)), np.array([gap])
+
+
+@dataclass(frozen=True)
+class BacklashFamily(EveryJoint):
+    """Play at every joint, its gap by a scan of what is left."""
+
+    effect: str = "backlash"
+    terms: tuple[type[Term], ...] = (Backlash,)
+
+    def scan(self, arm: Arm, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[list[Candidate]]:
+        """The best gaps of a fine grid at each joint that moves."""
+        joints = [joint for joint in range(1, len(arm) + 1) if moves(scenes, joint)]
+        return [list[Candidate](Backlash.scanned(arm, joint, scenes, residuals)) for joint in joints]
 
 
 def recorded_difference(scene: Scene, joint: int) -> Array | None:
@@ -139,5 +205,20 @@ def recorded_difference(scene: Scene, joint: int) -> Array | None:
     return None if np.isnan(difference).any() else np.asarray(difference - difference.mean())
 
 
+def _resemblance(
+    shapes: Sequence[Transmission], scenes: Sequence[Scene], residuals: Sequence[Array], joint: int
+) -> Array:
+    """Share of what is left at a joint (from 0) that each shape explains there, by the inertia of the twist alone."""
+    products = np.zeros((3, len(shapes)))
+    for scene, residual in zip(scenes, residuals, strict=True):
+        rows = np.flatnonzero(np.isfinite(residual[:, joint]))
+        left, inertia = residual[rows, joint], own_inertia(scene, joint)
+        width = max(int(np.median(np.diff(rows))), 1) if len(rows) > 1 else 1
+        for place, shape in enumerate(shapes):
+            torque = np.convolve(inertia * shape.twist(scene, inertia)[2], np.full(width, 1 / width), "same")[rows]
+            products[:, place] += torque @ left, torque @ torque, left @ left
+    return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
+
+
 JOINT_ELASTICITY = EveryJoint("joint_elasticity", (JointElasticity,))
-BACKLASH = EveryJoint("backlash", (Backlash,))
+BACKLASH = BacklashFamily()

@@ -20,6 +20,7 @@ from recordings.run import Array
 WIDER = 3.0  # times the widest link
 EXCITED = 0.25  # of the mean square in identification
 LITTLE = 0.002  # of the validation error
+LITTLE_BESIDE = 0.05  # of the gain in identification: a loss in validation that is little beside it
 SPECIAL = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
            "friction_drift", "load_dependent_friction")  # fmt: skip
 SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
@@ -273,7 +274,7 @@ class Judge:
         before, after = (self._validation_rms(each, joint) for each in (less, fit))
         return Evidence(
             joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, objection,
-            _refuted(validated, inside) or after > (1 + LITTLE) * before,
+            _refuted(validated, inside, after > (1 + LITTLE) * before),
         )  # fmt: skip
 
     def _validation_rms(self, fit: Fit, joint: int) -> float:
@@ -282,10 +283,15 @@ class Judge:
         return float(np.sqrt(np.mean(self.found.residual_at(joint, fit)[rows] ** 2)))
 
 
-def _refuted(validated: Gain, inside: Gain) -> bool:
-    """Whether validation data speak against an effect: surely, or by not profiting although they excite it."""
-    excited = validated.change > EXCITED * inside.change
-    return validated.share < 0 and (excited or validated.p_value > SURELY_WORSE)
+def _refuted(validated: Gain, inside: Gain, larger: bool) -> bool:
+    """Whether validation data speak against an effect: by not profiting although they excite it, or surely.
+
+    larger: whether their error grows as it is, not whitened. A sure loss that is little beside the gain in
+    identification, where they hardly excite it, is an effect whose form is not exact there.
+    """
+    if validated.change > EXCITED * inside.change:
+        return validated.share < 0 or larger
+    return validated.share < -LITTLE_BESIDE * max(inside.share, 0.0) and validated.p_value > SURELY_WORSE
 
 
 def looks_of(found: Round) -> int:

@@ -58,7 +58,8 @@ class Workbench:
 
     def block(self, candidate: Candidate, variant: int) -> Block:
         """A candidate's filtered columns."""
-        same, scenes = self.settings.guards.same_filter, self.calm if candidate.follows_model else self.scenes
+        same = self.settings.guards.same_filter
+        scenes = self.calm if candidate.follows_model and not candidate.closely else self.scenes
         return Block(candidate, variant, filtered_columns(candidate, scenes, self.observed, same))
 
     def with_candidates(self, families: Iterable[Family], left: Sequence[Array] | None = None) -> "Workbench":

@@ -13,7 +13,6 @@ from diagnosis.effects.contract import Candidate, Family, Scene
 from diagnosis.effects.friction import CoulombFriction
 from diagnosis.effects.library import BUILT_IN, library
 from diagnosis.effects.term import EveryJoint, Term
-from diagnosis.effects.transmission import CROSSINGS
 from identification import extras
 from identification.extras import BrokenEffectError
 from problem.arm import PARAMETER_NAMES
@@ -31,7 +30,7 @@ BEYOND = {
     "velocity",
     "power",
 }
-BEYOND |= {"sensor", "coldest", "warmest", *PARAMETER_NAMES}
+BEYOND |= {"resonant_stiffness", "crossed_gap", "sensor", "coldest", "warmest", *PARAMETER_NAMES}
 
 
 def scenes_of(kinds: str) -> list[Scene]:
@@ -84,8 +83,6 @@ def test_named_parameters_make_the_same_torque_again(kinds: str) -> None:
     for each in every(kinds):
         if each.effect == "external_contact" or getattr(each, "began", ()):
             continue  # bound to the runs of one recording
-        if each.effect == "backlash":
-            each = each.reshaped((CROSSINGS[1],))  # the time of a crossing is no named parameter
         coefficients = drawn(each, each.columns(where).shape[2])
         if each.effect == "torque_saturation":
             coefficients = np.ones(1)
