@@ -10,6 +10,7 @@ from diagnosis.effects.library import library
 from diagnosis.engine.claiming import claims_of
 from diagnosis.engine.doubt import doubted, inexact
 from diagnosis.engine.evidence import Evidence, looks_of
+from diagnosis.engine.flexible import Features, features
 from diagnosis.engine.floor import noise_floor
 from diagnosis.engine.links import are_bodies, link_prior
 from diagnosis.engine.located import located
@@ -21,7 +22,7 @@ from diagnosis.engine.segments import rows_of
 from diagnosis.engine.simulation import simulation_of
 from diagnosis.engine.solver import State
 from diagnosis.engine.soundness import misread, unsound
-from diagnosis.engine.surrogate import Features, Structure, features
+from diagnosis.engine.surrogate import Structure
 from diagnosis.engine.workbench import Workbench, workbench
 from diagnosis.result import Claim, Diagnosis, JointFit, Status, Unexplained
 from diagnosis.settings import Baseline, Settings

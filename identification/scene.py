@@ -36,6 +36,21 @@ class Scene:
         """What the links of the present model need, without friction: (samples, joints), N m (N)."""
         return rigid_body_torque(self.arm, self.motion, self.inertial)
 
+    @cached_property
+    def own_inertia(self) -> Array:
+        """Inertia that each joint feels of the links of the present model, its rotor left out: (samples, joints),
+        kg m2 (kg).
+        """
+        still = np.zeros(self.motion.position.shape)
+        rest = rigid_body_torque(self.arm, Motion(self.motion.position, still, still), self.inertial)
+        out = np.empty(rest.shape)
+        for joint in range(len(self.arm)):
+            push = still.copy()
+            push[:, joint] = 1.0
+            pushed = rigid_body_torque(self.arm, Motion(self.motion.position, still, push), self.inertial)
+            out[:, joint] = pushed[:, joint] - rest[:, joint]
+        return out
+
     @property
     def step(self) -> float:
         """Time from sample to sample, s."""

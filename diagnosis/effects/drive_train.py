@@ -12,9 +12,7 @@ import numpy as np
 
 from diagnosis.effects._drive_train import ffi, lib
 from diagnosis.effects.contract import Scene
-from problem.motion import Motion
 from problem.native import pointer
-from problem.regressor import rigid_body_torque
 from recordings.run import Array
 
 FINE = 0.1  # rad of the fastest oscillation a step
@@ -32,24 +30,14 @@ class Twist:
 
 
 def own_inertia(scene: Scene, joint: int) -> Array:
-    """Inertia that a joint (from 0) feels of the links, its rotor left out, (samples,), kg m2 (kg)."""
-    still = np.zeros(scene.motion.position.shape)
-    push = still.copy()
-    push[:, joint] = 1.0
-    torques = [
-        rigid_body_torque(scene.arm, Motion(scene.motion.position, still, each), scene.inertial)[:, joint]
-        for each in (push, still)
-    ]
-    inertia = torques[0] - torques[1]
+    """Inertia that a joint (from 0) feels of the links, its rotor left out, (samples,), kg m2 (kg): above zero."""
+    inertia = scene.own_inertia[:, joint]
     return np.maximum(inertia, max(LIGHTEST * float(inertia.max()), 1e-9))
 
 
-def twisted(scene: Scene, joint: int, law: Twist, inertia: Array | None = None) -> Array:
-    """Twist of a joint (from 0), its speed and its acceleration, (3, samples); at rest with its load at the start.
-
-    inertia: as `own_inertia` has it, where it is known already.
-    """
-    inertia = own_inertia(scene, joint) if inertia is None else inertia
+def twisted(scene: Scene, joint: int, law: Twist) -> Array:
+    """Twist of a joint (from 0), its speed and its acceleration, (3, samples); at rest with its load at the start."""
+    inertia = own_inertia(scene, joint)
     load = np.ascontiguousarray(scene.rigid_torque[:, joint])
     wall = 2 * np.pi * WALL_HZ
     stiffness, damping = (wall**2, 2 * wall) if law.gap > 0 else (law.stiffness, law.damping_time * law.stiffness)

@@ -65,10 +65,10 @@ class Transmission(Term):
         factor = float(law @ recorded / (law @ law)) if law.any() else 0.0
         return replace(self, measured=factor or None)
 
-    def twist(self, scene: Scene, inertia: Array | None = None) -> Array:
+    def twist(self, scene: Scene) -> Array:
         """Twist, its speed and its acceleration for a coefficient of one, (3, samples)."""
         law, coefficient = self.law
-        return twisted(scene, self.index, law, inertia) / coefficient
+        return twisted(scene, self.index, law) / coefficient
 
     def columns(self, scene: Scene) -> Array:
         """Derivative of the rigid torque along the change."""
@@ -215,7 +215,7 @@ def _resemblance(
         left, inertia = residual[rows, joint], own_inertia(scene, joint)
         width = max(int(np.median(np.diff(rows))), 1) if len(rows) > 1 else 1
         for place, shape in enumerate(shapes):
-            torque = np.convolve(inertia * shape.twist(scene, inertia)[2], np.full(width, 1 / width), "same")[rows]
+            torque = np.convolve(inertia * shape.twist(scene)[2], np.full(width, 1 / width), "same")[rows]
             products[:, place] += torque @ left, torque @ torque, left @ left
     return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
 

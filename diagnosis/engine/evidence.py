@@ -6,14 +6,14 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
-from diagnosis.engine.folds import Folds, Gain, folds_of, gain_of
+from diagnosis.engine.comparison import Comparison
+from diagnosis.engine.folds import Gain
 from diagnosis.engine.links import Widths
 from diagnosis.engine.plausible import implausible
 from diagnosis.engine.pushes import no_push
-from diagnosis.engine.refine import precision_of
-from diagnosis.engine.robust import Scatter, block_numbers, scatter, whitened_rows
+from diagnosis.engine.robust import Scatter
 from diagnosis.engine.rounds import Round
-from diagnosis.engine.segments import rows_of
+from diagnosis.engine.simpler import simpler_than
 from diagnosis.engine.solver import EXPECTED, Fit, State
 from recordings.run import Array
 
@@ -21,12 +21,8 @@ WIDER = 3.0  # times the widest link
 EXCITED = 0.25  # of the mean square in identification
 LITTLE = 0.002  # of the validation error
 LITTLE_BESIDE = 0.05  # of the gain in identification: a loss in validation that is little beside it
-SPECIAL = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
-           "friction_drift", "load_dependent_friction")  # fmt: skip
-SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
 ONCE = ("external_contact",)
 SURELY_WORSE = 0.99  # one-sided p-value of a gain, for a loss
-HELD_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
 
 
 @dataclass(frozen=True)
@@ -62,25 +58,16 @@ class Judge:
     state: State
 
     @cached_property
-    def wide(self) -> Fit:
-        """The fit with everything that is compared: the state's groups, and the simpler ones that they contain."""
-        simpler = [other for group in self.state.groups for other in self.simpler(group)]
-        return self.found.solver.fit(State(tuple(sorted({*self.state.groups, *simpler})), self.state.widths))
-
-    @cached_property
-    def folds(self) -> Folds:
-        """Whitened rows of the wide fit, in folds."""
-        found, fit = self.found, self.wide
-        rows = whitened_rows(found.columns, {}, fit, found.moments.lengths, found.noise, found.bench.observed)
-        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
-        values = np.concatenate([links, fit.coefficients[fit.columns]])
-        return folds_of(rows, values, precision_of(found.solver, fit, len(fit.inverse)))
+    def compared(self) -> Comparison:
+        """The state beside the simpler groups that its own contain."""
+        simpler = frozenset(other for group in self.state.groups for other in self.simpler(group))
+        return Comparison(self.found, self.state, simpler)
 
     def effects(self) -> dict[int, Evidence]:
         """Evidence for each group."""
         solver, state = self.found.solver, self.state
         fit = solver.fit(state)
-        spread, losses = self._scattered(state), solver.losses(fit)
+        spread, losses = self.compared.scattered(state), solver.losses(fit)
         out = {}
         for group in state.groups:
             candidate = solver.groups[group].candidate
@@ -117,8 +104,9 @@ class Judge:
         fit, less = (self.found.solver.fit(each) for each in (self.state, State(self.state.groups, without)))
         score = fit.score - less.score
         p_value = float(np.exp(-np.clip(score, 0, 700)))  # a Bayes factor bounds the p-value from above
-        gains = {joint: self._validated(fit, less, joint) for joint in range(joints)}
-        return self._evidence(fit, less, gains, (p_value, looks), score, None)
+        gains = {joint: self.compared.validated(fit, less, joint) for joint in range(joints)}
+        both = {joint: (gain, gain) for joint, gain in gains.items()}  # links are held out in validation runs alone
+        return self._evidence(fit, less, both, (p_value, looks), score)
 
     def looks(self, group: int) -> int:
         """How much was looked at: every place has its equal share of the level, and divides it among its shapes.
@@ -154,18 +142,8 @@ class Judge:
         return no_push(push, joint, observed, observed.torque[:, joint] - found.residual_at(joint, found.fit) - push)
 
     def simpler(self, group: int) -> tuple[int, ...]:
-        """Usual friction that a special law of friction has to be better than."""
-        groups, candidate = self.found.solver.groups, self.found.solver.groups[group].candidate
-        wanted = {name for name in candidate.replaces if name in EXPECTED}
-        if candidate.effect in SPECIAL:
-            wanted |= {"coulomb_friction", "viscous_friction"}
-        if candidate.effect in SPRINGS:
-            wanted |= {"torque_offset"}
-        return tuple(
-            number
-            for number, each in enumerate(groups)
-            if each.candidate.effect in wanted and each.candidate.joint == candidate.joint
-        )
+        """See `simpler_than`."""
+        return simpler_than(self.found.solver.groups, group)
 
     def _beyond_usual(self, group: int) -> Evidence:
         """The evidence against usual friction in the place of one special law, and of all at this joint."""
@@ -183,29 +161,7 @@ class Judge:
     def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
         """Evidence for the state against a smaller one."""
         fit, other = (self.found.solver.fit(each) for each in (self.state, less))
-        return self._evidence(fit, other, self._gains(fit, other, rows), tested, score, None)
-
-    def _scattered(self, state: State) -> Scatter:
-        """Robust covariance of the parameters of a state within the wide fit."""
-        chosen = self._chosen(state)
-        rows, fit = self.folds.rows, self.found.solver.fit(state)
-        errors = [
-            target - design[:, chosen] @ self._values(fit)
-            for target, design in zip(self.folds.targets, rows.designs, strict=True)
-        ]
-        own = type(rows)(tuple(design[:, chosen] for design in rows.designs), tuple(errors), rows.blocks)
-        precision = self.folds.precision[np.ix_(chosen, chosen)]
-        return scatter(own, precision, self.found.bench.settings.guards.robust_variance)
-
-    def _values(self, fit: Fit) -> Array:
-        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
-        return np.concatenate([links, fit.coefficients[fit.columns]])
-
-    def _chosen(self, state: State) -> list[int]:
-        """Where the parameters of a smaller state stand among those of the wide fit."""
-        rank = self.wide.links.shape[1]
-        at = {int(column): rank + place for place, column in enumerate(self.wide.columns)}
-        return [*range(rank), *(at[int(column)] for column in self.found.solver.fit(state).columns)]
+        return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score)
 
     def _tested(self, fit: Fit, spread: Scatter, group: int) -> float:
         columns = self.found.solver.groups[group].columns
@@ -214,7 +170,7 @@ class Judge:
     def _beyond(self, group: int, simpler: tuple[int, ...]) -> float:
         """P-value of what a group explains that the simpler ones in it do not."""
         state = State(tuple(sorted({*self.state.groups, *simpler})), self.state.widths)
-        return self._tested(self.found.solver.fit(state), self._scattered(state), group)
+        return self._tested(self.found.solver.fit(state), self.compared.scattered(state), group)
 
     def _place(self, fit: Fit, group: int) -> list[int]:
         """Where a group's coefficients stand in a fit's covariance."""
@@ -228,34 +184,6 @@ class Judge:
         lengths = self.found.moments.lengths[self.found.solver.groups[group].columns]
         return np.asarray(spread.covariance[np.ix_(place, place)] / np.outer(lengths, lengths))
 
-    def _gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[Gain, Gain]]:
-        """Per joint the gain on validation rows, and on identification stretches held out in turn."""
-        pair = [self._in_turn(each.state) for each in (less, fit)]
-        blocks = self.folds.rows.blocks
-        return {
-            joint: (
-                self._validated(fit, less, joint)[0],
-                gain_of(pair[0][joint], pair[1][joint], blocks[joint]),
-            )
-            for joint in joints
-        }
-
-    def _in_turn(self, state: State) -> list[Array]:
-        """Held-out errors of a state, stretch by stretch; those of the judged state itself are kept."""
-        return self._own_errors if state == self.state else self.folds.errors(self._chosen(state))
-
-    @cached_property
-    def _own_errors(self) -> list[Array]:
-        return self.folds.errors(self._chosen(self.state))
-
-    def _validated(self, fit: Fit, less: Fit, joint: int) -> tuple[Gain, Gain]:
-        observed, noise = self.found.bench.observed, self.found.noise
-        left = np.column_stack([self.found.residual_at(joint, each) for each in (less, fit)])
-        white = noise.white(left, joint, observed, "validate")
-        blocks = noise.numbers(block_numbers(observed, HELD_BLOCK_S), joint, observed, "validate")
-        gain = gain_of(white[:, 0], white[:, 1], blocks)
-        return gain, gain
-
     def _evidence(
         self,
         fit: Fit,
@@ -263,7 +191,6 @@ class Judge:
         gains: dict[int, tuple[Gain, Gain]],
         tested: tuple[float, int],
         score: float,
-        objection: str | None,
     ) -> Evidence:
         joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
         validated, inside = gains[joint]
@@ -271,16 +198,11 @@ class Judge:
         held_p = min(each.p_value for each in (validated, inside) if each.share >= min(0.5 * best.share, best.share))
         p_value, looks = tested
         corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
-        before, after = (self._validation_rms(each, joint) for each in (less, fit))
+        before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
         return Evidence(
-            joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, objection,
+            joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, None,
             _refuted(validated, inside, after > (1 + LITTLE) * before),
         )  # fmt: skip
-
-    def _validation_rms(self, fit: Fit, joint: int) -> float:
-        observed = self.found.bench.observed
-        rows = rows_of(observed.of_role("validate", joint), observed.rows)
-        return float(np.sqrt(np.mean(self.found.residual_at(joint, fit)[rows] ** 2)))
 
 
 def _refuted(validated: Gain, inside: Gain, larger: bool) -> bool:

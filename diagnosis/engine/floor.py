@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from diagnosis.engine.flexible import Features
 from diagnosis.engine.observed import Observed
 from diagnosis.engine.segments import rows_of
-from diagnosis.engine.surrogate import Features, predictable
+from diagnosis.engine.surrogate import predictable
 from recordings.differentiate import Signals
 from recordings.periods import find_period
 from recordings.run import Array

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from diagnosis.engine.evidence import Evidence
+from diagnosis.engine.flexible import Features
 from diagnosis.engine.noise import Noise
 from diagnosis.engine.rounds import Round
 from diagnosis.engine.segments import rows_of
 from diagnosis.engine.solver import State
-from diagnosis.engine.surrogate import SMALL, Features, Structure, structure
+from diagnosis.engine.surrogate import SMALL, Structure, structure
 from diagnosis.next_experiment import next_experiment
 from diagnosis.result import Claim
 from recordings.run import Array

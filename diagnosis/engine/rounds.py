@@ -7,13 +7,14 @@ import numpy as np
 
 from diagnosis.effects.contract import Family, Scene
 from diagnosis.engine.columns import Columns
+from diagnosis.engine.flexible import Features
 from diagnosis.engine.links import Widths
 from diagnosis.engine.moments import Moments
 from diagnosis.engine.noise import Noise, noise_of
 from diagnosis.engine.refine import refined
 from diagnosis.engine.search import Search, Step, background
 from diagnosis.engine.solver import EXPECTED, Fit, Solver, State
-from diagnosis.engine.surrogate import Features, predictable
+from diagnosis.engine.surrogate import predictable
 from diagnosis.engine.workbench import Workbench
 from problem.regressor import rigid_body_torque
 from recordings.run import Array

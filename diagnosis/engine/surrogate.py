@@ -1,49 +1,28 @@
 """A flexible stand-in for physics without a name: does anything predictable remain, and on what does it depend?
 
-Ridge regression on splines and random waves (Rahimi and Recht 2007) of the joints' motion and of time, none of them
-from the library. Only what it predicts on data that took no part counts.
+Ridge regression on flexible features, none of them from the library. Only what it predicts on data that took no part
+counts.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
+from diagnosis.engine.flexible import Features
 from diagnosis.engine.folds import gain_of
 from diagnosis.engine.noise import Noise
 from diagnosis.engine.observed import Observed
+from diagnosis.engine.ridge import FOLD_S, best_ridge, by_thirds, in_turn, predicted_in_turn
 from diagnosis.engine.robust import block_numbers
 from diagnosis.engine.segments import Segment, rows_of
 from recordings.run import Array
 
-HATS, FINE = 8, 16  # piecewise linear functions of a variable
-PAIRS = 6  # of other joints
-FEW_JOINTS = 4  # an arm with more gets fewer waves a pair
-WAVES = 16  # random waves of a pair of variables
-SPEEDS = (0.005, 0.02, 0.06, 0.2, 0.6)  # of the top speed: widths of smooth signs of the velocity
-MEMORIES_S = (0.02, 0.1, 0.5)  # s: of lagged signs, for what depends on the way since a reversal
-RIDGES = tuple(10.0 ** np.arange(-6.0, 2.0))  # of the mean squared length of a feature
 BLOCK_S = 1.0  # s: stretches of time that are compared on held-out data
 LEAST = 0.02  # of the held-out error, for the noise
 SMALL = 0.03  # of the held-out error: less may be what known effects are known too little of
 STRUCTURED = 0.05  # p-value below which a prediction counts as no noise: else whitening would hide what is slow
-FOLD_S = 2.0  # s: stretches that choose the ridge in turn
-
-
-@dataclass(frozen=True, eq=False)
-class Features:
-    """values: (rows, features). variables: per feature the names of what it depends on.
-
-    folds: (rows,), which third of the identification rows each belongs to, -1 for none. grams: of each third.
-    """
-
-    values: Array
-    variables: tuple[frozenset[str], ...]
-    folds: NDArray[np.intp]
-    grams: tuple[Array, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,69 +43,15 @@ class Structure:
     depends_on: tuple[str, ...]
 
 
-def features(observed: Observed, joint: int, rng: np.random.Generator) -> Features:
-    """Features for one joint at the kept rows."""
-    position, velocity, acceleration = (observed.kept(name) for name in ("position", "velocity", "acceleration"))
-    values: list[Array] = []
-    waves = WAVES if observed.joints <= FEW_JOINTS else WAVES // 2
-    names: list[frozenset[str]] = []
-
-    def add(columns: Array, *variables: str) -> None:
-        values.append(columns)
-        names.extend([frozenset(variables)] * columns.shape[1])
-
-    for other in range(observed.joints):
-        add(_hats(position[:, other]), f"position_{other + 1}")
-        add(_hats(velocity[:, other]), f"velocity_{other + 1}")
-        if other != joint:
-            pair = f"position_{joint + 1}", f"position_{other + 1}"
-            add(_waves(position[:, [joint, other]], rng, waves), *pair)
-            add(_waves(velocity[:, [joint, other]], rng, waves), f"velocity_{joint + 1}", f"velocity_{other + 1}")
-            add(
-                _waves(np.column_stack([position[:, joint], velocity[:, other]]), rng, waves),
-                pair[0],
-                f"velocity_{other + 1}",
-            )
-    for first, second in list(combinations([other for other in range(observed.joints) if other != joint], 2))[:PAIRS]:
-        add(_waves(position[:, [first, second]], rng, waves), f"position_{first + 1}", f"position_{second + 1}")
-    own = f"velocity_{joint + 1}"
-    add(_hats(acceleration[:, joint]), f"acceleration_{joint + 1}")
-    add(_waves(np.column_stack([position[:, joint], velocity[:, joint]]), rng), f"position_{joint + 1}", own)
-    add(_waves(np.column_stack([velocity[:, joint], acceleration[:, joint]]), rng), own, f"acceleration_{joint + 1}")
-    signs = _signs(velocity[:, joint])
-    add(signs, own)
-    add(_hats(position[:, joint], FINE) * signs[:, 2:3], own, f"position_{joint + 1}")
-    add(_lagged(observed, signs[:, 1]), own)
-    add(_lagged(observed, velocity[:, joint]), own)
-    clock = observed.time
-    add(_hats(clock), "time")
-    add(np.column_stack([clock, clock**2]) * signs[:, 2:3], own, "time")
-    add(np.column_stack([clock, clock**2]) * velocity[:, [joint]], own, "time")
-    matrix = np.column_stack(values)
-    matrix = matrix - matrix.mean(axis=0)
-    spread = matrix.std(axis=0)
-    kept = spread > 1e-9
-    chosen = tuple(name for name, wanted in zip(names, kept, strict=True) if wanted)
-    scaled, thirds = matrix[:, kept] / spread[kept], _thirds(observed, joint)
-    grams = tuple(scaled[thirds == fold].T @ scaled[thirds == fold] for fold in range(3))
-    return Features(scaled, chosen, thirds, grams)
-
-
-def _thirds(observed: Observed, joint: int) -> NDArray[np.intp]:
-    """Stretches of time of the identification rows, in turn; -1 elsewhere."""
-    learn = rows_of(observed.of_role("identify", joint), observed.rows)
-    return np.where(learn, block_numbers(observed, FOLD_S) % 3, -1)
-
-
 def predictable(residual: Array, joint: int, made: Features, observed: Observed) -> Array:
     """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
     products = tuple(made.values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
-    ridge, weights = _best_ridge(made.grams, products)
+    ridge, weights = best_ridge(made.grams, products)
     predicted = made.values @ weights
     rows = rows_of(observed.of_role("validate", joint), observed.rows)
     numbers, learn = block_numbers(observed, BLOCK_S), made.folds >= 0
     validated = gain_of(residual[rows], residual[rows] - predicted[rows], numbers[rows])
-    turned = _in_turn(made.values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
+    turned = in_turn(made.values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
     inside = gain_of(residual[learn], turned, numbers[learn])
     sure = any(each.share > LEAST and each.p_value < STRUCTURED for each in (validated, inside))
     return predicted if sure else np.zeros(len(residual))
@@ -150,69 +75,24 @@ def _structure(residual: Array, joint: int, made: Features, noise: Noise, observ
     white, target = noise.whitened(made.values, joint, both), noise.whitened(residual[:, None], joint, both)[:, 0]
     lost = noise.lost(joint)
     known = np.arange(len(target)) < sum(each.stop - each.start - lost for each in learn)
-    grams, products, thirds = _by_thirds(white, target, _folds(both, lost, observed, FOLD_S) % 3, known)
-    ridge, weights = _best_ridge(grams, products)
+    grams, products, thirds = by_thirds(white, target, _folds(both, lost, observed, FOLD_S) % 3, known)
+    ridge, weights = best_ridge(grams, products)
     blocks = _folds(both, lost, observed, BLOCK_S)
     validated = gain_of(target[~known], target[~known] - white[~known] @ weights, blocks[~known])
-    all_grams, all_products, folds = _by_thirds(white, target, thirds, np.ones(len(target), dtype=bool))
-    turned = _in_turn(white, target, folds, ridge, all_grams, all_products)
+    all_grams, all_products, folds = by_thirds(white, target, thirds, np.ones(len(target), dtype=bool))
+    turned = in_turn(white, target, folds, ridge, all_grams, all_products)
     inside = gain_of(target, turned, blocks)
     best = validated if validated.share >= inside.share else inside
     rows = rows_of(judge, observed.rows)
     prediction = made.values @ weights
     if best is inside:
-        prediction[rows] = _predicted_in_turn(made.values, rows, observed, ridge, all_grams, all_products)
+        prediction[rows] = predicted_in_turn(made.values, rows, observed, ridge, all_grams, all_products)
     power = float(np.mean(residual[rows] ** 2))
     share = 1 - float(np.mean((residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
     pair = (white[~known], target[~known]) if best is validated else (white, target)
     worth = best.share > SMALL
     found = _depends_on(made, np.sum(grams, axis=0), np.sum(products, axis=0), pair, ridge) if worth else ()
     return Structure(joint, best.share, best.p_value, validated.share, share, prediction, found)
-
-
-Thirds = tuple[tuple[Array, ...], tuple[Array, ...], NDArray[np.intp]]
-
-
-def _by_thirds(white: Array, target: Array, thirds: NDArray[np.intp], chosen: NDArray[np.bool_]) -> Thirds:
-    """Products of the chosen rows, third by third."""
-    parts = [white[chosen & (thirds == fold)] for fold in range(3)]
-    goals = [target[chosen & (thirds == fold)] for fold in range(3)]
-    grams = tuple(part.T @ part for part in parts)
-    return grams, tuple(part.T @ goal for part, goal in zip(parts, goals, strict=True)), thirds
-
-
-def _predicted_in_turn(
-    values: Array,
-    rows: NDArray[np.bool_],
-    observed: Observed,
-    ridge: float,
-    grams: tuple[Array, ...],
-    products: tuple[Array, ...],
-) -> Array:
-    """Predictions of the chosen rows, each from the thirds that it does not belong to."""
-    thirds = block_numbers(observed, FOLD_S)[rows] % 3
-    out = np.empty(len(thirds))
-    for fold in range(3):
-        gram = np.sum(grams, axis=0) - grams[fold] + ridge * np.eye(values.shape[1])
-        weights = np.linalg.solve(gram, np.sum(products, axis=0) - products[fold])
-        out[thirds == fold] = values[rows][thirds == fold] @ weights
-    return out
-
-
-def _in_turn(
-    white: Array,
-    target: Array,
-    thirds: NDArray[np.intp],
-    ridge: float,
-    grams: tuple[Array, ...],
-    products: tuple[Array, ...],
-) -> Array:
-    """Errors of each third where the others have been learnt from, (rows,)."""
-    out, whole, towards = target.copy(), np.sum(grams, axis=0), np.sum(products, axis=0)
-    for fold in range(3):
-        weights = np.linalg.solve(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
-        out[thirds == fold] -= white[thirds == fold] @ weights
-    return out
 
 
 def _depends_on(
@@ -238,50 +118,3 @@ def _folds(segments: Sequence[Segment], lost: int, observed: Observed, length_s:
     """Number of the stretch of time of each whitened row."""
     numbers = block_numbers(observed, length_s)
     return np.concatenate([numbers[each.start + lost : each.stop] for each in segments])
-
-
-def _best_ridge(grams: tuple[Array, ...], products: tuple[Array, ...]) -> tuple[float, Array]:
-    """The ridge that predicts each third best from the others, and the weights with it on all."""
-    count = len(products[0])
-    ridges = np.array(RIDGES) * sum(float(np.trace(gram)) for gram in grams) / max(count, 1)
-    errors = np.zeros(len(ridges))
-    whole, towards = np.sum(grams, axis=0), np.sum(products, axis=0)
-    for own, product in zip(grams, products, strict=True):
-        values, vectors = np.linalg.eigh(whole - own)
-        turned = vectors.T @ (towards - product)
-        for number, ridge in enumerate(ridges):
-            weights = vectors @ (turned / (np.maximum(values, 0) + ridge))
-            errors[number] += weights @ own @ weights - 2 * weights @ product
-    best = float(ridges[int(np.argmin(errors))])
-    return best, np.linalg.solve(whole + best * np.eye(count), towards)
-
-
-def _hats(values: Array, hats: int = HATS) -> Array:
-    """Piecewise linear functions between quantiles of the values, (rows, hats)."""
-    knots = np.unique(np.quantile(values, np.linspace(0, 1, hats)))
-    if len(knots) < 3:
-        return np.empty((len(values), 0))
-    return np.column_stack([np.interp(values, knots, unit) for unit in np.eye(len(knots))])
-
-
-def _waves(values: Array, rng: np.random.Generator, count: int = WAVES) -> Array:
-    spread = values.std(axis=0)
-    scaled = (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1)
-    frequency = rng.normal(0, 1.0, (values.shape[1], count))
-    return np.asarray(np.cos(scaled @ frequency + rng.uniform(0, 2 * np.pi, count)))
-
-
-def _signs(velocity: Array) -> Array:
-    top = max(float(np.abs(velocity).max()), 1e-9)
-    return np.column_stack([np.tanh(velocity / (speed * top)) for speed in SPEEDS])
-
-
-def _lagged(observed: Observed, values: Array) -> Array:
-    """First-order lags of a signal, run by run."""
-    lengths = np.cumsum([len(each.torque) for each in observed.signals])[:-1]
-    out = []
-    for memory in MEMORIES_S:
-        keep = float(np.exp(-1 / (memory * observed.rate_hz)))
-        parts = [lfilter([1 - keep], [1, -keep], part, zi=[keep * part[0]])[0] for part in np.split(values, lengths)]
-        out.append(np.concatenate(parts))
-    return np.column_stack(out)

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from diagnosis.engine.evidence import SPECIAL
 from diagnosis.engine.rivals import AS_GOOD
+from diagnosis.engine.simpler import SPECIAL
 from diagnosis.engine.solver import EXPECTED
 from diagnosis.next.moments import Index, solved
 from diagnosis.next.question import Law, Question, Rival

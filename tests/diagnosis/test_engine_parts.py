@@ -6,13 +6,14 @@ import pytest
 from scipy.signal import lfilter
 
 from diagnosis.effects.library import library
+from diagnosis.engine.flexible import features
 from diagnosis.engine.links import link_prior
 from diagnosis.engine.noise import noise_of
 from diagnosis.engine.observed import Observed, observe
 from diagnosis.engine.segments import Segment, parts
 from diagnosis.engine.simulation import simulation_of
 from diagnosis.engine.solver import EXPECTED, Solver, State
-from diagnosis.engine.surrogate import features, structure
+from diagnosis.engine.surrogate import structure
 from diagnosis.engine.workbench import Workbench, workbench
 from diagnosis.settings import Settings
 from problem.base_parameters import base_parameters
