@@ -57,6 +57,11 @@ class ExcitationProblem:
     unit_columns: bool = False
 
     @property
+    def spectral(self) -> bool:
+        """Whether a point's value is the condition number, whose derivatives are known."""
+        return True
+
+    @property
     def lower(self) -> Array:
         """Lower bounds, (dimension,)."""
         return self.trajectory.lower

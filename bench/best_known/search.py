@@ -1,4 +1,7 @@
-"""Many starts for one problem: from random points, from the ends of CMA-ES, and from kicks of the best known."""
+"""Many starts for one problem: from random points, from the ends of CMA-ES, and from kicks of the best known.
+
+Where no derivatives are known, CMA-ES does it alone: in the whole box, and in a smaller one about the best known.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -15,6 +18,8 @@ from problem.fitness import Criterion
 from problem.transforms import Array
 
 TURNS = ("cma-es", "gradient", "kick", "cma-es", "kick", "kick")  # one after the other
+WITHOUT_SLOPES = ("cma-es", "kick")  # the same where there are no derivatives
+EVALUATIONS = 10_000  # of such a start: these problems are dear
 DRAWS = 200  # random points, the best of which is a start
 POPULATION, DOUBLINGS = 25, 4  # of CMA-ES: doubled from one restart to the next (Auger and Hansen 2005), then anew
 BUDGET = 600  # generations
@@ -34,6 +39,8 @@ class Start:
         """How this start began, and its end; best: the point (dimension,) to kick, if there is one yet."""
         rng = self._stream()
         box = Box(problem.lower, problem.upper)
+        if not problem.spectral:
+            return self._without_slopes(problem, box, best, rng)
         plain = _plain(problem)
         turn = TURNS[self.number % len(TURNS)]
         if turn == "cma-es":
@@ -50,21 +57,35 @@ class Start:
         points = best + spread * touched * rng.normal(size=(KICKED, len(best)))
         return _from_best_of(_plain(problem), np.clip(points, problem.lower, problem.upper))
 
+    def _without_slopes(
+        self, problem: ExcitationProblem, box: Box, best: Array | None, rng: np.random.Generator
+    ) -> tuple[str, End]:
+        turn = WITHOUT_SLOPES[self.number % len(WITHOUT_SLOPES)] if best is not None else "cma-es"
+        if turn == "kick" and best is not None:
+            reach = np.exp(rng.uniform(*np.log(KICKS))) * (box.upper - box.lower) / 2
+            box = Box(np.maximum(best - reach, box.lower), np.minimum(best + reach, box.upper))
+        return turn, _evolution(problem, box, POPULATION, EVALUATIONS, rng)
+
     def _stream(self) -> np.random.Generator:
         return named_generator("best known", self.seed, self.name, self.number)
 
     def _evolved(self, plain: ExcitationProblem, box: Box, rng: np.random.Generator) -> End:
         restarts = sum(TURNS[number % len(TURNS)] == "cma-es" for number in range(self.number))
         size = POPULATION * 2 ** (restarts % DOUBLINGS)
-        population = uniform_points(size, box, rng)
-        algorithm = find_algorithm("cma-es", "best-known")
-        with np.errstate(over="ignore"):  # in the package, when every point of a generation is as good
-            found = minimise(
-                algorithm, CMAESParams(), lambda X: plain.evaluate(X).fitness, box, population, BUDGET * size, rng
-            )
-        before, after = judge(plain, found.best_x), descend(plain, found.best_x)
+        before = _evolution(plain, box, size, BUDGET * size, rng)
+        after = descend(plain, before.point)
         best = after if after.better_than(before) else replace(before, gradients=after.gradients)
-        return _add(best, found.evaluations + after.evaluations)
+        return replace(best, evaluations=before.evaluations + after.evaluations)
+
+
+def _evolution(problem: ExcitationProblem, box: Box, size: int, evaluations: int, rng: np.random.Generator) -> End:
+    """Where CMA-ES ends in a box."""
+    algorithm, population = find_algorithm("cma-es", "best-known"), uniform_points(size, box, rng)
+    with np.errstate(over="ignore"):  # in the package, when every point of a generation is as good
+        found = minimise(
+            algorithm, CMAESParams(), lambda X: problem.evaluate(X).fitness, box, population, evaluations, rng
+        )
+    return _add(judge(problem, found.best_x), found.evaluations - 1)
 
 
 def _plain(problem: ExcitationProblem) -> ExcitationProblem:

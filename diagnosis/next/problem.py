@@ -23,6 +23,11 @@ class TellApartProblem(ExcitationProblem):
 
     prepared: Prepared
 
+    @property
+    def spectral(self) -> bool:
+        """Its value is no condition number."""
+        return False
+
     def strength(self, point: Array) -> float:
         """How well the motion of a point (dimension,) decides, standard errors."""
         motion = self.trajectory.motions(point[None], self.times).motion

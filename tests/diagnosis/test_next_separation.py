@@ -15,6 +15,7 @@ from diagnosis.next.moments import left_over, solved
 from diagnosis.next.preset import RivalSettings, TellApartSettings
 from diagnosis.next.problem import TellApartProblem
 from diagnosis.next.question import Law, Name, Question, Rival
+from diagnosis.next.remedies import remedies
 from diagnosis.next.sampling import kept_columns, white
 from diagnosis.next.within import fourier_within
 from problem.arm import Limits
@@ -235,3 +236,15 @@ def test_a_law_that_free_links_hold_already_costs_nothing() -> None:
     assert (gain_law.freedom, link_law.freedom) == (1, 0)
     found = chances(problem.prepared, question, problem.moments(point).gram, 1000, np.random.default_rng(0))
     assert found.wrong < 0.05
+
+
+def test_a_second_encoder_sees_a_spring_by_how_far_it_twists() -> None:
+    stiffness = 2e5
+    spring = RivalSettings(effect="joint_elasticity", joint=2, parameters=(("stiffness", stiffness),))
+    problem = told_apart(spring, RivalSettings(effect="channel_skew", joint=2))
+    motion = problem.trajectory.motions(points(problem, 1), problem.times).motion.select(np.intp(0))
+    prepared = problem.prepared
+    told = remedies(prepared, prepared.questions[0], (0, 1), motion, problem.times)
+    found = next(each for each in told if each.what.startswith("a second encoder behind the gear of joint 2"))
+    twist = prepared.present.scene(motion, problem.times).torque[:, 1] / stiffness
+    assert found.separation == pytest.approx(np.std(twist) * np.sqrt(len(twist)) / 2e-5)
