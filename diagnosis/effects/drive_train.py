@@ -17,7 +17,8 @@ from recordings.run import Array
 
 FINE = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
-LIGHTEST = 1e-3  # of the greatest inertia that the joint feels in the run
+FASTEST_HZ = 400.0  # of a resonance: stiffer springs follow their load at once, whatever the model's inertia is
+LIGHTEST = 0.01  # of the greatest inertia that the joint feels in the run: a model may be wrong enough to have less
 
 
 @dataclass(frozen=True)
@@ -32,12 +33,13 @@ class Twist:
 def own_inertia(scene: Scene, joint: int) -> Array:
     """Inertia that a joint (from 0) feels of the links, its rotor left out, (samples,), kg m2 (kg): above zero."""
     inertia = scene.own_inertia[:, joint]
-    return np.maximum(inertia, max(LIGHTEST * float(inertia.max()), 1e-9))
+    return np.maximum(inertia, max(LIGHTEST * float(np.abs(inertia).max()), 1e-9))
 
 
 def twisted(scene: Scene, joint: int, law: Twist) -> Array:
     """Twist of a joint (from 0), its speed and its acceleration, (3, samples); at rest with its load at the start."""
-    inertia = own_inertia(scene, joint)
+    slow = 0.0 if law.gap > 0 else law.stiffness / (2 * np.pi * FASTEST_HZ) ** 2
+    inertia = np.maximum(own_inertia(scene, joint), slow)
     load = np.ascontiguousarray(scene.rigid_torque[:, joint])
     wall = 2 * np.pi * WALL_HZ
     stiffness, damping = (wall**2, 2 * wall) if law.gap > 0 else (law.stiffness, law.damping_time * law.stiffness)

@@ -1,5 +1,7 @@
 """Twists of drive trains against the whole nonlinear arm: Pinocchio's dynamics in scipy's integrator."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_scenes import scene_of, waves
@@ -107,3 +109,22 @@ def test_first_looks_at_a_spring_follow_the_load_at_once_or_ring() -> None:
     load = where.rigid_torque[:, JOINT]
     np.testing.assert_allclose(rigid.twist(where)[0], -load, atol=0.1 * np.abs(load).max())
     assert ringing.shape[0] < rigid.shape[0]
+
+
+def test_links_that_no_arm_can_have_do_not_stop_the_integration() -> None:
+    arm = random_arm("RRR", seed=3)
+    time, motor = waves(3, 2, 1.0)
+    where = scene_of(arm, motor, time)
+    wrong = replace(where, inertial=-1e-3 * where.inertial)
+    assert own_inertia(wrong, JOINT).min() > 0
+    for law in (Twist(stiffness=1e6, damping_time=3e-4), Twist(gap=1e-3)):
+        assert np.isfinite(twisted(wrong, JOINT, law)).all()
+
+
+def test_a_spring_stiffer_than_any_resonance_follows_its_load_at_once() -> None:
+    arm = random_arm("RRR", seed=3)
+    time, motor = waves(3, 2, 1.0)
+    where = scene_of(arm, motor, time)
+    load = where.rigid_torque[:, JOINT]
+    twist = twisted(where, JOINT, Twist(stiffness=1e9, damping_time=3e-4))[0] * 1e9
+    np.testing.assert_allclose(twist, -load, atol=0.05 * np.abs(load).max())
