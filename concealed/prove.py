@@ -158,7 +158,7 @@ def _log(path: Path, commit: str, name: str, found: dict[str, Any]) -> None:
     entry = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": commit,
-        "changed_files": bool(_git("status", "--porcelain", "--untracked-files=no")),
+        "changed_files": bool(_git("status", "--porcelain", "--untracked-files=no", ".", ":!results")),  # of the code
         "set": name,
         **{key: found[key] for key in ("seed", "cases", "manifest")},
         "score": {
