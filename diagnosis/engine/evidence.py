@@ -20,7 +20,8 @@ from recordings.run import Array
 WIDER = 3.0  # times the widest link
 EXCITED = 0.25  # of the mean square in identification
 LITTLE = 0.002  # of the validation error
-LITTLE_BESIDE = 0.05  # of the gain in identification: a loss in validation that is little beside it
+LITTLE_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
+LITTLE_BESIDE = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
 ONCE = ("external_contact",)
 SURELY_WORSE = 0.99  # one-sided p-value of a gain, for a loss
 
@@ -201,19 +202,20 @@ class Judge:
         before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
         return Evidence(
             joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, None,
-            _refuted(validated, inside, after > (1 + LITTLE) * before),
+            _refuted(validated, inside, after / before - 1 if before > 0 else 0.0),
         )  # fmt: skip
 
 
-def _refuted(validated: Gain, inside: Gain, larger: bool) -> bool:
+def _refuted(validated: Gain, inside: Gain, growth: float) -> bool:
     """Whether validation data speak against an effect: by not profiting although they excite it, or surely.
 
-    larger: whether their error grows as it is, not whitened. A sure loss that is little beside the gain in
+    growth: of their error as it is, not whitened, as a share. A sure whitened loss that is little beside the gain in
     identification, where they hardly excite it, is an effect whose form is not exact there.
     """
     if validated.change > EXCITED * inside.change:
-        return validated.share < 0 or larger
-    return validated.share < -LITTLE_BESIDE * max(inside.share, 0.0) and validated.p_value > SURELY_WORSE
+        return validated.share < 0 or growth > LITTLE
+    lost = validated.share < -LITTLE_BESIDE * max(inside.share, 0.0) and validated.p_value > SURELY_WORSE
+    return lost or growth > LITTLE_UNEXCITED
 
 
 def looks_of(found: Round) -> int:
