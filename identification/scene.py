@@ -7,7 +7,7 @@ import numpy as np
 
 from problem.arm import Arm
 from problem.motion import Motion
-from problem.regressor import rigid_body_torque
+from problem.regressor import inertia_column, rigid_body_torque
 from recordings.run import Array, Run
 
 
@@ -41,15 +41,9 @@ class Scene:
         """Inertia that each joint feels of the links of the present model, its rotor left out: (samples, joints),
         kg m2 (kg).
         """
-        still = np.zeros(self.motion.position.shape)
-        rest = rigid_body_torque(self.arm, Motion(self.motion.position, still, still), self.inertial)
-        out = np.empty(rest.shape)
-        for joint in range(len(self.arm)):
-            push = still.copy()
-            push[:, joint] = 1.0
-            pushed = rigid_body_torque(self.arm, Motion(self.motion.position, still, push), self.inertial)
-            out[:, joint] = pushed[:, joint] - rest[:, joint]
-        return out
+        arm, position = self.arm, self.motion.position
+        columns = (inertia_column(arm, position, joint, self.inertial)[:, joint] for joint in range(len(arm)))
+        return np.column_stack(list(columns))
 
     @property
     def step(self) -> float:

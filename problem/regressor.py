@@ -4,6 +4,7 @@ The torque is the moment (force) of each link's wrench projected on the joint's 
 takes the z-component in the link's frame instead; with standard D-H frames the axis is z of the frame before.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -65,6 +66,17 @@ def rigid_body_torque(arm: Arm, motion: Motion, parameters: Array | None = None)
     samples = motion.position.size // joints
     lib.torques(joints, *_compiled(arm), samples, *_arrays(motion), pointer(phi), pointer(out))
     return out
+
+
+def inertia_column(arm: Arm, position: Array, joint: int, parameters: Array | None = None) -> Array:
+    """A column of the links' inertia matrix: torques of a unit acceleration of one joint (from 0), nothing else.
+
+    position: (samples, joints); parameters: as in `rigid_body_torque`. Returns (samples, joints), kg m2 (kg, kg m),
+    without rotors. Raises ValueError as `rigid_body_torque` does.
+    """
+    still, push = np.zeros(position.shape), np.zeros(position.shape)
+    push[:, joint] = 1.0
+    return rigid_body_torque(replace(arm, gravity=(0.0, 0.0, 0.0)), Motion(position, still, push), parameters)
 
 
 @lru_cache(maxsize=64)

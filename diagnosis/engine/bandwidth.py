@@ -10,8 +10,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from problem.arm import Arm
-from problem.motion import Motion
-from problem.regressor import rigid_body_torque
+from problem.regressor import inertia_column
 from recordings.cutoff import acceleration_spectrum, noise_level
 from recordings.run import Array, Run
 
@@ -44,13 +43,7 @@ def _usable(run: Run, arm: Arm, inertial: Array, highest_hz: float) -> float:
 def _inertia(run: Run, arm: Arm, inertial: Array) -> Array:
     """Root mean square of the mass matrix over the run, (joints, joints)."""
     position = run.position[:: max(run.samples // STATES, 1)]
-    still = np.zeros(position.shape)
-    gravity = rigid_body_torque(arm, Motion(position, still, still), inertial)
-    columns = []
-    for joint in range(len(arm)):
-        unit = still.copy()
-        unit[:, joint] = 1.0
-        columns.append(rigid_body_torque(arm, Motion(position, still, unit), inertial) - gravity)
+    columns = [inertia_column(arm, position, joint, inertial) for joint in range(len(arm))]
     rotors = np.diag(arm.rotor_inertia) if arm.rotor_inertia else 0.0
     return np.asarray(np.sqrt(np.mean(np.square(np.stack(columns, axis=-1) + rotors), axis=0)))
 

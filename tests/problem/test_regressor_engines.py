@@ -9,7 +9,7 @@ from random_arms import random_arm, random_motion
 
 from problem.arm import Arm
 from problem.motion import Motion
-from problem.regressor import observation_matrix, rigid_body_torque
+from problem.regressor import inertia_column, observation_matrix, rigid_body_torque
 from problem.robot_file import RobotFile, load_arm
 from problem.transforms import Array
 from problem.urdf import read_urdf
@@ -157,3 +157,16 @@ def rnea(model: object, motion: Motion) -> Array:
     data = model.createData()  # type: ignore[attr-defined]
     states = zip(motion.position, motion.velocity, motion.acceleration, strict=True)
     return np.array([pin.rnea(model, data, *state).copy() for state in states])
+
+
+@pytest.mark.parametrize("kinds", ["RRR", "PRRRRR"])
+def test_columns_of_the_inertia_matrix_are_those_of_an_independent_engine(kinds: str) -> None:
+    pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed")
+    arm = random_arm(kinds, seed=5)
+    position = np.random.default_rng(5).uniform(-2, 2, (50, len(arm)))
+    model = pinocchio_model(arm)
+    data = model.createData()
+    upper = [np.triu(pin.crba(model, data, state)) for state in position]
+    theirs = np.array([each + np.triu(each, 1).T for each in upper])
+    ours = np.stack([inertia_column(arm, position, joint) for joint in range(len(arm))], axis=-1)
+    np.testing.assert_allclose(ours, theirs, atol=1e-10 * np.abs(theirs).max())
