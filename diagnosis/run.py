@@ -2,7 +2,7 @@
 
 import time
 
-from diagnosis.engine.rounds import Progress
+from diagnosis.engine.rounds import Progress, found
 from diagnosis.result import Diagnosis
 from diagnosis.settings import Baseline, Settings
 from diagnosis.stages import prepared
@@ -25,4 +25,4 @@ def diagnose(
     ready = prepared(recording, baseline, seed, settings or Settings(), progress)
     if isinstance(ready, Diagnosis):
         return ready
-    return ready.told(ready.searched(ready.begun(progress), progress), started, progress)
+    return ready.told(found(ready.begun(progress), progress), started, progress)

@@ -1,7 +1,6 @@
 """The stages of a diagnosis: a bench with all columns, the search on it, and what is said of its end."""
 
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -10,14 +9,13 @@ from diagnosis.effects.library import library
 from diagnosis.engine.claiming import claims_of
 from diagnosis.engine.doubt import doubted, inexact
 from diagnosis.engine.evidence import Evidence, looks_of
-from diagnosis.engine.flexible import Features, features
 from diagnosis.engine.floor import noise_floor
 from diagnosis.engine.links import are_bodies, link_prior
 from diagnosis.engine.located import located
 from diagnosis.engine.observed import Observed, observe
 from diagnosis.engine.pruning import Passed, pruned, withdrawn
 from diagnosis.engine.remaining import structured, structures, unknown_claim
-from diagnosis.engine.rounds import Progress, Round, begun, coloured, found, inertial_of
+from diagnosis.engine.rounds import Progress, Round, begun, coloured, inertial_of
 from diagnosis.engine.segments import rows_of
 from diagnosis.engine.simulation import simulation_of
 from diagnosis.engine.solver import State
@@ -38,30 +36,25 @@ WORTH_CLOSING = 0.02  # of the noise floor: a smaller gap cannot be measured
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A recording with its bench, before anything is searched. features: of each joint, for the surrogates."""
+    """A recording with its bench, before anything is searched. seed: of the surrogates' random waves."""
 
     recording: Recording
     bench: Workbench
-    features: tuple[Features, ...]
+    seed: int
 
     def begun(self, progress: Progress) -> Round:
         """With every candidate on the bench, and a first look at the noise."""
-        return begun(self.bench, library(), progress)
-
-    def searched(self, first: Round, progress: Progress) -> Round:
-        """The end of the search that starts from a first look."""
-        return found(first, self.features, progress)
+        return begun(self.bench, library(), self.seed, progress)
 
     def told(self, searched: Round, started: float, progress: Progress) -> Diagnosis:
         """Everything that can be said of a search. started: by `time.perf_counter`."""
         progress("testing claims")
-        made = self.features
-        model, effects, links, left = _named(pruned(searched), made)
+        model, effects, links, left = _named(pruned(searched))
         remains = [each for each in left if structured(each)]
         unknowns = [each for each in remains if not inexact(each, effects)]
         residual = model.residual(model.fit)
         claims = claims_of(model, effects, links) + tuple(unknown_claim(model, each, residual) for each in unknowns)
-        return _told(self.recording, model, claims, (unknowns, remains), made, time.perf_counter() - started)
+        return _told(self.recording, model, claims, (unknowns, remains), time.perf_counter() - started)
 
 
 def prepared(
@@ -80,20 +73,18 @@ def prepared(
     base = base_parameters(simulation.arm)
     links = simulation.inertial
     prior = None if links is None or not are_bodies(links) else link_prior(simulation.arm, base, links)
-    rng = np.random.default_rng(seed)
-    made = tuple(features(observed, joint, rng) for joint in range(observed.joints))
-    return Ready(recording, workbench(observed, simulation, base, prior, settings), made)
+    return Ready(recording, workbench(observed, simulation, base, prior, settings), seed)
 
 
-def _named(passed: Passed, made: Sequence[Features]) -> tuple[Round, dict[int, Evidence], dict[int, Evidence], Left]:
+def _named(passed: Passed) -> tuple[Round, dict[int, Evidence], dict[int, Evidence], Left]:
     """The model with the names that hold: see `engine.doubt`; and what it leaves. Nothing without the guard."""
     model, effects, links = passed
     if not model.bench.settings.guards.unknown:
         return model, effects, links, ()
-    left = structures(model, made, coloured(model, made))
+    left = structures(model, coloured(model))
     while doubtful := doubted(effects, left):
         model, effects, links = withdrawn(model, doubtful, "what is left at its joint is no less structured")
-        left = structures(model, made, coloured(model, made))
+        left = structures(model, coloured(model))
     return model, effects, links, left
 
 
@@ -102,7 +93,6 @@ def _told(
     model: Round,
     claims: tuple[Claim, ...],
     structure: tuple[list[Structure], list[Structure]],
-    made: Sequence[Features],
     seconds: float,
 ) -> Diagnosis:
     """structure: what is a finding `unknown`, and all that remains."""
@@ -113,7 +103,7 @@ def _told(
     refit = model.residual(model.solver.fit(State((), None)))
     start = refit if bench.simulation.kind == "refit" else bench.target
     observed = bench.observed
-    floor = noise_floor(final, made, observed)
+    floor = noise_floor(final, bench.features, observed)
     fits = _fits(refit, final, floor, bench.observed)
     where = located(start, floor, bench.observed)
     status: Status = "mismatch" if claims else "none"

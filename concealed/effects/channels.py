@@ -14,24 +14,30 @@ BEND = 8  # of saturation: the larger, the sharper
 
 
 class Gain(Hidden):
-    """A torque channel that reads too much or too little; other form: more on one side. size: share."""
+    """A torque channel that reads too much or too little; other form: more beyond a knee. size: share."""
 
-    effect, forms = "torque_gain_error", ("factor", "one-sided")
+    effect, forms = "torque_gain_error", ("factor", "bent")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
         """Of either sign."""
-        return cls(joint, 0.06, 0.5, cls.drawn_form(rng), {"direction": float(rng.choice([-1, 1]))})
+        shape = {"direction": float(rng.choice([-1, 1])), "knee": float(rng.uniform(-0.2, 0.2)), "peak": 0.0}
+        return cls(joint, 0.06, 0.5, cls.drawn_form(rng), shape)
+
+    def informed(self, peak: Array) -> Self:
+        """The knee is a share of the largest torque."""
+        return replace(self, shape={**self.shape, "peak": float(peak[self.joint])})
 
     def parameters(self) -> Values:
         """The factor."""
         return {"gain": 1 + self.shape["direction"] * self.size}
 
     def read(self, torque: Array) -> Array:
-        """One channel times a factor."""
+        """One channel times a factor, or by six tenths of its error below a knee."""
         read, error = torque.copy(), self.shape["direction"] * self.size
-        share = 1.0 if self.form == "factor" else np.where(torque[:, self.joint] > 0, 1.0, 0.6)
-        read[:, self.joint] *= 1 + error * share
+        own, knee = torque[:, self.joint], self.shape["knee"] * self.shape["peak"]
+        bent = 0.6 * own + 0.4 * (np.maximum(own - knee, 0) - max(-knee, 0.0))
+        read[:, self.joint] += error * (own if self.form == "factor" else bent)
         return read
 
 

@@ -12,6 +12,8 @@ from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from recordings.run import Array
 
+MEAN_TOOTH = float(np.exp(-2.0) * np.i0(2.0))  # of exp(2 (sin x - 1)) over a turn
+
 
 def gravity_wave(machine: Machine, joint: int) -> tuple[float, float]:
     """Amplitude (N m) and phase of the gravity torque A sin(q + phase) as this joint alone turns."""
@@ -93,7 +95,7 @@ class Cable(Hidden):
 
 
 class Ripple(Hidden):
-    """A sine over the turn; other form: narrow teeth (five harmonics). size: amplitude, N m."""
+    """A sine over the turn; other form: narrow teeth (five harmonics), no work over a turn. size: amplitude, N m."""
 
     effect, forms = "torque_ripple", ("sine", "teeth")
 
@@ -113,4 +115,4 @@ class Ripple(Hidden):
         angle = self.shape["order"] * track.position[:, self.joint] + self.shape["phase"]
         if self.form == "sine":
             return np.asarray(self.size * np.sin(angle))
-        return np.asarray(self.size * np.exp(2 * (np.sin(angle) - 1)))
+        return np.asarray(self.size * (np.exp(2 * (np.sin(angle) - 1)) - MEAN_TOOTH))

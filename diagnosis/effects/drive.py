@@ -67,6 +67,43 @@ class TorqueGain(Term):
 
 
 @dataclass(frozen=True)
+class TorqueGainBySign(Term):
+    """(gain - 1) tau_model of one joint where that is positive, (gain_below - 1) tau_model where it is negative.
+
+    Two half-bridges of a current sensor, or a sensor that is bent at its zero.
+    """
+
+    effect = "torque_gain_error"
+    form = "by sign"
+    names = ("gain", "gain_below")
+    follows_model = True
+    of_channel = True
+
+    def columns(self, scene: Scene) -> Array:
+        """The torque of the present model above and below zero."""
+        torque = scene.torque[:, self.own]
+        return self._stacked(np.maximum(torque, 0), np.minimum(torque, 0))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The factors above and below zero."""
+        return dict(zip(self.names, (1 + coefficients).tolist(), strict=True))
+
+    def unit(self, name: str) -> str:
+        """A factor has none."""
+        return "1"
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        above, below = (number(1 + value) for value in coefficients.tolist())
+        return f"tau_{self.joint} *= {above} where it is positive, {below} where it is negative"
+
+    @classmethod
+    def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with two gains."""
+        return cls.at(arm, joints[0]), np.array([parameters[name] for name in cls.names]) - 1.0
+
+
+@dataclass(frozen=True)
 class TorqueOffset(Term):
     """A constant."""
 
@@ -134,6 +171,6 @@ class TorqueSaturation(Term):
 
 
 ROTOR_INERTIA = EveryJoint("rotor_inertia", (RotorInertia,))
-TORQUE_GAIN = EveryJoint("torque_gain_error", (TorqueGain,), resting=True)
+TORQUE_GAIN = EveryJoint("torque_gain_error", (TorqueGain, TorqueGainBySign), resting=True)
 TORQUE_OFFSET = EveryJoint("torque_offset", (TorqueOffset,), resting=True)
 TORQUE_SATURATION = EveryJoint("torque_saturation", (TorqueSaturation,), resting=True)

@@ -29,16 +29,16 @@ class Folds:
 
     def errors(self, chosen: Sequence[int]) -> list[Array]:
         """Held-out errors of a fit with the chosen parameters only, (rows,) for each joint."""
-        out = [target.copy() for target in self.targets]
-        place = np.ix_(chosen, chosen)
+        place, values = np.ix_(chosen, chosen), np.zeros((len(self.precision), FOLDS))
         whole, towards = np.sum(self.grams, axis=0), np.sum(self.products, axis=0)
         for fold in range(FOLDS):
             gram = (whole - self.grams[fold] + self.precision)[place]
-            values = np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ (towards - self.products[fold])[chosen]
-            for error, design, block in zip(out, self.rows.designs, self.rows.blocks, strict=True):
-                own = block % FOLDS == fold
-                error[own] -= design[np.ix_(own, chosen)] @ values
-        return out
+            inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+            values[chosen, fold] = inverse @ (towards - self.products[fold])[chosen]
+        return [
+            target - (design @ values)[np.arange(len(block)), block % FOLDS]
+            for target, design, block in zip(self.targets, self.rows.designs, self.rows.blocks, strict=True)
+        ]
 
 
 def folds_of(rows: Rows, values: Array, precision: Array) -> Folds:

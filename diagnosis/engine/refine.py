@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from diagnosis.effects.contract import Candidate
-from diagnosis.engine.columns import Block, Columns
+from diagnosis.engine.columns import Block
 from diagnosis.engine.noise import Noise
 from diagnosis.engine.robust import whitened_rows
 from diagnosis.engine.solver import Fit, Solver, State
@@ -46,21 +46,21 @@ class Profile:
         return 0.5 * float(towards @ np.linalg.pinv(left, rcond=1e-6, hermitian=True) @ towards)
 
 
-def refined(bench: Workbench, columns: Columns, noise: Noise, solver: Solver, state: State) -> dict[int, Block]:
+def refined(bench: Workbench, noise: Noise, solver: Solver, state: State) -> dict[int, Block]:
     """Blocks with better shapes for the state's groups that have any, by their number."""
     out = {}
     for group in state.groups:
         candidate = solver.groups[group].candidate
         if candidate.shape:
-            profile = _profile(bench, columns, noise, solver, state.minus(group))
+            profile = _profile(bench, noise, solver, state.minus(group))
             found = _search(bench, noise, profile, bench.blocks[group])
             if found is not None:
                 out[group] = found
     return out
 
 
-def _profile(bench: Workbench, columns: Columns, noise: Noise, solver: Solver, rest: State) -> Profile:
-    fit = solver.fit(rest)
+def _profile(bench: Workbench, noise: Noise, solver: Solver, rest: State) -> Profile:
+    fit, columns = solver.fit(rest), bench.columns
     rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, bench.observed)
     joints = range(columns.joints)
     return Profile(

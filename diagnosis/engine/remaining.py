@@ -1,11 +1,8 @@
 """What the library leaves: structure that a surrogate predicts on data that took no part."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from diagnosis.engine.evidence import Evidence
-from diagnosis.engine.flexible import Features
 from diagnosis.engine.noise import Noise
 from diagnosis.engine.rounds import Round
 from diagnosis.engine.segments import rows_of
@@ -19,13 +16,15 @@ UNKNOWN_LEVEL = 0.02  # of the test between stretches of time, which few strong 
 LARGE, LARGE_LEVEL = 0.1, 0.05  # a gain for which a weaker test is enough
 
 
-def structures(found: Round, made: Sequence[Features], noise: Noise) -> tuple[Structure, ...]:
+def structures(found: Round, noise: Noise) -> tuple[Structure, ...]:
     """What surrogates predict of each joint's residual, friction and offsets fitted that may not be claimed."""
     usual = {number for number, unusual in enumerate(found.solver.unusual) if not unusual}
     state = State(tuple(sorted({*found.state.groups, *usual})), found.state.widths)
     residual = found.residual(found.solver.fit(state))
     observed = found.bench.observed
-    return tuple(structure(residual[:, joint], joint, each, noise, observed) for joint, each in enumerate(made))
+    return tuple(
+        structure(residual[:, joint], joint, each, noise, observed) for joint, each in enumerate(found.bench.features)
+    )
 
 
 def structured(each: Structure) -> bool:

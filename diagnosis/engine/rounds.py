@@ -7,7 +7,7 @@ import numpy as np
 
 from diagnosis.effects.contract import Family, Scene
 from diagnosis.engine.columns import Columns
-from diagnosis.engine.flexible import Features
+from diagnosis.engine.flexible import features
 from diagnosis.engine.links import Widths
 from diagnosis.engine.moments import Moments
 from diagnosis.engine.noise import Noise, noise_of
@@ -68,25 +68,28 @@ def open_widths(bench: Workbench) -> Widths | None:
     return (FIRST_WIDTH,) * bench.prior.links
 
 
-def begun(bench: Workbench, families: Sequence[Family], progress: Progress) -> Round:
-    """Friction and links fitted, every candidate on the bench, and errors taken as coloured for the first time."""
+def begun(bench: Workbench, families: Sequence[Family], seed: int, progress: Progress) -> Round:
+    """Friction and links fitted, every candidate on the bench, and errors taken as coloured for the first time.
+
+    seed: of the surrogates' random waves.
+    """
     progress("fitting links and friction")
     plain = bench.with_candidates(family for family in families if family.effect in EXPECTED)
     first = _round(plain, _flat(plain.target, plain), lambda solver: background(solver, open_widths(plain)))
     moved = _followed(first)
     progress("looking for candidates")
-    whole = moved.with_candidates(families, _left(moved, first))
-    rough = _round(
-        whole, _flat(first.residual(first.fit), whole), lambda solver: background(solver, open_widths(whole))
-    )
+    left = first.residual(first.fit)
+    rng = np.random.default_rng(seed)
+    made = tuple(features(moved.observed, joint, rng) for joint in range(moved.observed.joints))
+    whole = replace(moved.with_candidates(families, _by_run(moved, left)), features=made)
+    rough = _round(whole, _flat(left, whole), lambda solver: background(solver, open_widths(whole)))
     forward = Search(rough.solver, replace(bench.settings.guards, backward_elimination=False), True, 0)
     steps: list[Step] = []
     return replace(rough, state=forward.improved(rough.state, steps))
 
 
-def _left(bench: Workbench, found: Round) -> list[Array]:
-    """What a round leaves of each run, (samples, joints), NaN at rows that were not kept."""
-    residual = found.residual(found.fit)
+def _by_run(bench: Workbench, residual: Array) -> list[Array]:
+    """A residual (rows, joints) of each run, (samples, joints), NaN at rows that were not kept."""
     parts, start = [], 0
     for signals in bench.observed.signals:
         whole = np.full(signals.motion.position.shape, np.nan)
@@ -96,19 +99,21 @@ def _left(bench: Workbench, found: Round) -> list[Array]:
     return parts
 
 
-def found(current: Round, made: Sequence[Features], progress: Progress) -> Round:
-    """Rounds of search, shapes and model from a first round; `current` is let go as the next one is made."""
+def found(current: Round, progress: Progress) -> Round:
+    """Rounds of search, shapes and model from a first round, which is let go as the next one is made."""
     for number in range(ROUNDS):
         progress(f"searching, round {number + 1}")
-        noise = coloured(current, made)
-        current = _searched(current.bench, noise, current.state if number else None, True, current.steps)
+        noise, known = coloured(current), current.state if number else None
+        bench, steps = _followed(current) if number else current.bench, current.steps
+        del current  # its columns, before there are others
+        searched = _searched(bench, noise, known, True, steps)
         progress("fitting nonlinear parameters")
-        blocks = refined(current.bench, current.columns, current.noise, current.solver, current.state)
-        current = _round(current.bench.with_blocks(blocks), current.noise, current.state, current.steps)
-        if number + 1 < ROUNDS:
-            current = replace(current, bench=_followed(current))
+        bench, steps = bench.with_blocks(refined(bench, noise, searched.solver, searched.state)), searched.steps
+        known = searched.state
+        del searched
+        current = _round(bench, noise, known, steps)
     progress("searching, last round")
-    return _searched(current.bench, coloured(current, made), current.state, False, current.steps)
+    return _searched(current.bench, coloured(current), current.state, False, current.steps)
 
 
 def _searched(bench: Workbench, noise: Noise, known: State | None, afresh: bool, steps: tuple[Step, ...]) -> Round:
@@ -126,11 +131,11 @@ def _searched(bench: Workbench, noise: Noise, known: State | None, afresh: bool,
     return replace(base, state=state, steps=(*steps, *moves))
 
 
-def coloured(current: Round, made: Sequence[Features]) -> Noise:
+def coloured(current: Round) -> Noise:
     """Noise of what a round leaves and no surrogate predicts."""
     observed, guards = current.bench.observed, current.bench.settings.guards
     left = current.residual(current.fit)
-    for joint, each in enumerate(made):
+    for joint, each in enumerate(current.bench.features):
         left[:, joint] -= predictable(left[:, joint], joint, each, observed)
     return noise_of(left, observed, len(current.fit.inverse) / observed.joints, guards.prewhitening)
 
@@ -142,10 +147,9 @@ def _flat(residual: Array, bench: Workbench) -> Noise:
 def _round(
     bench: Workbench, noise: Noise, state: State | Callable[[Solver], State], steps: tuple[Step, ...] = ()
 ) -> Round:
-    columns = bench.columns()
-    moments, solver = bench.solver(columns, noise)
+    moments, solver = bench.solver(noise)
     chosen = state(solver) if callable(state) else state
-    return Round(bench, columns, noise, moments, solver, chosen, steps)
+    return Round(bench, bench.columns, noise, moments, solver, chosen, steps)
 
 
 def _followed(current: Round) -> Workbench:

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from diagnosis.effects.contract import Candidate, Family, Scene
 from diagnosis.engine.columns import Block, Columns, base_columns, filtered_columns, place_of, stacked
+from diagnosis.engine.flexible import Features
 from diagnosis.engine.links import LinkPrior
 from diagnosis.engine.moments import Moments, moments
 from diagnosis.engine.naming import named_first
@@ -27,7 +29,7 @@ from recordings.run import Array
 class Workbench:
     """rigid: filtered columns of the base parameters by run and joint. target: measured less simulated torque,
     filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
-    candidates that follow the model. blocks: the candidates' filtered columns.
+    candidates that follow the model. blocks: the candidates' filtered columns. features: of each joint, for surrogates.
     """
 
     settings: Settings
@@ -39,22 +41,24 @@ class Workbench:
     target: Array
     scenes: tuple[Scene, ...]
     calm: tuple[Scene, ...]
-    blocks: tuple[Block, ...]
+    blocks: tuple[Block, ...] = ()
+    features: tuple[Features, ...] = ()
 
     @property
     def places(self) -> int:
         """Number of places with a candidate."""
         return len({place_of(block.candidate) for block in self.blocks})
 
+    @cached_property
     def columns(self) -> Columns:
-        """Everything stacked."""
+        """Everything stacked, once."""
         return stacked(self.base, self.rigid, self.blocks, self.target)
 
-    def solver(self, columns: Columns, noise: Noise) -> tuple[Moments, Solver]:
+    def solver(self, noise: Noise) -> tuple[Moments, Solver]:
         """Moments and solver under a noise model."""
-        found = moments(columns, noise, self.observed)
-        scales = [scale_of(group.candidate, self.simulation.inertial) for group in columns.groups]
-        return found, Solver(found, columns.groups, len(self.base), self.prior, self.places, scales)
+        found, groups = moments(self.columns, noise, self.observed), self.columns.groups
+        scales = [scale_of(group.candidate, self.simulation.inertial) for group in groups]
+        return found, Solver(found, groups, len(self.base), self.prior, self.places, scales)
 
     def block(self, candidate: Candidate, variant: int) -> Block:
         """A candidate's filtered columns."""
@@ -103,7 +107,7 @@ def workbench(
     scenes = tuple(_scene(signals, signals.motion, simulation, inertial) for signals in observed.signals)
     pairs = zip(observed.signals, observed.calm, strict=True)
     calm = tuple(_scene(signals, motion, simulation, inertial) for signals, motion in pairs)
-    return Workbench(settings, observed, simulation, base, prior, rigid, observed.torque - simulated, scenes, calm, ())
+    return Workbench(settings, observed, simulation, base, prior, rigid, observed.torque - simulated, scenes, calm)
 
 
 def _scene(signals: Signals, motion: Motion, simulation: Simulation, inertial: Array) -> Scene:

@@ -30,9 +30,12 @@ def no_run(columns: int) -> Moments:
 
 
 def solved(gram: Array, chosen: Index, right: Array) -> Array:
-    """Coefficients of the chosen columns for right-hand sides (columns, ...): least squares, slightly damped."""
+    """Coefficients of the chosen columns for right-hand sides (columns, ...): least squares, slightly damped.
+
+    What a motion never shows, torque below zero say, has none: its column is zero.
+    """
     part = gram[np.ix_(chosen, chosen)]
-    lengths = np.sqrt(np.maximum(np.diag(part), 1e-300))
+    lengths = np.sqrt(np.where(np.diag(part) > 0, np.diag(part), np.inf))
     scaled = part / np.outer(lengths, lengths) + RIDGE * np.eye(len(chosen))
     turned = right[chosen] / (lengths if right.ndim == 1 else lengths[:, None])
     values = np.linalg.solve(scaled, turned)

@@ -1,6 +1,8 @@
 """Each hidden effect leaves its own mark: at its joint, in the direction that its law says."""
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -182,3 +184,21 @@ def test_hose_hysteresis_stays_within_one_and_forgets_nothing_at_rest() -> None:
 def test_a_saturated_channel_takes_its_share_from_the_highest_torque(form: str, size: float) -> None:
     channel = Saturation(0, size, 0.6, form, {"peak": 20.0})
     assert channel.read(np.array([[20.0]]))[0, 0] == pytest.approx(20.0 * (1 - size), rel=1e-9)
+
+
+@pytest.mark.parametrize("knee", [-0.2, 0.0, 0.2])
+def test_a_bent_gain_reads_zero_as_zero_and_is_bent_at_its_knee(knee: float) -> None:
+    channel = Gain(0, 0.1, 0.5, "bent", {"direction": 1.0, "knee": knee, "peak": 20.0})
+    torque = np.linspace(-20, 20, 401)[:, None]
+    slope = np.diff(channel.read(torque)[:, 0]) / 0.1
+    assert channel.read(np.zeros((1, 1)))[0, 0] == 0.0
+    assert slope[0] == pytest.approx(1.06)
+    assert slope[-1] == pytest.approx(1.1)
+    assert torque[np.flatnonzero(slope > 1.08)[0], 0] == pytest.approx(20 * knee, abs=0.11)
+
+
+def test_teeth_do_no_work_over_a_turn() -> None:
+    teeth = Ripple(0, 1.0, 10.0, "teeth", {"order": 7.0, "phase": 0.3})
+    turn = np.linspace(0, 2 * np.pi, 7000, endpoint=False)
+    track: Any = SimpleNamespace(position=turn[:, None])
+    assert np.mean(teeth.torque(track, 0)) == pytest.approx(0.0, abs=1e-12)

@@ -29,6 +29,7 @@ BEYOND = {
     "static_level",
     "velocity",
     "power",
+    "gain_below",
 }
 BEYOND |= {"resonant_stiffness", "crossed_gap", "sensor", "coldest", "warmest", *PARAMETER_NAMES}
 

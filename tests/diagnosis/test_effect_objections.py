@@ -23,6 +23,7 @@ WRONG: list[tuple[str, str, int | None, list[float], str]] = [
     ("friction_drift", "viscous over time", 1, [1.0, -2.0], "final"),
     ("rotor_inertia", "", 1, [-0.1], "inertia"),
     ("torque_gain_error", "", 1, [-1.5], "gain"),
+    ("torque_gain_error", "by sign", 1, [-1.5, 0.1], "gain"),
     ("joint_elasticity", "", 1, [-1e-4], "stiffness"),
     ("backlash", "", 1, [-1e-3], "gap"),
     ("cable_stiffness", "linear", 1, [-2.0, 1.0], "stiffness"),

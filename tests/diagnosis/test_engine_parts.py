@@ -36,8 +36,8 @@ def observed(bench: Workbench) -> Observed:
 
 
 def solved(bench: Workbench) -> Solver:
-    columns = bench.columns()
-    return bench.solver(columns, noise_of(columns.target, bench.observed, 0.0))[1]
+    columns = bench.columns
+    return bench.solver(noise_of(columns.target, bench.observed, 0.0))[1]
 
 
 def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Observed) -> None:
@@ -50,7 +50,7 @@ def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Obs
 
 def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench: Workbench) -> None:
     solver = solved(bench)
-    columns = bench.columns()
+    columns = bench.columns
     noise = noise_of(columns.target, bench.observed, 0.0)
     state = State((0, 4, 8), (0.0, 0.0, 0.0))
     fit = solver.fit(state)

@@ -248,3 +248,12 @@ def test_a_second_encoder_sees_a_spring_by_how_far_it_twists() -> None:
     found = next(each for each in told if each.what.startswith("a second encoder behind the gear of joint 2"))
     twist = prepared.present.scene(motion, problem.times).torque[:, 1] / stiffness
     assert found.separation == pytest.approx(np.std(twist) * np.sqrt(len(twist)) / 2e-5)
+
+
+def test_a_column_that_a_motion_never_shows_explains_nothing() -> None:
+    rows = np.random.default_rng(0).normal(size=(50, 3))
+    rows[:, 1] = 0.0
+    gram, right = rows.T @ rows, np.array([1.0, 1e-17, 2.0])
+    values = solved(gram, np.arange(3), right)
+    assert values[1] == 0.0
+    np.testing.assert_allclose(values[[0, 2]], solved(gram, np.array([0, 2]), right), rtol=1e-9)
