@@ -1,6 +1,8 @@
 """`armlab diagnose`: from a recording folder to a verdict in files and lines."""
 
+import resource
 import shlex
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import get_args
@@ -47,3 +49,11 @@ def diagnose_recording(
     more = f", {pictures} pictures in {FIGURES}" if pictures else ""
     more += f", predicted torque in {FOLDER}" if any(name.startswith(FOLDER) for name in texts) else ""
     yield f"wrote {out}: {files}{more}"
+    if found.seconds:
+        yield f"diagnosed in {found.seconds:.1f} s once read; {_peak_memory():.2f} GB of memory at most"
+
+
+def _peak_memory() -> float:
+    """Of this process, GB."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes in what the system counts in
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9

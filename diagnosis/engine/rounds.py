@@ -29,12 +29,16 @@ class Round:
     """A bench with its moments, and the state that was found on it."""
 
     bench: Workbench
-    columns: Columns
     noise: Noise
     moments: Moments
     solver: Solver
     state: State
     steps: tuple[Step, ...] = ()
+
+    @property
+    def columns(self) -> Columns:
+        """The bench's."""
+        return self.bench.columns
 
     @property
     def fit(self) -> Fit:
@@ -149,7 +153,7 @@ def _round(
 ) -> Round:
     moments, solver = bench.solver(noise)
     chosen = state(solver) if callable(state) else state
-    return Round(bench, bench.columns, noise, moments, solver, chosen, steps)
+    return Round(bench, noise, moments, solver, chosen, steps)
 
 
 def _followed(current: Round) -> Workbench:
