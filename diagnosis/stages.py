@@ -85,7 +85,8 @@ def _named(passed: Passed) -> tuple[Round, dict[int, Evidence], dict[int, Eviden
     while doubtful := doubted(effects, left):
         model, effects, links = withdrawn(model, doubtful, "what is left at its joint is no less structured")
         left = structures(model, coloured(model))
-    return model, effects, links, left
+    wrong = doubted(links, left)
+    return model, effects, {link: each for link, each in links.items() if link not in wrong}, left
 
 
 def _told(

@@ -82,6 +82,21 @@ class FrictionCoupling(JointCoupling):
 
 
 @dataclass(frozen=True)
+class CarriedCoupling(FrictionCoupling):
+    """The other joint's own friction, a share of which its gears carry over: coefficient qd_k + level sgn(qd_k)."""
+
+    form = "carried"
+
+    def _parts(self, scene: Scene) -> dict[str, Array]:
+        return {**super()._parts(scene), "level": direction(scene, self.joints[1] - 1)}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        own, other = self.joints
+        return f"tau_{own} += {sum_of((coefficients[0], f'qd_{other}'), (coefficients[1], f'sgn(qd_{other})'))}"
+
+
+@dataclass(frozen=True)
 class ViscousCoupling(JointCoupling):
     """Viscous friction alone."""
 
@@ -105,7 +120,7 @@ class InertiaCoupling(JointCoupling):
     names = ("inertia",)
 
 
-FORMS = (ViscousCoupling, CoulombCoupling, InertiaCoupling, FrictionCoupling, JointCoupling)
+FORMS = (ViscousCoupling, CoulombCoupling, InertiaCoupling, FrictionCoupling, CarriedCoupling, JointCoupling)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from diagnosis.effects.term import CERTAIN, EveryJoint, Term, number
 from problem.arm import Arm
 from recordings.run import Array
 
+KNEE_SHARES = (0.4, 0.6, 0.8)  # of the model's highest torque
 LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.97, 0.985)  # of the model's highest torque
 
 
@@ -170,7 +171,57 @@ class TorqueSaturation(Term):
         return cls.at(arm, joints[0], shape=(limit,), bounds=((limit / 2, limit * 2),)), np.ones(1)
 
 
+@dataclass(frozen=True)
+class TorqueBend(Term):
+    """Torque that bends towards a limit: share sgn(tau) (|tau| - knee)^2 / knee less above a knee; shape: the knee."""
+
+    effect = "torque_saturation"
+    form = "soft"
+    names = ("limit", "knee")
+    follows_model = True
+    of_channel = True
+
+    @classmethod
+    def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Knees below the highest torque of the model."""
+        top = max(float(np.abs(scene.torque[:, joint - 1]).max()) for scene in scenes)
+        return [cls.at(arm, joint, shape=(x * top,), bounds=((0.2 * top, top),)) for x in KNEE_SHARES if top > 0]
+
+    def columns(self, scene: Scene) -> Array:
+        """What the bend takes away from the torque of the present model."""
+        torque = scene.torque[:, self.own]
+        knee = self.shape[0]
+        return self._stacked(-np.sign(torque) * np.maximum(np.abs(torque) - knee, 0.0) ** 2 / knee)
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The highest reading, where the bent line is level, and where the bend begins."""
+        knee = self.shape[0]
+        return {"limit": knee * (1 + 0.25 / float(coefficients[0])), "knee": knee}
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter; the knee has that of the limit."""
+        return super().unit("limit")
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        own, knee = self.joint, number(self.shape[0])
+        bend = number(float(coefficients[0]) / self.shape[0])
+        return f"tau_{own} -= {bend} sgn(tau_{own}) (|tau_{own}| - {knee})^2 where |tau_{own}| > {knee}"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A channel that bends reads less, not more."""
+        spread = 0.0 if covariance is None else CERTAIN * float(np.sqrt(max(covariance[0, 0], 0.0)))
+        return "reads more than the torque above the knee" if coefficients[0] + spread <= 0 else None
+
+    @classmethod
+    def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with its limit and knee."""
+        limit, knee = (float(parameters[name]) for name in cls.names)
+        bend = 0.25 / (limit / knee - 1)
+        return cls.at(arm, joints[0], shape=(knee,), bounds=((knee / 2, knee * 2),)), np.array([bend])
+
+
 ROTOR_INERTIA = EveryJoint("rotor_inertia", (RotorInertia,))
 TORQUE_GAIN = EveryJoint("torque_gain_error", (TorqueGain, TorqueGainBySign), resting=True)
 TORQUE_OFFSET = EveryJoint("torque_offset", (TorqueOffset,), resting=True)
-TORQUE_SATURATION = EveryJoint("torque_saturation", (TorqueSaturation,), resting=True)
+TORQUE_SATURATION = EveryJoint("torque_saturation", (TorqueSaturation, TorqueBend), resting=True)

@@ -1,5 +1,6 @@
 """Friction that builds up over a short way after each reversal (Dahl 1968), and falls with speed (LuGre).
 
+Both may stand beside Coulomb friction: of a joint's bearings and seals some turn over at once.
 LuGre's bristles (Canudas de Wit, Olsson, Astrom and Lischinsky 1995) bend by z: dz/dt = qd - stiffness |qd| z / g(qd),
 with the Stribeck curve g; their torque is stiffness z. Written over the way of the joint, the time is gone.
 """
@@ -31,7 +32,6 @@ class DahlFriction(Term):
     effect = "presliding_hysteresis"
     form = "Dahl"
     names = ("level", "stiffness")
-    replaces = ("coulomb_friction",)
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -72,7 +72,6 @@ class LuGreFriction(Term):
     effect = "presliding_hysteresis"
     form = "LuGre"
     names = ("level", "stiffness", "static_level", "velocity")
-    replaces = ("coulomb_friction", "stribeck_friction")
 
     @classmethod
     def first_looks(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:

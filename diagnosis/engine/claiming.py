@@ -23,6 +23,7 @@ from problem.regressor import rigid_body_torque
 from recordings.run import Array
 
 BY_DIRECTION = {"coulomb_friction", "torque_offset"}
+CONSTANT = {"torque_offset", "cable_stiffness"}
 CARRIES = 0.5  # of the scatter of the joint's gravity torque
 REACH = 0.1  # m: the size of a body
 HARDLY = 0.1  # of the largest eigenvalue: a point has no spread, and what is fitted to it may have a little less
@@ -41,9 +42,9 @@ def claims_of(found: Round, effects: dict[int, Evidence], links: dict[int, Evide
 
 
 def _by_direction(claim: Claim, claims: list[Claim]) -> Claim:
-    """Coulomb friction and an offset of one joint are levels that differ by direction, exactly."""
+    """Coulomb friction beside an offset or the rest of a spring is two levels that differ by direction, exactly."""
     here = {other.effect for other in claims if other.joint == claim.joint}
-    if claim.effect not in BY_DIRECTION or not here >= BY_DIRECTION:
+    if claim.effect not in BY_DIRECTION or "coulomb_friction" not in here or not here & CONSTANT:
         return claim
     rival = Rival("asymmetric_friction", claim.joint, claim.joints, True)
     rivals = (rival, *(each for each in claim.rivals if each.effect != rival.effect))

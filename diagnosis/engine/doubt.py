@@ -11,15 +11,15 @@ from diagnosis.engine.evidence import Evidence
 from diagnosis.engine.remaining import structured
 from diagnosis.engine.surrogate import Structure
 
-DOUBT = 1.0  # of the held-out error power that a law explains
+DOUBT = 0.7  # of the held-out error power that a law explains
 INEXACT = 0.25  # of the same: what the form of a law may be wrong by
 
 
-def doubted(effects: Mapping[int, Evidence], left: Sequence[Structure]) -> frozenset[int]:
-    """The groups whose names do not hold; friction and offsets, which every arm has, keep theirs."""
+def doubted(claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> frozenset[int]:
+    """The groups or links whose names do not hold; friction and offsets, which every arm has, keep theirs."""
     over = {each.joint: _power(each) for each in left if structured(each)}
     return frozenset(
-        group for group, each in effects.items() if not each.usual and over.get(each.joint, 0.0) > DOUBT * each.gain
+        number for number, each in claimed.items() if not each.usual and over.get(each.joint, 0.0) > DOUBT * each.gain
     )
 
 

@@ -58,21 +58,32 @@ def folds_of(rows: Rows, values: Array, precision: Array) -> Folds:
 
 @dataclass(frozen=True)
 class Gain:
-    """Share by which held-out errors fall, and the one-sided p-value of that between stretches of time.
+    """Share by which held-out errors fall, and one-sided p-values of that.
 
-    change: mean square of what the prediction changes by: how much the data excite it.
+    p_value asks whether stretches of time profit alike: what a few of them hold may be a fault of theirs. chance asks
+    whether noise would make it. change: mean square of what the prediction changes by: how much the data excite it.
     """
 
     share: float
     p_value: float
+    chance: float
     change: float
 
 
 def gain_of(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> Gain:
-    """The gain from errors (rows,) without and with something."""
-    better = without**2 - with_it**2
-    sums = np.bincount(blocks, better)[np.unique(blocks)]
-    share = float(np.sum(better)) / max(float(with_it @ with_it), 1e-300)
-    spread = float(np.std(sums, ddof=1)) / np.sqrt(len(sums)) if len(sums) > 2 else 0.0
-    p_value = float(student.sf(np.mean(sums) / spread, len(sums) - 1)) if spread > 0 else 1.0
-    return Gain(share, p_value, float(np.mean((without - with_it) ** 2)))
+    """The gain from errors (rows,) without and with something.
+
+    What is left times what is predicted is how far chance carries the gain, stretch by stretch; as many stretches
+    count as share the prediction's power.
+    """
+    predicted, places = without - with_it, np.unique(blocks)
+    better, power, carried = (
+        np.bincount(blocks, each)[places] for each in (without**2 - with_it**2, predicted**2, with_it * predicted)
+    )
+    gain = float(np.sum(better))
+    spread = float(np.std(better, ddof=1)) * np.sqrt(len(better)) if len(better) > 2 else 0.0
+    p_value = float(student.sf(gain / spread, len(better) - 1)) if spread > 0 else 1.0
+    noise = 2 * float(np.sqrt(carried @ carried))
+    count = float(np.sum(power)) ** 2 / max(float(power @ power), 1e-300)
+    chance = float(student.sf(gain / noise, count)) if noise > 0 else 1.0
+    return Gain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, float(np.mean(predicted**2)))

@@ -8,7 +8,7 @@ from diagnosis.engine.search import Search, Step
 from diagnosis.engine.solver import EXPECTED, State
 from diagnosis.settings import Settings
 
-USUAL_SHARE = 0.1  # of the least gain: what every arm has needs less of it; an offset is whitened away with slow errors
+ONCE_SHARE = 1 / 3  # of the least gain: what happened once acts in a small part of the time
 CYCLES = 3  # of withdrawing and looking again
 HELD_LEVEL = 0.05  # of the one-sided test on held-out data
 LARGE, LARGE_LEVEL = 0.2, 0.2  # a gain that no chance makes, though a few stretches hold most of it
@@ -22,11 +22,11 @@ def failing(evidence: Evidence, settings: Settings) -> str | None:
         return evidence.objection
     if evidence.corrected > settings.level:
         return f"p = {evidence.corrected:.2g} after correction"
-    if not evidence.repeatable:
-        return None
-    least = settings.least_gain * (USUAL_SHARE if evidence.usual else 1.0)
+    least = settings.least_gain * (1.0 if evidence.repeatable else ONCE_SHARE)
     if guards.heldout_gain and evidence.gain < least:
         return f"held-out gain {100 * evidence.gain:.2g} %"
+    if not evidence.repeatable:
+        return None
     if (
         guards.heldout_gain
         and not evidence.usual
@@ -70,11 +70,12 @@ def withdrawn(found: Round, groups: frozenset[int], why: str) -> Passed:
 
 
 def _closed(found: Round, passed: tuple[State, dict[int, Evidence], frozenset[int]], steps: list[Step]) -> Passed:
-    """With the links that pass; where they do not, everything is tested again with links as simulated."""
+    """With the links that pass; where they do not, all is searched and tested again with links as simulated."""
     state, effects, banned = passed
     state, links = _links(found, state, steps)
     if links is None:
-        state, effects, banned = _passing(found, state, banned, steps)
+        search = Search(found.solver, found.bench.settings.guards, True, len(state.widths or ()), banned)
+        state, effects, banned = _passing(found, search.improved(state, steps), banned, steps)
     return replace(found, state=state, steps=tuple(steps)), effects, links or {}
 
 
@@ -90,10 +91,7 @@ def _passing(
         if not bad:
             return state, effects, banned
         weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
-        joint = groups[weakest].candidate.joint
-        special = {group for group in state.groups if judge.simpler(group) and groups[group].candidate.joint == joint}
-        usual = groups[weakest].candidate.effect in EXPECTED
-        gone = special if usual and special else {weakest}
+        gone = _gone(judge, weakest)
         for group in gone:
             what = groups[group].candidate
             steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
@@ -101,6 +99,18 @@ def _passing(
         banned |= {number for number, each in enumerate(groups) if each.place in places}
         back = {other for group in gone for other in judge.simpler(group)}
         state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
+
+
+def _gone(judge: Judge, weakest: int) -> set[int]:
+    """The group that fails; usual friction beside a special law takes that law with it, if it is likelier alone."""
+    solver, state = judge.found.solver, judge.state
+    joint = solver.groups[weakest].candidate.joint
+    special = {each for each in state.groups if judge.simpler(each) and solver.groups[each].candidate.joint == joint}
+    if solver.groups[weakest].candidate.effect not in EXPECTED or not special:
+        return {weakest}
+    usual = {other for group in special for other in judge.simpler(group)}
+    plain = State(tuple(sorted(set(state.groups) - special | usual)), state.widths)
+    return {weakest} if solver.fit(state.minus(weakest)).score > solver.fit(plain).score else special
 
 
 def _links(found: Round, state: State, steps: list[Step]) -> tuple[State, dict[int, Evidence] | None]:

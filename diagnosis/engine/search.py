@@ -13,6 +13,7 @@ import numpy as np
 from diagnosis.effects.contract import Candidate
 from diagnosis.engine.links import ONE, WIDTHS, Widths
 from diagnosis.engine.plausible import implausible
+from diagnosis.engine.simpler import simpler_than
 from diagnosis.engine.solver import CROWD, EXPECTED, Solver, State
 from diagnosis.settings import Guards
 from recordings.run import Array
@@ -96,8 +97,8 @@ class Search:
     def excluded(self, state: State, group: int) -> bool:
         """Whether the state holds the group's place already, or something that contains it."""
         candidate = self.solver.groups[group].candidate
-        inside = (self.solver.groups[other] for other in state.groups)
-        return any(
+        inside = [self.solver.groups[other] for other in state.groups]
+        return self._late_twice(state, group) or any(
             other.place == self.solver.groups[group].place
             or (
                 candidate.effect in ONE_LAW
@@ -107,6 +108,11 @@ class Search:
             or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
             for other in inside
         )
+
+    def _late_twice(self, state: State, group: int) -> bool:
+        """Whether a delay of all channels would stand beside several skews: the skew of one, told in many words."""
+        late = [self.solver.groups[each].candidate.effect for each in (*state.groups, group)]
+        return "time_delay" in late and late.count("channel_skew") > 1
 
     def _addition(self, state: State, but: int | None = None) -> int | None:
         """The group that raises the score most and breaks no law of physics."""
@@ -157,10 +163,16 @@ class Search:
         if not self.guards.backward_elimination:
             return
         for group in state.groups:
-            without = state.minus(group)
-            added = self._addition(without, group)
-            if added is not None:
-                yield f"{self._name(group)} -> {self._name(added)}", self.joined(without, added)
+            for without in self._without(state, group):
+                added = self._addition(without, group)
+                if added is not None:
+                    yield f"{self._name(group)} -> {self._name(added)}", self.joined(without, added)
+
+    def _without(self, state: State, group: int) -> list[State]:
+        """The state without a group, and with the usual friction that the group contained in its place."""
+        bare, usual = state.minus(group), simpler_than(self.solver.groups, group)
+        back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
+        return [bare] if back == bare else [bare, back]
 
     def _widths(self, state: State) -> Iterator[tuple[str, State]]:
         if self.fixed or state.widths is None:

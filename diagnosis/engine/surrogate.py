@@ -53,7 +53,7 @@ def predictable(residual: Array, joint: int, made: Features, observed: Observed)
     validated = gain_of(residual[rows], residual[rows] - predicted[rows], numbers[rows])
     turned = in_turn(made.values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
     inside = gain_of(residual[learn], turned, numbers[learn])
-    sure = any(each.share > LEAST and each.p_value < STRUCTURED for each in (validated, inside))
+    sure = any(each.share > LEAST and each.chance < STRUCTURED for each in (validated, inside))
     return predicted if sure else np.zeros(len(residual))
 
 
@@ -92,7 +92,7 @@ def _structure(residual: Array, joint: int, made: Features, noise: Noise, observ
     pair = (white[~known], target[~known]) if best is validated else (white, target)
     worth = best.share > SMALL
     found = _depends_on(made, np.sum(grams, axis=0), np.sum(products, axis=0), pair, ridge) if worth else ()
-    return Structure(joint, best.share, best.p_value, validated.share, share, prediction, found)
+    return Structure(joint, best.share, best.chance, validated.share, share, prediction, found)
 
 
 def _depends_on(

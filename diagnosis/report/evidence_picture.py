@@ -68,6 +68,8 @@ def variable_of(diagnosis: Diagnosis, data: Shown, claim: Claim) -> tuple[str, A
         kind, _, which = name.rpartition("_")
         if kind in SPANS and which.isdigit():
             return _motion(diagnosis, data, kind, int(which) - 1)
+        if kind == "torque" and which.isdigit():
+            return _load(diagnosis, data, claim, int(which) - 1)
     return f"torque that it predicts, {joint_unit(arm, joint)}", claim.prediction[:, joint]
 
 
@@ -75,6 +77,12 @@ def _motion(diagnosis: Diagnosis, data: Shown, kind: str, joint: int) -> tuple[s
     units = SPANS[kind]
     unit = units[0] if diagnosis.simulation.arm.joints[joint].kind == "revolute" else units[1]
     return f"{kind} of joint {joint + 1}, {unit}", data.observed.kept(kind)[:, joint]
+
+
+def _load(diagnosis: Diagnosis, data: Shown, claim: Claim, joint: int) -> tuple[str, Array]:
+    """Torque of the model without the finding."""
+    torque = data.observed.torque[:, joint] - data.final[:, joint] - claim.prediction[:, joint]
+    return f"torque of the model at joint {joint + 1}, {joint_unit(diagnosis.simulation.arm, joint)}", torque
 
 
 def _folded(data: Shown, claim: Claim, joint: int) -> tuple[str, Array]:

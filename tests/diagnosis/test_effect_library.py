@@ -30,6 +30,7 @@ BEYOND = {
     "velocity",
     "power",
     "gain_below",
+    "knee",
 }
 BEYOND |= {"resonant_stiffness", "crossed_gap", "sensor", "coldest", "warmest", *PARAMETER_NAMES}
 

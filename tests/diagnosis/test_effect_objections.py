@@ -30,6 +30,7 @@ WRONG: list[tuple[str, str, int | None, list[float], str]] = [
     ("cable_stiffness", "cubic", 1, [2.0, -1.0], "stiffness below zero"),
     ("payload", "point", 3, [-1.0], "negative mass"),
     ("torque_saturation", "", 1, [0.2], "takes away 0.20"),
+    ("torque_saturation", "soft", 1, [-0.2], "reads more"),
     ("base_tilt", "", None, [6.0, 0.0], "tilt of more than"),
 ]
 

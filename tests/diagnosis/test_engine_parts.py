@@ -6,7 +6,8 @@ import pytest
 from scipy.signal import lfilter
 
 from diagnosis.effects.library import library
-from diagnosis.engine.flexible import features
+from diagnosis.engine.flexible import families, features
+from diagnosis.engine.folds import gain_of
 from diagnosis.engine.links import link_prior
 from diagnosis.engine.noise import noise_of
 from diagnosis.engine.observed import Observed, observe
@@ -115,3 +116,31 @@ def test_a_surrogate_finds_structure_of_other_joints_and_none_in_noise(observed:
     assert found.gain > 0.5
     assert "position_3" in found.depends_on
     assert structure(noise_only[:, 0], 0, made, noise, observed).gain < 0.05
+
+
+def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed) -> None:
+    """A torque constant that falls with speed, on one joint that carries another's load."""
+    rng = np.random.default_rng(2)
+    left = 0.05 * rng.standard_normal(observed.rows)
+    noise = noise_of(np.column_stack([left] * 3), observed, 0.0)
+    load = np.sin(2 * observed.kept("position")[:, 2]) + observed.kept("acceleration")[:, 1] / 10
+    weak = 0.02 * load * observed.kept("velocity")[:, 1] ** 2
+    found = [structure(left + weak, 1, each, noise, observed) for each in families(observed, 1, load)]
+    best = max(found, key=lambda each: each.gain)
+    assert best.gain > 0.2
+    assert best.p_value < 0.05
+    assert set(best.depends_on) <= {"torque_2", "velocity_2"}
+    chance = [structure(left, 1, each, noise, observed) for each in families(observed, 1, load)]
+    assert min(each.p_value for each in chance) * len(chance) > 0.1
+
+
+def test_a_gain_in_few_stretches_is_sure_but_in_one_alone_is_not() -> None:
+    rng = np.random.default_rng(3)
+    blocks = np.repeat(np.arange(40), 50)
+    noise = rng.standard_normal(len(blocks))
+    few = np.where(blocks % 10 == 0, 1.0, 0.0)
+    once = np.where(blocks == 7, 1.0, 0.0)
+    assert gain_of(noise + few, noise, blocks).chance < 0.01
+    assert gain_of(noise + once, noise, blocks).chance > 0.01
+    assert gain_of(noise, noise + 0.1 * few, blocks).chance > 0.5
+    assert gain_of(noise + 0.3, noise, blocks).p_value < 1e-6

@@ -14,6 +14,7 @@ from recordings.run import Array
 
 ARM = load_arm("irb120-arm")
 RATE_HZ = 200.0
+PARTS = 20  # of a sample
 POSITION, TORQUE = ["q1", "q2", "q3"], ["tau1", "tau2", "tau3"]
 COULOMB, VISCOUS = (1.0, 1.5, 0.7), (0.8, 1.0, 0.5)
 PAYLOAD = (1.0, 0.05, 0.03, 0.1, 0.02, 0.02, 0.01, 0.0, 0.0, 0.0)  # per kg, about the frame of link 3
@@ -29,12 +30,14 @@ def motion_at(time: Array, seed: int) -> Motion:
 
 
 def frame(seed: int, seconds: float = 10.0, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0) -> pd.DataFrame:
-    """One run: rigid torque, friction, 0.05 N m of noise. mass: of a load at link 3, kg."""
+    """One run: rigid torque, friction as its mean over a sample, 0.05 N m of noise. mass: of a load at link 3, kg."""
     time = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     motion, phi = motion_at(time, seed), ARM.parameters.copy()
+    within = ((np.arange(PARTS) + 0.5) / PARTS - 0.5) / RATE_HZ
+    direction = np.mean([np.sign(motion_at(time + shift, seed).velocity) for shift in within], axis=0)
     phi[20:30] += mass * np.array(PAYLOAD)
     torque = rigid_body_torque(ARM, motion, phi)
-    torque += np.array(viscous) * motion.velocity + np.array(COULOMB) * np.sign(motion.velocity)
+    torque += np.array(viscous) * motion.velocity + np.array(COULOMB) * direction
     torque += np.random.default_rng(seed + 500).normal(0, 0.05, torque.shape)
     return pd.DataFrame(np.column_stack([time, motion.position, torque]), columns=["t", *POSITION, *TORQUE])
 
