@@ -11,7 +11,7 @@ from diagnosis.engine.evidence import Evidence
 from diagnosis.engine.remaining import structured
 from diagnosis.engine.surrogate import Structure
 
-DOUBT = 0.7  # of the held-out error power that a law explains
+DOUBT = 1.0  # of the held-out error power that a law explains
 INEXACT = 0.25  # of the same: what the form of a law may be wrong by
 
 

@@ -13,6 +13,7 @@ CYCLES = 3  # of withdrawing and looking again
 HELD_LEVEL = 0.05  # of the one-sided test on held-out data
 LARGE, LARGE_LEVEL = 0.2, 0.2  # a gain that no chance makes, though a few stretches hold most of it
 Passed = tuple[Round, dict[int, Evidence], dict[int, Evidence]]
+_State = tuple[State, dict[int, Evidence], frozenset[int]]
 
 
 def failing(evidence: Evidence, settings: Settings) -> str | None:
@@ -44,18 +45,21 @@ def pruned(found: Round) -> Passed:
     After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
     be its copy. Then the search looks once more, without the places that were withdrawn.
     """
-    guards, state, banned = found.bench.settings.guards, found.state, frozenset[int]()
     steps = list(found.steps)
+    return _closed(found, _searched(found, found.state, frozenset(), steps), steps)
+
+
+def _searched(found: Round, state: State, banned: frozenset[int], steps: list[Step], fixed: bool = False) -> _State:
+    """What passes of a state, and of what the search finds once more. fixed: whether the links' widths stay."""
     for _ in range(CYCLES):
         state, effects, banned = _passing(found, state, banned, steps)
-        search = Search(found.solver, guards, state.widths is None, len(state.widths or ()), banned)
+        known = fixed or state.widths is None
+        search = Search(found.solver, found.bench.settings.guards, known, len(state.widths or ()), banned)
         again = search.improved(state, steps)
         if again == state:
-            break
+            return state, effects, banned
         state = again
-    else:
-        state, effects, banned = _passing(found, state, banned, steps)
-    return _closed(found, (state, effects, banned), steps)
+    return _passing(found, state, banned, steps)
 
 
 def withdrawn(found: Round, groups: frozenset[int], why: str) -> Passed:
@@ -69,19 +73,16 @@ def withdrawn(found: Round, groups: frozenset[int], why: str) -> Passed:
     return _closed(found, _passing(found, state, groups, steps), steps)
 
 
-def _closed(found: Round, passed: tuple[State, dict[int, Evidence], frozenset[int]], steps: list[Step]) -> Passed:
-    """With the links that pass; where they do not, all is searched and tested again with links as simulated."""
+def _closed(found: Round, passed: _State, steps: list[Step]) -> Passed:
+    """With the links that pass; where they do not, all is tested and searched again with links as simulated."""
     state, effects, banned = passed
     state, links = _links(found, state, steps)
     if links is None:
-        search = Search(found.solver, found.bench.settings.guards, True, len(state.widths or ()), banned)
-        state, effects, banned = _passing(found, search.improved(state, steps), banned, steps)
+        state, effects, banned = _searched(found, state, banned, steps, fixed=True)
     return replace(found, state=state, steps=tuple(steps)), effects, links or {}
 
 
-def _passing(
-    found: Round, state: State, banned: frozenset[int], steps: list[Step]
-) -> tuple[State, dict[int, Evidence], frozenset[int]]:
+def _passing(found: Round, state: State, banned: frozenset[int], steps: list[Step]) -> _State:
     """The state without its failing effects, the weakest first; usual friction in the place of special laws."""
     groups, settings = found.solver.groups, found.bench.settings
     while True:

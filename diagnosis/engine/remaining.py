@@ -18,8 +18,7 @@ from diagnosis.next_experiment import next_experiment
 from diagnosis.result import Claim
 from recordings.run import Array
 
-UNKNOWN_LEVEL = 0.05  # of the test between stretches of time, after all surrogates that were tried
-LARGE, LARGE_LEVEL = 0.1, 0.3  # a gain that no chance makes, though few stretches hold most of it
+UNKNOWN_LEVEL = 0.1  # of the test between stretches of time, after all surrogates that were tried
 
 
 def structures(found: Round, noise: Noise) -> tuple[Structure, ...]:
@@ -35,17 +34,13 @@ def _surest(found: Round, residual: Array, joint: int, noise: Noise) -> Structur
     observed = found.bench.observed
     few = families(observed, joint, observed.torque[:, joint] - residual)
     tried = [structure(residual, joint, each, noise, observed) for each in (found.bench.features[joint], *few)]
-    best = min(tried, key=lambda each: (each.gain <= SMALL, each.p_value / _level(each)))
+    best = min(tried, key=lambda each: (each.gain <= SMALL, each.p_value))
     return replace(best, p_value=min(1.0, best.p_value * len(tried)))
 
 
 def structured(each: Structure) -> bool:
     """Whether it is more than chance, and large enough to matter."""
-    return each.gain > SMALL and each.p_value < _level(each)
-
-
-def _level(each: Structure) -> float:
-    return LARGE_LEVEL if each.gain > LARGE else UNKNOWN_LEVEL
+    return each.gain > SMALL and each.p_value < UNKNOWN_LEVEL
 
 
 def unknown_claim(found: Round, each: Structure, residual: Array) -> Claim:
