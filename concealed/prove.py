@@ -99,8 +99,9 @@ def prove(proof: Proof, work: Path, results: Path, jobs: int) -> Iterator[str]:
         yield from _progress("diagnosed", diagnose_all(folder, verdicts, cases, jobs), len(cases))
         found = score(folder, verdicts, sealed, results / name)
         yield from lines(found)
-        if proof.commit is not None and not (work / FINISHED).is_file():
+        if proof.commit is not None and not (work / name / FINISHED).is_file():
             _log(results / LOG, proof.commit, name, found)
+        (work / name / FINISHED).touch()
     (work / FINISHED).touch()
 
 

@@ -21,7 +21,7 @@ FEW = 50  # random states that show whether an error changes anything
 
 @dataclass(frozen=True)
 class EncoderOffset(Term):
-    """q = recorded + offset: first order in the offset; all joints feel it."""
+    """recorded = q + offset: first order in the offset; all joints feel it."""
 
     effect = "encoder_offset"
     names = ("offset",)
@@ -33,9 +33,9 @@ class EncoderOffset(Term):
         return cls(joint, (joint,), tuple(range(len(arm))), arm.joints[joint - 1].kind, **details)
 
     def columns(self, scene: Scene) -> Array:
-        """Derivative of the rigid torque by the position of the joint."""
+        """Derivative of the rigid torque by what the encoder reads too much."""
         change = np.zeros((3, *scene.motion.position.shape))
-        change[0, :, self.joints[0] - 1] = 1.0
+        change[0, :, self.joints[0] - 1] = -1.0
         return along(scene, Motion(*change))[:, :, None]
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
@@ -44,7 +44,7 @@ class EncoderOffset(Term):
 
     def equation(self, coefficients: Array) -> str:
         """The law with its number."""
-        return f"q_{self.joint} = recorded + {number(coefficients[0])}"
+        return f"q_{self.joint} = recorded - {number(coefficients[0])}"
 
     @classmethod
     def restored(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:

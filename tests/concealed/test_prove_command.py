@@ -44,6 +44,14 @@ def test_a_judged_proof_is_logged_once_with_commit_seed_seal_and_score(silent: l
     assert entries[0]["score"]["clean"]["false claims on nulls"][0] == 0
 
 
+def test_sets_that_are_proved_one_after_another_are_logged_each(silent: list[str], tmp_path: Path) -> None:
+    for name in ("mixed", "nulls"):
+        proof = Proof({name: SETS["mixed"]}, "judged", "c" * 40)
+        list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
+    entries = [json.loads(line) for line in (tmp_path / "results" / LOG).read_text().splitlines()]
+    assert [each["set"] for each in entries] == ["mixed", "nulls"]
+
+
 def test_the_seal_is_printed_before_the_first_diagnosis(silent: list[str], tmp_path: Path) -> None:
     steps = prove(Proof(SETS, "judged", "b" * 40), tmp_path / "work", tmp_path / "results", 1)
     for line in steps:

@@ -9,6 +9,7 @@ from engines import pinocchio_model
 from random_arms import random_arm
 from scipy.interpolate import make_interp_spline
 
+from concealed.effects.channels import EncoderOffset as HiddenOffset
 from diagnosis.effects.contract import Scene
 from problem.arm import Arm
 from problem.motion import Motion
@@ -64,12 +65,12 @@ def test_recorded_links_show_the_spring_even_where_the_model_is_wrong() -> None:
 
 
 @pytest.mark.parametrize("kinds", ["RRR", "PRR"])
-def test_encoder_offset_is_the_torque_at_another_position(kinds: str) -> None:
-    where, offset = scene(kinds, seconds=1.0), 1e-3
-    shifted = where.motion.position.copy()
-    shifted[:, 1] += offset
-    other = Motion(shifted, where.motion.velocity, where.motion.acceleration)
-    truth = true_torque(where.arm, other) - true_torque(where.arm, where.motion)
+def test_encoder_offset_is_what_the_truth_machine_adds_to_positions(kinds: str) -> None:
+    hidden = HiddenOffset(1, 1e-3, 1e-2, "constant", {"direction": -1.0})
+    where = scene(kinds, seconds=1.0)
+    real = Motion(where.motion.position - hidden.shift(3), where.motion.velocity, where.motion.acceleration)
+    truth = true_torque(where.arm, real) - true_torque(where.arm, where.motion)
+    offset = hidden.parameters()["offset"]
     close(torque_of(candidate("encoder_offset", [where], 2), np.array([offset]), where), truth, 1e-2)
 
 
