@@ -16,6 +16,7 @@ from recordings.run import Array
 ATTEMPTS = 6  # draws of effects that cannot be seen on this arm, before one is taken as it is
 SEEN = 0.6  # of the multiple aimed at
 STEPS, CLOSE = 4, 0.03  # of the search for a size, and when it ends
+POWERS, FARTHEST = (0.25, 3.0), 1e3  # of the size that a multiple may follow, and the longest step
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +55,21 @@ def drawn(plan: Plan, tracks: Sequence[Track]) -> Sized:
 
 
 def resized(plan: Plan, sized: Sized, tracks: Sequence[Track]) -> Sized:
-    """Corrected on simulated tracks: slow motions, and parts of the drive, may do otherwise than thought."""
+    """Corrected on simulated tracks: slow motions may do otherwise than thought. What has parts stays as it is."""
     oracle = oracle_of(plan, tracks)
     for number, target in enumerate(sized.targets):
-        if sized.hidden[number].has_parts:  # one step: another size would need another simulation
-            found = multiple_of(plan, oracle, sized.hidden, number, tracks)
-            sized = sized.with_size(number, sized.hidden[number].size * target / max(found, 1e-9))
-        else:
-            sized, _ = _brought_to(plan, oracle, sized, number, tracks, target)
+        sized, _ = _brought_to(plan, oracle, sized, number, tracks, target)
     return sized
+
+
+def next_size(tried: Sequence[tuple[float, float]], target: float) -> float:
+    """Where a power law through the last two tries (size, multiple) has the multiple aimed at; a line after one."""
+    size, found = tried[-1]
+    power = 1.0
+    if len(tried) > 1 and tried[-2][0] != size:
+        before, then = tried[-2]
+        power = float(np.clip(np.log(found / then) / np.log(size / before), *POWERS))
+    return float(size * np.clip((target / found) ** (1 / power), 1 / FARTHEST, FARTHEST))
 
 
 def multiples(plan: Plan, hidden: Sequence[Hidden], tracks: Sequence[Track]) -> tuple[float, ...]:

@@ -12,7 +12,7 @@ from concealed.folder import write_case
 from concealed.loop.draw import Draw, informed
 from concealed.loop.poor import LENGTH_S, poor_reference
 from concealed.motions import USED_RANGE
-from concealed.passes import Simulated
+from concealed.passes import Simulated, corrected
 from concealed.plan import Plan, RunPlan
 from concealed.play import play, thinned
 from concealed.simulate import FINE_HZ, Controller, draw_controller, rigid_torque, run_times
@@ -42,7 +42,7 @@ def first_recording(drawn: Draw) -> Recorded:
         for _ in range(3):
             sized = resized(plan, sized, wanted)
     coarse = play(plan, sized.hidden, controller, wanted, [thinned(track) for track in wanted])
-    sized = resized(plan, sized, coarse)
+    sized, coarse = corrected(plan, sized, controller, wanted, coarse)
     fine = play(plan, sized.hidden, controller, coarse, wanted)
     return Recorded(Simulated(plan, sized, fine, multiples(plan, sized.hidden, fine)), controller)
 

@@ -20,11 +20,13 @@ WRIST = 3  # joints whose drives may go through one another
 class JointCoupling(Term):
     """coefficient qd_k + level sgn(qd_k + qd_j) + inertia qdd_k: at joint j, from joint k.
 
-    A motor that turns with both joints has its Coulomb friction in the direction of their sum.
+    A motor that turns with both joints has its Coulomb friction in the direction of their sum. Where it is the other
+    joint's own friction, of which gears carry a share over, it has that joint's direction. with_own: which of these.
     """
 
     effect = "joint_coupling"
     names: ClassVar[tuple[str, ...]] = ("coefficient", "level", "inertia")
+    with_own: ClassVar[bool] = True
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
@@ -41,7 +43,7 @@ class JointCoupling(Term):
         velocity = scene.motion.velocity
         return {
             "coefficient": velocity[:, other],
-            "level": direction(scene, other, own),
+            "level": direction(scene, other, own) if self.with_own else direction(scene, other),
             "inertia": scene.motion.acceleration[:, other],
         }
 
@@ -57,7 +59,8 @@ class JointCoupling(Term):
     def equation(self, coefficients: Array) -> str:
         """The law with its numbers."""
         own, other = self.joints
-        texts = {"coefficient": f"qd_{other}", "level": f"sgn(qd_{other} + qd_{own})", "inertia": f"qdd_{other}"}
+        side = f"sgn(qd_{other} + qd_{own})" if self.with_own else f"sgn(qd_{other})"
+        texts = {"coefficient": f"qd_{other}", "level": side, "inertia": f"qdd_{other}"}
         terms = ((value, texts[name]) for name, value in zip(self.names, coefficients.tolist(), strict=True))
         return f"tau_{own} += {sum_of(*terms)}"
 
@@ -83,17 +86,10 @@ class FrictionCoupling(JointCoupling):
 
 @dataclass(frozen=True)
 class CarriedCoupling(FrictionCoupling):
-    """The other joint's own friction, a share of which its gears carry over: coefficient qd_k + level sgn(qd_k)."""
+    """The other joint's own friction alone; its inertia beside it would be too much like a shared motor's."""
 
     form = "carried"
-
-    def _parts(self, scene: Scene) -> dict[str, Array]:
-        return {**super()._parts(scene), "level": direction(scene, self.joints[1] - 1)}
-
-    def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
-        own, other = self.joints
-        return f"tau_{own} += {sum_of((coefficients[0], f'qd_{other}'), (coefficients[1], f'sgn(qd_{other})'))}"
+    with_own = False
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from diagnosis.effects.term import EveryJoint, Term, number
 from problem.arm import Arm
 from recordings.run import Array
 
-EXPONENTS = (0.5, 1.5, 2.0, 3.0)
+EXPONENTS = (0.3, 0.5, 0.7, 1.5, 2.0, 3.0)
 EXPONENT_RANGE = (0.25, 4.0)
 
 

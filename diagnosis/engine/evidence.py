@@ -23,6 +23,7 @@ LITTLE = 0.002  # of the validation error
 LITTLE_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
 LITTLE_BESIDE = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
 ONCE = ("external_contact",)
+LIKELIER = float(np.log(20))  # units of log likelihood: of two laws with as many numbers, the one that is surely it
 SURELY_WORSE = 0.99  # one-sided p-value of a gain, for a loss
 
 
@@ -77,7 +78,7 @@ class Judge:
             objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
             tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
             evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
-            if self.simpler(group):
+            if self.simpler(group) and not self._in_place_of_usual(group):
                 evidence = self._beyond_usual(group)
             if candidate.effect in ONCE:
                 evidence = replace(evidence, repeatable=False)
@@ -145,6 +146,16 @@ class Judge:
     def simpler(self, group: int) -> tuple[int, ...]:
         """See `simpler_than`."""
         return simpler_than(self.found.solver.groups, group)
+
+    def _in_place_of_usual(self, group: int) -> bool:
+        """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that."""
+        solver, state, simpler = self.found.solver, self.state, self.simpler(group)
+        candidate = solver.groups[group].candidate
+        numbers = int(solver.ranks[group]) + len(candidate.shape)
+        if not candidate.shape or set(simpler) & set(state.groups) or numbers > solver.ranks[list(simpler)].sum():
+            return False
+        usual = State(tuple(sorted({*state.minus(group).groups, *simpler})), state.widths)
+        return solver.fit(state).score > solver.fit(usual).score + LIKELIER
 
     def _beyond_usual(self, group: int) -> Evidence:
         """The evidence against usual friction in the place of one special law, and of all at this joint."""

@@ -13,7 +13,7 @@ SCALES = {  # of coefficients, SI units
     "geometry_error": 0.02,  # m or rad
     "encoder_offset": 0.05,  # rad
     "base_tilt": 0.5,  # m/s2
-    "torque_gain_error": 0.1,
+    "torque_gain_error": 0.2,
     "time_delay": 0.01,  # s
     "channel_skew": 0.01,  # s
     "backlash": 0.01,  # rad

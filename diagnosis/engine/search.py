@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate
 from diagnosis.engine.links import ONE, WIDTHS, Widths
 from diagnosis.engine.plausible import implausible
 from diagnosis.engine.simpler import simpler_than
@@ -81,10 +80,16 @@ class Search:
             yield f"+ {self._name(added)}", self.joined(state, added)
 
     def joined(self, state: State, group: int) -> State:
-        """The state with a group, without those that it replaces."""
+        """The state with a group, without those that it replaces, or that break a law of physics at its joint then."""
         for other in self._replaced(state, group):
             state = state.minus(other)
-        return state.plus(group)
+        state = state.plus(group)
+        joint = self.solver.groups[group].candidate.joint
+        for other in state.groups:
+            beside = other != group and self.solver.groups[other].candidate.joint == joint
+            if beside and self.objection(state, other) is not None:
+                state = state.minus(other)
+        return state
 
     def _replaced(self, state: State, group: int) -> list[int]:
         groups, candidate = self.solver.groups, self.solver.groups[group].candidate
@@ -169,10 +174,18 @@ class Search:
                     yield f"{self._name(group)} -> {self._name(added)}", self.joined(without, added)
 
     def _without(self, state: State, group: int) -> list[State]:
-        """The state without a group, and with the usual friction that the group contained in its place."""
+        """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
         bare, usual = state.minus(group), simpler_than(self.solver.groups, group)
         back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
-        return [bare] if back == bare else [bare, back]
+        own = self.solver.groups[group].candidate
+        free = bare
+        if own.effect == "coulomb_friction":  # one law may stand for both, and neither alone makes room for it
+            free = State(tuple(each for each in bare.groups if not self._viscous_at(each, own.joint)), state.widths)
+        return list(dict.fromkeys((bare, back, free)))
+
+    def _viscous_at(self, group: int, joint: int | None) -> bool:
+        candidate = self.solver.groups[group].candidate
+        return candidate.effect == "viscous_friction" and candidate.joint == joint
 
     def _widths(self, state: State) -> Iterator[tuple[str, State]]:
         if self.fixed or state.widths is None:
@@ -202,8 +215,3 @@ def background(solver: Solver, widths: Widths | None) -> State:
         if group.candidate.effect in EXPECTED and group.variant == 0
     ]
     return State(tuple(chosen), widths)
-
-
-def _contend(candidate: Candidate, other: Candidate) -> bool:
-    """Whether a joint has either of two effects: what one contains, or a second special law of velocity."""
-    return candidate.effect in other.replaces or (candidate.effect in ONE_LAW and other.effect in ONE_LAW)

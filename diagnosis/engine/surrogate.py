@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.engine.flexible import Features
-from diagnosis.engine.folds import gain_of
+from diagnosis.engine.folds import Gain, gain_of
 from diagnosis.engine.noise import Noise
 from diagnosis.engine.observed import Observed
 from diagnosis.engine.ridge import FOLD_S, best_ridge, by_thirds, in_turn, predicted_in_turn
@@ -29,9 +29,9 @@ STRUCTURED = 0.05  # p-value below which a prediction counts as no noise: else w
 class Structure:
     """What a surrogate predicts of a joint's residual.
 
-    gain: share by which the whitened held-out error falls, p_value: one-sided, of that; the better of validation rows
-    and of identification stretches held out in turn. validated: on validation rows alone. share: of the validation
-    variance as it is. prediction: (rows,), N m. depends_on: variables, most important first.
+    gain: share by which the whitened held-out error falls, p_value: of chance making that (see `Gain`); the surer of
+    validation rows and of identification stretches held out in turn. validated: on validation rows alone. share: of
+    the validation variance as it is. prediction: (rows,), N m. depends_on: variables, most important first.
     """
 
     joint: int
@@ -69,6 +69,10 @@ def structure(residual: Array, joint: int, made: Features, noise: Noise, observe
     return min(ways, key=lambda each: (each.gain <= SMALL, each.p_value))
 
 
+def _unsure(gain: Gain) -> tuple[bool, float]:
+    return gain.share <= SMALL, gain.chance
+
+
 def _structure(residual: Array, joint: int, made: Features, noise: Noise, observed: Observed) -> Structure:
     learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
     both = (*learn, *judge)
@@ -82,7 +86,7 @@ def _structure(residual: Array, joint: int, made: Features, noise: Noise, observ
     all_grams, all_products, folds = by_thirds(white, target, thirds, np.ones(len(target), dtype=bool))
     turned = in_turn(white, target, folds, ridge, all_grams, all_products)
     inside = gain_of(target, turned, blocks)
-    best = validated if validated.share >= inside.share else inside
+    best = min((validated, inside), key=_unsure)
     rows = rows_of(judge, observed.rows)
     prediction = made.values @ weights
     if best is inside:

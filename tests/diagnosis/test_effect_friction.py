@@ -148,6 +148,15 @@ def test_coupled_coulomb_friction_follows_the_motor_that_turns_with_both_joints(
     np.testing.assert_allclose(torque_of(coupling, coefficients, where)[:, 1], 2.0 * both)
 
 
+def test_friction_that_gears_carry_over_has_the_direction_of_the_joint_that_it_comes_from() -> None:
+    where = scene()
+    parts = {"coefficient": 0.5, "level": 2.0}
+    coupling, coefficients = family("joint_coupling").restored(where.arm, (2, 3), parts, "carried")
+    expected = 2.0 * direction(where, 2) + 0.5 * where.motion.velocity[:, 2]
+    np.testing.assert_allclose(torque_of(coupling, coefficients, where)[:, 1], expected)
+    assert "sgn(qd_3)" in coupling.equation(coefficients)
+
+
 def test_couplings_are_tried_between_neighbours_and_within_a_wrist() -> None:
     assert pairs_of(3) == [(1, 2), (2, 1), (2, 3), (3, 2)]
     assert set(pairs_of(6)) - {pair for pair in pairs_of(6) if abs(pair[0] - pair[1]) == 1} == {(4, 6), (6, 4)}

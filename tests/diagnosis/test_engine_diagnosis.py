@@ -19,6 +19,7 @@ from problem.motion import Motion
 from problem.robot_file import load_arm
 from recordings.run import Array
 
+SLIGHT = 0.006  # N m s/rad: some ten standard errors of noise
 SCHEMAS = Path(__file__).parents[1] / "schemas"
 
 
@@ -30,6 +31,13 @@ def viscous(motion: Motion, time: Array) -> Array:
 
 def friction_everywhere(motion: Motion, time: Array) -> Array:
     return np.asarray(motion.velocity * [1.5, 1.2, 0.8] + np.sign(motion.velocity) * [2.0, 1.5, 1.0])
+
+
+def thin_oil(motion: Motion, time: Array) -> Array:
+    torque = np.zeros(motion.position.shape)
+    velocity = motion.velocity[:, 1]
+    torque[:, 1] = 0.3 * np.sign(velocity) * np.abs(velocity) ** 0.4
+    return torque
 
 
 def product_of_positions(motion: Motion, time: Array) -> Array:
@@ -96,6 +104,21 @@ def test_friction_on_every_joint_of_an_arm_with_wrong_links_is_named_as_such() -
     named = {(claim.effect, claim.joint) for claim in found.claims}
     assert friction <= named
     assert {effect for effect, _ in named - friction} <= {"inertial_parameter_error"}
+
+
+def test_one_law_of_velocity_is_not_told_as_coulomb_and_viscous_friction() -> None:
+    (claim,) = diagnose(cases.recording(thin_oil)).claims
+    assert (claim.effect, claim.joint) == ("nonlinear_viscous_friction", 2)
+    assert {each.name: each.value for each in claim.parameters}["exponent"] == pytest.approx(0.4, abs=0.05)
+
+
+def test_what_can_be_seen_and_is_too_small_for_a_name_is_unknown() -> None:
+    def slight(motion: Motion, time: Array) -> Array:
+        torque = np.zeros(motion.position.shape)
+        torque[:, 1] = SLIGHT * motion.velocity[:, 2]
+        return torque
+
+    assert [(claim.effect, claim.joint) for claim in diagnose(cases.recording(slight)).claims] == [("unknown", 2)]
 
 
 def test_structure_outside_the_library_is_called_unknown_with_what_it_depends_on() -> None:

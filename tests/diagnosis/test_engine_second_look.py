@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import pytest
 import yaml
 from told_recordings import frame, recording_in
 
@@ -11,8 +12,10 @@ from identification.model_file import read_model
 from recordings.load import load_recording
 
 
-def test_nothing_is_missing_of_the_model_that_a_diagnosis_found(tmp_path: Path) -> None:
-    folder = recording_in(tmp_path / "first", frame(0, 10, mass=0.6), frame(1, 10, mass=0.6))
+@pytest.mark.parametrize("sampled", [False, True])
+def test_nothing_is_missing_of_the_model_that_a_diagnosis_found(tmp_path: Path, sampled: bool) -> None:
+    runs = [frame(seed, 10, mass=0.6, sampled=sampled) for seed in range(2)]
+    folder = recording_in(tmp_path / "first", *runs)
     list(diagnose_recording(folder, tmp_path / "out", None, 0))
     _with_upright_base(tmp_path / "out" / "model.yaml")
     assert read_model(tmp_path / "out" / "model.yaml").extras

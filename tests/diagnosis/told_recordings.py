@@ -29,11 +29,17 @@ def motion_at(time: Array, seed: int) -> Motion:
     return Motion(sine @ a + cosine @ b, velocity, -(sine * omega**2) @ a - (cosine * omega**2) @ b)
 
 
-def frame(seed: int, seconds: float = 10.0, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0) -> pd.DataFrame:
-    """One run: rigid torque, friction as its mean over a sample, 0.05 N m of noise. mass: of a load at link 3, kg."""
+def frame(
+    seed: int, seconds: float = 10.0, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0, sampled: bool = False
+) -> pd.DataFrame:
+    """One run: rigid torque, friction, 0.05 N m of noise. mass: of a load at link 3, kg.
+
+    sampled: whether Coulomb friction is that of the instant; else its mean over a sample, as drives report it.
+    """
     time = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     motion, phi = motion_at(time, seed), ARM.parameters.copy()
-    within = ((np.arange(PARTS) + 0.5) / PARTS - 0.5) / RATE_HZ
+    parts = 1 if sampled else PARTS
+    within = ((np.arange(parts) + 0.5) / parts - 0.5) / RATE_HZ
     direction = np.mean([np.sign(motion_at(time + shift, seed).velocity) for shift in within], axis=0)
     phi[20:30] += mass * np.array(PAYLOAD)
     torque = rigid_body_torque(ARM, motion, phi)
