@@ -23,6 +23,7 @@ LITTLE = 0.002  # of the validation error
 LITTLE_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
 LITTLE_BESIDE = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
 ONCE = ("external_contact",)
+LATE = ("time_delay", "channel_skew")
 LIKELIER = float(np.log(20))  # units of log likelihood: of two laws with as many numbers, the one that is surely it
 SURELY_WORSE = 0.99  # one-sided p-value of a gain, for a loss
 
@@ -35,6 +36,8 @@ class Evidence:
     rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
     of the model. objection: of physics. worse: whether validation runs are surely predicted worse. repeatable: False
     for what happened once, in one stretch of one run: no other data can tell of it. usual: what every arm has.
+    late: a shift in time, which shows most at reversals, where rows count little: it adds little for its size,
+    resembles nothing else, and is judged by whitened errors alone.
     """
 
     joint: int
@@ -50,6 +53,7 @@ class Evidence:
     worse: bool = False
     repeatable: bool = True
     usual: bool = False
+    late: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +81,16 @@ class Judge:
             objection = implausible(candidate, values)
             objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
             tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
-            evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
+            late = candidate.effect in LATE
+            looked = (tested, self.looks(group))
+            evidence = self._against(state.minus(group), looked, candidate.rows, -losses[group], late)
             if self.simpler(group) and not self._in_place_of_usual(group):
                 evidence = self._beyond_usual(group)
             if candidate.effect in ONCE:
                 evidence = replace(evidence, repeatable=False)
                 objection = self._pushed(group)
-            out[group] = replace(evidence, objection=objection, usual=candidate.effect in EXPECTED)
+            usual = candidate.effect in EXPECTED
+            out[group] = replace(evidence, objection=objection, usual=usual, late=late)
         return out
 
     def links(self) -> dict[int, Evidence]:
@@ -170,10 +177,12 @@ class Judge:
             found.append(self._against(less, tested, groups[group].candidate.rows, score))
         return min(found, key=lambda each: each.gain)
 
-    def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
+    def _against(
+        self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float, late: bool = False
+    ) -> Evidence:
         """Evidence for the state against a smaller one."""
         fit, other = (self.found.solver.fit(each) for each in (self.state, less))
-        return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score)
+        return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score, late)
 
     def _tested(self, fit: Fit, spread: Scatter, group: int) -> float:
         columns = self.found.solver.groups[group].columns
@@ -203,6 +212,7 @@ class Judge:
         gains: dict[int, tuple[Gain, Gain]],
         tested: tuple[float, int],
         score: float,
+        late: bool = False,
     ) -> Evidence:
         joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
         validated, inside = gains[joint]
@@ -211,9 +221,10 @@ class Judge:
         p_value, looks = tested
         corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
         before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
+        growth = after / before - 1 if before > 0 and not late else 0.0
         return Evidence(
             joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, None,
-            _refuted(validated, inside, after / before - 1 if before > 0 else 0.0),
+            _refuted(validated, inside, growth),
         )  # fmt: skip
 
 
