@@ -23,7 +23,6 @@ LITTLE = 0.002  # of the validation error
 LITTLE_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
 LITTLE_BESIDE = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
 ONCE = ("external_contact",)
-LATE = ("time_delay", "channel_skew")
 LIKELIER = float(np.log(20))  # units of log likelihood: of two laws with as many numbers, the one that is surely it
 SURELY_WORSE = 0.99  # one-sided p-value of a gain, for a loss
 
@@ -36,8 +35,6 @@ class Evidence:
     rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
     of the model. objection: of physics. worse: whether validation runs are surely predicted worse. repeatable: False
     for what happened once, in one stretch of one run: no other data can tell of it. usual: what every arm has.
-    late: a shift in time, which shows most at reversals, where rows count little: it adds little for its size,
-    resembles nothing else, and is judged by whitened errors alone.
     """
 
     joint: int
@@ -53,7 +50,6 @@ class Evidence:
     worse: bool = False
     repeatable: bool = True
     usual: bool = False
-    late: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +77,13 @@ class Judge:
             objection = implausible(candidate, values)
             objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
             tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
-            late = candidate.effect in LATE
-            looked = (tested, self.looks(group))
-            evidence = self._against(state.minus(group), looked, candidate.rows, -losses[group], late)
+            evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
             if self.simpler(group) and not self._in_place_of_usual(group):
                 evidence = self._beyond_usual(group)
             if candidate.effect in ONCE:
                 evidence = replace(evidence, repeatable=False)
                 objection = self._pushed(group)
-            usual = candidate.effect in EXPECTED
-            out[group] = replace(evidence, objection=objection, usual=usual, late=late)
+            out[group] = replace(evidence, objection=objection, usual=candidate.effect in EXPECTED)
         return out
 
     def links(self) -> dict[int, Evidence]:
@@ -177,12 +170,10 @@ class Judge:
             found.append(self._against(less, tested, groups[group].candidate.rows, score))
         return min(found, key=lambda each: each.gain)
 
-    def _against(
-        self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float, late: bool = False
-    ) -> Evidence:
+    def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
         """Evidence for the state against a smaller one."""
         fit, other = (self.found.solver.fit(each) for each in (self.state, less))
-        return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score, late)
+        return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score)
 
     def _tested(self, fit: Fit, spread: Scatter, group: int) -> float:
         columns = self.found.solver.groups[group].columns
@@ -212,7 +203,6 @@ class Judge:
         gains: dict[int, tuple[Gain, Gain]],
         tested: tuple[float, int],
         score: float,
-        late: bool = False,
     ) -> Evidence:
         joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
         validated, inside = gains[joint]
@@ -221,10 +211,9 @@ class Judge:
         p_value, looks = tested
         corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
         before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
-        growth = after / before - 1 if before > 0 and not late else 0.0
         return Evidence(
             joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, None,
-            _refuted(validated, inside, growth),
+            _refuted(validated, inside, after / before - 1 if before > 0 else 0.0),
         )  # fmt: skip
 
 

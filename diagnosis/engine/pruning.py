@@ -9,7 +9,6 @@ from diagnosis.engine.solver import EXPECTED, State
 from diagnosis.settings import Settings
 
 ONCE_SHARE = 1 / 3  # of the least gain: what happened once acts in a small part of the time
-USUAL_SHARE = 1 / 3  # of the least evidence: what every arm has is believed sooner
 PLAIN = 0.25  # of the held-out error: a gain that needs no other evidence for its name
 CYCLES = 3  # of withdrawing and looking again
 HELD_LEVEL = 0.05  # of the one-sided test on held-out data
@@ -25,8 +24,7 @@ def failing(evidence: Evidence, settings: Settings) -> str | None:
         return evidence.objection
     if evidence.corrected > settings.level:
         return f"p = {evidence.corrected:.2g} after correction"
-    evident = settings.least_evidence * (USUAL_SHARE if evidence.usual else 1.0)
-    if evidence.score < evident and evidence.gain < PLAIN and not evidence.late:
+    if not evidence.usual and evidence.score < settings.least_evidence and evidence.gain < PLAIN:
         return f"log evidence {evidence.score:.0f}: too little for a name"
     least = settings.least_gain * (1.0 if evidence.repeatable else ONCE_SHARE)
     if guards.heldout_gain and evidence.gain < least:
