@@ -76,12 +76,12 @@ def _nearest(
     """The effect with parts at the size that comes nearest, and the tracks that it leads to."""
     target, tried = sized.targets[number], list[tuple[float, float]]()
     best = (np.inf, sized, coarse)
-    for _ in range(COARSE_PASSES):
+    for more in reversed(range(COARSE_PASSES)):
         found = max(multiple_of(plan, oracle_of(plan, coarse), sized.hidden, number, coarse), 1e-9)
         tried.append((sized.hidden[number].size, found))
         best = min(best, (abs(float(np.log(found / target))), sized, coarse), key=lambda each: each[0])
         aimed = sized.with_size(number, next_size(tried, target))
-        if best[0] < NEAR or aimed.hidden[number].size == tried[-1][0]:
+        if not more or best[0] < NEAR or aimed.hidden[number].size == tried[-1][0]:
             break
         played = _played(plan, sized, aimed, number, controller, wanted)
         if played is None:

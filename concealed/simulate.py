@@ -130,19 +130,19 @@ def _rolled(made: Plant, wanted: Motion, control: Array, twists: dict[str, float
     data.qpos[made.places], data.qvel[made.dofs] = wanted.position[0], wanted.velocity[0]
     for name, twist in twists.items():
         data.qpos[made.model.joint(name).qposadr[0]] = twist
-    mujoco.set_mju_user_warning(_unheard)
     kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
     first = np.empty(mujoco.mj_stateSize(made.model, kind))
     mujoco.mj_getState(made.model, data, first, kind)
-    states, _ = rollout.rollout(made.model, [data], first[None], np.ascontiguousarray(control)[None])
+    warnings, before = list[str](), mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(warnings.append)  # else the engine prints them, and logs them beside the user's files
+    try:
+        states, _ = rollout.rollout(made.model, [data], first[None], np.ascontiguousarray(control)[None])
+    finally:
+        mujoco.set_mju_user_warning(before)
     found = np.vstack([first, states[0]])
-    if not np.all(np.isfinite(found)) or np.abs(found[:, 1:]).max() > 1e4 or data.warning[6].number:
+    if warnings or not np.all(np.isfinite(found)) or np.abs(found[:, 1:]).max() > 1e4:
         raise FloatingPointError(f"the simulated arm runs away at a step of {made.model.opt.timestep:g} s")
     return found
-
-
-def _unheard(message: str) -> None:
-    """The engine's warnings, which it would print and log beside the user's files: a run that runs away raises."""
 
 
 def _track(made: Plant, controller: Controller, time: Array, states: Array, control: Array) -> Track:

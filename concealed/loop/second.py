@@ -38,9 +38,8 @@ def first_recording(drawn: Draw) -> Recorded:
     wanted = [_track(plan, time, poor_reference(plan.stream(f"motion {run}"), time, plan.machine)) for run in range(2)]
     sized = Sized((informed(drawn, wanted),), (drawn.target,))
     controller = draw_controller(plan.stream("controller"), plan.machine.arm)
-    if not sized.hidden[0].has_parts:
-        for _ in range(3):
-            sized = resized(plan, sized, wanted)
+    for _ in range(3):
+        sized = resized(plan, sized, wanted)
     coarse = play(plan, sized.hidden, controller, wanted, [thinned(track) for track in wanted])
     sized, coarse = corrected(plan, sized, controller, wanted, coarse)
     fine = play(plan, sized.hidden, controller, coarse, wanted)

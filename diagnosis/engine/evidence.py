@@ -148,7 +148,10 @@ class Judge:
         return simpler_than(self.found.solver.groups, group)
 
     def _in_place_of_usual(self, group: int) -> bool:
-        """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that."""
+        """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that.
+
+        A law without a shape is usual friction by direction, and has to be better than it as others have.
+        """
         solver, state, simpler = self.found.solver, self.state, self.simpler(group)
         candidate = solver.groups[group].candidate
         numbers = int(solver.ranks[group]) + len(candidate.shape)

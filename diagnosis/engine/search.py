@@ -12,7 +12,7 @@ import numpy as np
 
 from diagnosis.engine.links import ONE, WIDTHS, Widths
 from diagnosis.engine.plausible import implausible
-from diagnosis.engine.simpler import simpler_than
+from diagnosis.engine.simpler import FRICTION, simpler_than
 from diagnosis.engine.solver import CROWD, EXPECTED, Solver, State
 from diagnosis.settings import Guards
 from recordings.run import Array
@@ -177,15 +177,12 @@ class Search:
         """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
         bare, usual = state.minus(group), simpler_than(self.solver.groups, group)
         back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
-        own = self.solver.groups[group].candidate
-        free = bare
-        if own.effect == "coulomb_friction":  # one law may stand for both, and neither alone makes room for it
-            free = State(tuple(each for each in bare.groups if not self._viscous_at(each, own.joint)), state.widths)
+        own, free = self.solver.groups[group].candidate, bare
+        for other in bare.groups:  # one law may stand for all friction of a joint, and no part alone makes room for it
+            beside = self.solver.groups[other].candidate
+            if own.effect == FRICTION[0] and beside.effect in FRICTION and beside.joint == own.joint:
+                free = free.minus(other)
         return list(dict.fromkeys((bare, back, free)))
-
-    def _viscous_at(self, group: int, joint: int | None) -> bool:
-        candidate = self.solver.groups[group].candidate
-        return candidate.effect == "viscous_friction" and candidate.joint == joint
 
     def _widths(self, state: State) -> Iterator[tuple[str, State]]:
         if self.fixed or state.widths is None:

@@ -7,6 +7,7 @@ from diagnosis.engine.solver import EXPECTED
 
 SPECIAL = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
            "friction_drift", "load_dependent_friction")  # fmt: skip
+FRICTION = ("coulomb_friction", "viscous_friction")  # what every joint has
 SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
 
 
@@ -15,7 +16,7 @@ def simpler_than(groups: Sequence[Group], number: int) -> tuple[int, ...]:
     candidate = groups[number].candidate
     wanted = {name for name in candidate.replaces if name in EXPECTED}
     if candidate.effect in SPECIAL:
-        wanted |= {"coulomb_friction", "viscous_friction"}
+        wanted |= set(FRICTION)
     if candidate.effect in SPRINGS:
         wanted |= {"torque_offset"}
     return tuple(

@@ -14,7 +14,9 @@ AGREE = 0.01
 INTRODUCTION = """\
 # Real arms, diagnosed with only the rigid body given
 
-Percent: `||tau - tau_hat|| / ||tau||` over all joints, filtered torque, on data that took no part in any fit or choice.
+Percent: `||tau - tau_hat|| / ||tau||` over all joints, filtered torque, on data that took no part in any fit.
+They are not untouched: bounds and forms of the diagnosis were chosen after earlier looks at them, each of which is in
+`validation_looks.jsonl`. What judges the diagnosis on data that nobody had seen is `results/proof/`.
 As given: the CAD links where the source publishes them. Refitted: base parameters fitted, nothing else. Found: with
 every finding, and with the surrogate where something is unknown. Best known: the figure of a published or hand-made
 model of that run. What is not sure is not named: an unknown stands with what it depends on.

@@ -1,5 +1,7 @@
 """Hidden effects come as large as they were aimed at, those with parts of their own too."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hidden_cases import plan
@@ -8,42 +10,65 @@ from concealed import passes
 from concealed.effects.drives import Backlash, Elasticity
 from concealed.effects.hidden import Hidden
 from concealed.passes import corrected
+from concealed.plan import Plan
 from concealed.play import play, thinned, wanted_track
-from concealed.simulate import draw_controller
+from concealed.simulate import Controller, draw_controller
 from concealed.sizing import Sized, multiples, next_size
+from concealed.track import Track
+
+GAP = Backlash(1, 1e-3, 2e-2, "gap", {"hz": 80.0, "stiffness": 2e4})
 
 
-def _multiple(hidden: Hidden, target: float) -> float:
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """A case with one effect, as it was played coarsely for the first time."""
+
+    plan: Plan
+    hidden: Hidden
+    controller: Controller
+    wanted: list[Track]
+    tracks: tuple[Track, ...]
+
+    def corrected(self, target: float) -> tuple[Hidden, tuple[Track, ...]]:
+        sized = Sized((self.hidden,), (target,))
+        sized, tracks = corrected(self.plan, sized, self.controller, self.wanted, self.tracks)
+        return sized.hidden[0], tracks
+
+
+def coarse(hidden: Hidden) -> Coarse:
     made = plan()
     controller = draw_controller(made.stream("controller"), made.machine.arm)
     wanted = [wanted_track(made, number, run) for number, run in enumerate(made.runs)]
-    coarse = play(made, (hidden,), controller, wanted, [thinned(track) for track in wanted])
-    sized, coarse = corrected(made, Sized((hidden,), (target,)), controller, wanted, coarse)
-    return multiples(made, sized.hidden, coarse)[0]
+    tracks = play(made, (hidden,), controller, wanted, [thinned(track) for track in wanted])
+    return Coarse(made, hidden, controller, wanted, tracks)
 
 
 def test_a_gap_whose_torque_does_not_grow_in_proportion_meets_its_aim() -> None:
-    gap = Backlash(1, 1e-3, 2e-2, "gap", {"hz": 80.0, "stiffness": 2e4})
-    assert _multiple(gap, 6.0) == pytest.approx(6.0, rel=0.15)
+    first = coarse(GAP)
+    gap, tracks = first.corrected(6.0)
+    assert multiples(first.plan, (gap,), tracks)[0] == pytest.approx(6.0, rel=0.15)
 
 
 def test_a_spring_that_cannot_be_as_soft_stays_at_its_bound() -> None:
-    spring = Elasticity(0, 3e-5, 4e-5, "linear", {"damping": 2e-4})
-    assert 0 < _multiple(spring, 20.0) < 15.0
+    spring, _ = coarse(Elasticity(0, 3e-5, 4e-5, "linear", {"damping": 2e-4})).corrected(20.0)
+    assert spring.size == 4e-5
 
 
 def test_where_the_engine_cannot_follow_the_nearest_so_far_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     def runs_away(*_: object) -> None:
         raise FloatingPointError("the simulated arm runs away")
 
-    made, gap = plan(), Backlash(1, 1e-3, 2e-2, "gap", {"hz": 80.0, "stiffness": 2e4})
-    controller = draw_controller(made.stream("controller"), made.machine.arm)
-    wanted = [wanted_track(made, number, run) for number, run in enumerate(made.runs)]
-    coarse = play(made, (gap,), controller, wanted, [thinned(track) for track in wanted])
+    first = coarse(GAP)
     monkeypatch.setattr(passes, "play", runs_away)
-    sized, kept = corrected(made, Sized((gap,), (1.0,)), controller, wanted, coarse)
-    assert sized.hidden == (gap,)
-    assert kept is coarse
+    gap, tracks = first.corrected(1.0)
+    assert gap == GAP
+    assert tracks is first.tracks
+
+
+def test_what_the_engine_warns_of_is_an_error_and_no_output(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(FloatingPointError, match="runs away"):
+        coarse(Elasticity(2, 1e-6, 2e-6, "linear", {"damping": 2e-4}))
+    assert capfd.readouterr() == ("", "")
 
 
 def test_the_next_size_follows_a_power_law_through_the_last_two() -> None:

@@ -33,13 +33,6 @@ def friction_everywhere(motion: Motion, time: Array) -> Array:
     return np.asarray(motion.velocity * [1.5, 1.2, 0.8] + np.sign(motion.velocity) * [2.0, 1.5, 1.0])
 
 
-def thin_oil(motion: Motion, time: Array) -> Array:
-    torque = np.zeros(motion.position.shape)
-    velocity = motion.velocity[:, 1]
-    torque[:, 1] = 0.3 * np.sign(velocity) * np.abs(velocity) ** 0.4
-    return torque
-
-
 def product_of_positions(motion: Motion, time: Array) -> Array:
     torque = np.zeros(motion.position.shape)
     torque[:, 1] = 2.0 * np.sin(4 * motion.position[:, 0]) * motion.position[:, 2]
@@ -106,7 +99,13 @@ def test_friction_on_every_joint_of_an_arm_with_wrong_links_is_named_as_such() -
     assert {effect for effect, _ in named - friction} <= {"inertial_parameter_error"}
 
 
-def test_one_law_of_velocity_is_not_told_as_coulomb_and_viscous_friction() -> None:
+@pytest.mark.parametrize("coefficient", [0.3, 2.0])
+def test_one_law_of_velocity_is_not_told_as_coulomb_and_viscous_friction(coefficient: float) -> None:
+    def thin_oil(motion: Motion, time: Array) -> Array:
+        torque, velocity = np.zeros(motion.position.shape), motion.velocity[:, 1]
+        torque[:, 1] = coefficient * np.sign(velocity) * np.abs(velocity) ** 0.4
+        return torque
+
     (claim,) = diagnose(cases.recording(thin_oil)).claims
     assert (claim.effect, claim.joint) == ("nonlinear_viscous_friction", 2)
     assert {each.name: each.value for each in claim.parameters}["exponent"] == pytest.approx(0.4, abs=0.05)
