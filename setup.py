@@ -2,4 +2,4 @@
 
 from setuptools import setup
 
-setup(cffi_modules=["problem/kernel_build.py:ffibuilder", "diagnosis/effects/drive_train_build.py:ffibuilder"])
+setup(cffi_modules=["problem/kernel_build.py:ffibuilder", "armlab/effects/drive_train_build.py:ffibuilder"])

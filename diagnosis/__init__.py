@@ -10,6 +10,6 @@ def __getattr__(name: str) -> Any:
     """`diagnose`, from its module."""
     if name != "diagnose":
         raise AttributeError(f"module 'diagnosis' has no attribute '{name}'")
-    from diagnosis.run import diagnose
+    from armlab.diagnosis.diagnose import diagnose
 
     return diagnose

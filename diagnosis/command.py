@@ -7,12 +7,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import get_args
 
-from diagnosis.files import check_out, verdict_texts, write_texts
-from diagnosis.predicted import FOLDER, predicted_texts
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.settings import Baseline, Settings, guards_without
+from armlab.diagnosis.verdict_files import (
+    PREDICTED_FOLDER,
+    check_output_folder,
+    predicted_texts,
+    verdict_texts,
+    write_texts,
+)
 from diagnosis.report.terminal import terminal_lines
 from diagnosis.report.write import FIGURES, report_texts
-from diagnosis.run import diagnose
-from diagnosis.settings import Baseline, Settings, guards_without
 from problem.errors import InputError
 from recordings.load import load_recording
 
@@ -32,7 +37,7 @@ def diagnose_recording(
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     recording = load_recording(folder)
-    check_out(out, recording)
+    check_output_folder(out, recording)
     try:
         found = diagnose(recording, chosen, seed, Settings(guards=guards_without(without)), progress)
     except ValueError as error:
@@ -45,9 +50,11 @@ def diagnose_recording(
     write_texts(texts, out)
     yield from terminal_lines(found)
     pictures = sum(name.startswith(FIGURES) for name in texts)
-    files = ", ".join(name for name in texts if not name.startswith((FIGURES, FOLDER)))
+    files = ", ".join(name for name in texts if not name.startswith((FIGURES, PREDICTED_FOLDER)))
     more = f", {pictures} pictures in {FIGURES}" if pictures else ""
-    more += f", predicted torque in {FOLDER}" if any(name.startswith(FOLDER) for name in texts) else ""
+    more += (
+        f", predicted torque in {PREDICTED_FOLDER}" if any(name.startswith(PREDICTED_FOLDER) for name in texts) else ""
+    )
     yield f"wrote {out}: {files}{more}"
     if found.seconds:
         yield f"diagnosed in {found.seconds:.1f} s once read; {_peak_memory():.2f} GB of memory at most"

@@ -43,7 +43,7 @@ class Effects(Protocol):
 
     effect: str
 
-    def restored(
+    def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Law, Array]:
         """The law of these joints (from 1) and its coefficients."""
@@ -87,7 +87,7 @@ def restored(arm: Arm, told: Mapping[str, Any], parameters: Mapping[str, Value])
     found = [each for _, each in registered() if each.effect == effect]
     if not found:
         raise ValueError("no effect that a model can compute; it may be of a package that is not installed")
-    return Extra(told, *found[0].restored(arm, joints, parameters, told["form"]))
+    return Extra(told, *found[0].from_parameters(arm, joints, parameters, told["form"]))
 
 
 def registered() -> list[tuple[str, Effects]]:

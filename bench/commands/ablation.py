@@ -14,9 +14,9 @@ import click
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int) -> None:
     """Diagnose concealed cases with each guard off in turn: what is it worth? (extra `engines`)"""
+    from armlab.diagnosis.ablation import verdicts_without_each
     from concealed.ablation import Ablation
     from concealed.ablation import ablate as run
-    from diagnosis.ablation import verdicts_without_each
 
     for line in run(Ablation(seed, cases, nulls), verdicts_without_each, work, results, jobs):
         click.echo(line)

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
+from armlab.diagnosis.intervals import parameter_half_widths
+from armlab.diagnosis.result import Diagnosis
+from armlab.effects.contract import Candidate
 from diagnosis.compare.structure import Fit, fitted, separable, united
-from diagnosis.effects.contract import Candidate
-from diagnosis.engine.intervals import named
-from diagnosis.result import Diagnosis
 from problem.arm import PARAMETER_UNITS
 from problem.base_parameters import BaseParameters, base_parameters
 from recordings.run import Array
@@ -59,7 +59,9 @@ def _of_effects(candidates: tuple[Candidate, ...], old: Fit, new: Fit) -> list[C
     rows = []
     degrees = _degrees(old, new)
     for candidate, place in zip(candidates, old.places, strict=True):
-        sides = [named(candidate, fit.values[place], fit.covariance[place, place], 1.0) for fit in (old, new)]
+        sides = [
+            parameter_half_widths(candidate, fit.values[place], fit.covariance[place, place], 1.0) for fit in (old, new)
+        ]
         for (name, one, spread), (_, other, more) in zip(*sides, strict=True):
             if isinstance(one, float) and isinstance(other, float):
                 error = float(np.hypot(float(np.asarray(spread)), float(np.asarray(more))))

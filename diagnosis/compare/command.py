@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import get_args
 
+from armlab.diagnosis.settings import Baseline
+from armlab.diagnosis.verdict_files import check_output_folder, write_texts
 from diagnosis.compare.compare import compare
 from diagnosis.compare.page import comparison_page
 from diagnosis.compare.tell import as_json, terminal_lines
-from diagnosis.files import check_out, write_texts
-from diagnosis.settings import Baseline
 from problem.errors import InputError
 from recordings.load import load_recording
 
@@ -29,7 +29,7 @@ def compare_recordings(
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     recordings = load_recording(old), load_recording(new)
-    check_out(out, recordings[1])
+    check_output_folder(out, recordings[1])
     try:
         found = compare(*recordings, chosen, seed, progress)
     except ValueError as error:

@@ -6,12 +6,12 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import Baseline, Guards, Settings
+from armlab.effects.contract import Scene
 from diagnosis.compare.changes import Change, changes_between
 from diagnosis.compare.structure import predicted
-from diagnosis.effects.contract import Scene
-from diagnosis.result import Diagnosis
-from diagnosis.run import diagnose
-from diagnosis.settings import Baseline, Guards, Settings
 from identification.pseudo_inertia import links_of
 from problem.arm import Arm
 from problem.errors import InputError

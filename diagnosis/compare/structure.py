@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate, Scene
-from diagnosis.engine.columns import base_columns
-from diagnosis.engine.segments import rows_of
-from diagnosis.result import Diagnosis
+from armlab.diagnosis.columns import base_columns
+from armlab.diagnosis.data import rows_in
+from armlab.diagnosis.result import Diagnosis
+from armlab.effects.contract import Candidate, Scene
 from identification.extras import Extra, torque_with
 from identification.scene import scene_of
 from problem.arm import Arm
@@ -129,7 +129,7 @@ def _rows(
     assert final is not None
     assert target is not None
     joints = observed.joints
-    moving = np.column_stack([rows_of(observed.used(joint), observed.rows) for joint in range(joints)])
+    moving = np.column_stack([rows_in(observed.used(joint), observed.rows) for joint in range(joints)])
     weights = moving / np.sqrt(np.mean(final**2, axis=0))
     rigid = [_base(diagnosis.simulation.arm, base, signals) for signals in observed.signals]
     scenes = scenes_of(diagnosis)

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from textwrap import wrap
 from typing import Any
 
+from armlab.diagnosis.verdict_files import verdict_content
 from diagnosis.compare.changes import LEVEL, Change
 from diagnosis.compare.compare import Comparison
 from diagnosis.report.words import DIGITS, gain_sentence, joined, number, place, plain, probability, told, unit
-from diagnosis.verdict import verdict
 
 SCHEMA = "comparison/1"
 WIDTH = 110
@@ -64,7 +64,7 @@ def as_json(found: Comparison) -> dict[str, Any]:
         "new": found.new.recording.name,
         "level": LEVEL,
         "changes": [_change(each) for each in found.changes],
-        "against": None if found.against is None else verdict(found.against),
+        "against": None if found.against is None else verdict_content(found.against),
     }
 
 

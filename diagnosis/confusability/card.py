@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.diagnosis.settings import Settings
+from armlab.effects.contract import Candidate, Family, Scene
+from armlab.effects.separability import Confusion, base_rows, candidate_rows, compute_confusion
 from diagnosis.confusability.planned import Planned
-from diagnosis.effects.contract import Candidate, Family, Scene
-from diagnosis.effects.geometry import Confusion, base_rows, confusion, rows_of
-from diagnosis.settings import Settings
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.regressor import rigid_body_torque
@@ -93,7 +93,7 @@ def confusability(
     if not found:
         raise ValueError("no effect has a column on this motion")
     free = {"nominal": None, "refit": base_rows(base_parameters(arm), scenes, filters)}
-    views = {name: confusion(found, scenes, filters, free[name], scatter) for name in VIEWS}
+    views = {name: compute_confusion(found, scenes, filters, free[name], scatter) for name in VIEWS}
     seconds = sum(float(each.time[-1] - each.time[0]) for each in motions)
     rows = 2 * chosen.cutoff_hz * seconds
     entries = tuple(_entry(index, views, rows) for index in range(len(found)))
@@ -107,7 +107,7 @@ def candidates(
     """One candidate a place, in the middle of its shapes; none whose columns vanish on this motion."""
     places = [shapes for family in families for shapes in family.candidates(arm, scenes)]
     middle = [shapes[len(shapes) // 2] for shapes in places if shapes]
-    return [each for each in middle if _shown(rows_of(each, scenes, filters))]
+    return [each for each in middle if _shown(candidate_rows(each, scenes, filters))]
 
 
 def _shown(rows: Array) -> bool:

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.diagnosis.verdict_files import write_texts
+from armlab.effects.library import library
 from diagnosis.confusability.card import VIEWS, confusability
 from diagnosis.confusability.page import card_page
 from diagnosis.confusability.picture import heat_map
 from diagnosis.confusability.planned import planned_motions
 from diagnosis.confusability.tables import as_csv, as_json, markdown, terminal_lines
-from diagnosis.effects.library import library
-from diagnosis.files import write_texts
 from problem.arm import Arm
 from problem.errors import InputError
 from problem.robot_file import load_arm

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.engine.rivals import AS_GOOD
+from armlab.diagnosis.claims import MAX_DEFICIT
 from diagnosis.next.deciding import gained, held_out_need, rest
 from diagnosis.next.moments import solved
 from diagnosis.next.posterior import coefficients
@@ -53,7 +53,7 @@ def decided(question: Question, explained: list[Array], right: int, rows: float)
     prices = [np.array([[law.price(rows)] for law in each]) for each in laws]
     scores = np.array([np.max(found - price, axis=0) for found, price in zip(explained, prices, strict=True)])
     best, ordered = np.argmax(scores, axis=0), np.sort(scores, axis=0)
-    clear = ordered[-1] - ordered[-2] > AS_GOOD
+    clear = ordered[-1] - ordered[-2] > MAX_DEFICIT
     whole = np.array([np.max(found, axis=0) for found in explained])
     for one, special in enumerate(laws):
         for other, usual in enumerate(laws):

@@ -4,12 +4,12 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from diagnosis.engine.rivals import AS_GOOD
-from diagnosis.engine.simpler import SPECIAL
-from diagnosis.engine.solver import EXPECTED
+from armlab.diagnosis.claims import MAX_DEFICIT
+from armlab.diagnosis.search import SPECIAL_FRICTION
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.solver import USUAL_EFFECTS
 from diagnosis.next.moments import Index, solved
 from diagnosis.next.question import Law, Question, Rival
-from diagnosis.settings import Settings
 from recordings.run import Array
 
 LEAST = 1e-9  # standard errors
@@ -74,12 +74,12 @@ def gained(products: Array, left: Array, extras: Index, rows: float) -> Array:
 
 def need(right: Law, other: Law, rows: float) -> float:
     """By how much the likelihood of the right law has to lead that of another, in its logarithm."""
-    return max(AS_GOOD + right.price(rows) - other.price(rows), held_out_need(right, other, rows))
+    return max(MAX_DEFICIT + right.price(rows) - other.price(rows), held_out_need(right, other, rows))
 
 
 def held_out_need(right: Law, other: Law, rows: float) -> float:
     """What a special law of friction has to gain on usual friction: a share of the held-out error at its joint."""
-    if right.candidate.effect in SPECIAL and other.candidate.effect in EXPECTED:
+    if right.candidate.effect in SPECIAL_FRICTION and other.candidate.effect in USUAL_EFFECTS:
         return 0.5 * Settings().least_gain * rows * right.share
     return -np.inf
 

@@ -4,16 +4,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.effects.contract import Scene
-from diagnosis.engine.noise import noise_of
-from diagnosis.engine.observed import WIDER, Observed, observe
-from diagnosis.engine.segments import CERTAIN, CREEP, HIGH
+from armlab.diagnosis.data import (
+    CREEP_RATIO,
+    HIGH_SPEED_QUANTILE,
+    POSITION_CUTOFF_RATIO,
+    STANDSTILL_SIGMAS,
+    Observed,
+    observe,
+)
+from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.settings import Settings
+from armlab.effects.contract import Scene
 from diagnosis.next.moments import Index, Moments
 from diagnosis.next.present import Present
 from diagnosis.next.question import Layout
 from diagnosis.next.sampling import Sampling, kept_columns
 from diagnosis.next.whitening import Whitening
-from diagnosis.settings import Settings
 from problem.regressor import rigid_body_torque
 from recordings.cutoff import acceleration_spectrum, noise_level
 from recordings.recording import Recording
@@ -47,21 +53,21 @@ class FirstRun:
 
     def sampling(self, columns: Array, fitted: Index) -> Sampling:
         """The filter and the noise that is left when the fitted columns are taken out."""
-        noise = noise_of(self._residual(columns[:, :, fitted]), self.observed, len(fitted) / self.observed.joints)
+        noise = fit_noise(self._residual(columns[:, :, fitted]), self.observed, len(fitted) / self.observed.joints)
         whitening = Whitening(noise.taps, noise.scales)
         return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, whitening, self._standing())
 
     def _standing(self) -> tuple[float, ...]:
         """Speed of each joint (joints,) below which a diagnosis takes it as standing still, rad/s (m/s)."""
-        speed = np.quantile(np.abs(self.observed.motion.velocity), HIGH, axis=0)
-        highest = WIDER * self.observed.cutoff_hz
+        speed = np.quantile(np.abs(self.observed.motion.velocity), HIGH_SPEED_QUANTILE, axis=0)
+        highest = POSITION_CUTOFF_RATIO * self.observed.cutoff_hz
         noise = []
         for signals in self.observed.signals:
             run = signals.run
             frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
             density = noise_level(frequency, spectrum, shape, run.rate_hz)
             noise.append(2 * np.pi * np.sqrt(density * highest**3 / 3))
-        slow: list[float] = np.maximum(CERTAIN * np.max(noise, axis=0), CREEP * speed).tolist()
+        slow: list[float] = np.maximum(STANDSTILL_SIGMAS * np.max(noise, axis=0), CREEP_RATIO * speed).tolist()
         return tuple(slow)
 
     def moments(self, columns: Array, noise: Whitening, role: Role) -> Moments:

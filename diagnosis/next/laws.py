@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate, Family, Scene
-from diagnosis.effects.drive import TORQUE_OFFSET
-from diagnosis.effects.friction import COULOMB, VISCOUS
-from diagnosis.engine.naming import named_first
+from armlab.effects.contract import Candidate, Family, Scene
+from armlab.effects.drive import TORQUE_OFFSET
+from armlab.effects.friction import COULOMB_FRICTION, VISCOUS_FRICTION
+from armlab.effects.naming import is_first_name
 from diagnosis.next.present import Part
 from diagnosis.next.question import Name
 from diagnosis.next.verdict_file import Finding
@@ -25,7 +25,7 @@ def name_of(candidate: Candidate) -> Name:
 
 def background(arm: Arm, scenes: Sequence[Scene]) -> list[Candidate]:
     """Coulomb and viscous friction and an offset on every joint."""
-    families = (COULOMB, VISCOUS, TORQUE_OFFSET)
+    families = (COULOMB_FRICTION, VISCOUS_FRICTION, TORQUE_OFFSET)
     return [shapes[0] for family in families for shapes in family.candidates(arm, scenes)]
 
 
@@ -35,7 +35,7 @@ def part_of(finding: Finding, arm: Arm, families: Sequence[Family]) -> Part | No
     for family in families:
         if family.effect == finding.name.effect:
             try:
-                return family.restored(arm, place, finding.parameters)
+                return family.from_parameters(arm, place, finding.parameters)
             except (ValueError, KeyError):
                 return None
     return None
@@ -58,7 +58,7 @@ def alternatives(name: Name, offered: Offered) -> list[Candidate]:
         raise InputError(f"{name} leaves no trace in the torques of this arm")
     thinned = [[shapes[at] for at in _spread(len(shapes))] for shapes in places]
     found = [each for shapes in thinned for each in shapes]
-    return [each for each in found if named_first(each)] or found
+    return [each for each in found if is_first_name(each)] or found
 
 
 def _places(name: Name, offered: Offered) -> list[list[Candidate]]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from diagnosis.effects.library import library
+from armlab.effects.library import library
 from diagnosis.next.asked import Asked
 from diagnosis.next.prepare import Links, Prepared, prepare
 from diagnosis.next.question import Name, Question

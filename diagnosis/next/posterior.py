@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate
-from diagnosis.engine.plausible import implausible, scale_of
+from armlab.effects.contract import Candidate
+from armlab.effects.plausible import prior_scale, reason_implausible
 from diagnosis.next.moments import Index, Moments, solved
 from recordings.run import Array
 
@@ -20,7 +20,7 @@ def coefficients(
     """
     chosen = np.append(free, own)
     gram = seen.gram.copy()
-    gram[own, own] += 1 / scale_of(candidate, None) ** 2
+    gram[own, own] += 1 / prior_scale(candidate, None) ** 2
     mean = solved(gram, chosen, seen.vector)
     part = gram[np.ix_(chosen, chosen)]
     lengths = np.sqrt(np.maximum(np.diag(part), 1e-300))
@@ -32,4 +32,4 @@ def coefficients(
 
 
 def _possible(candidate: Candidate, values: Array) -> bool:
-    return candidate.objection(values) is None and implausible(candidate, values) is None
+    return candidate.objection(values) is None and reason_implausible(candidate, values) is None

@@ -5,9 +5,10 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate, Scene
-from diagnosis.effects.library import library
-from diagnosis.engine.links import link_prior
+from armlab.diagnosis.links import link_prior
+from armlab.diagnosis.settings import Settings
+from armlab.effects.contract import Candidate, Scene
+from armlab.effects.library import library
 from diagnosis.next.asked import Asked
 from diagnosis.next.first_run import FirstRun, first_run
 from diagnosis.next.laws import Offered, alternatives, background, leaves_trace, name_of, offered_by, part_of
@@ -17,7 +18,6 @@ from diagnosis.next.question import IN_LINKS, Layout, Name, Question, blindness,
 from diagnosis.next.sampling import THINNED, Sampling, white
 from diagnosis.next.sizes import Choice, chosen_rivals
 from diagnosis.next.verdict_file import VerdictFile
-from diagnosis.settings import Settings
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters, base_parameters
 from problem.errors import InputError

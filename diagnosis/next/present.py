@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate, Scene
+from armlab.effects.contract import Candidate, Scene
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

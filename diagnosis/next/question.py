@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate, Scene
+from armlab.effects.contract import Candidate, Scene
 from diagnosis.next.moments import ROUNDING, Index, Moments, left_over
 from diagnosis.next.sampling import Sampling, kept_columns
 from problem.base_parameters import BaseParameters

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from diagnosis.effects.contract import Candidate, Scene
-from diagnosis.engine.segments import MARGIN, Segment, parts, rows_of
+from armlab.diagnosis.data import STANDSTILL_MARGIN, Segment, rows_in, split_segment
+from armlab.effects.contract import Candidate, Scene
 from diagnosis.next.whitening import Whitening
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
@@ -62,14 +62,14 @@ class Sampling:
         if not self.standing:
             return np.ones(velocity.shape, dtype=bool)
         still = np.abs(velocity) < np.array(self.standing)
-        reach = round(MARGIN / self.cutoff_hz * self.rate_hz)
+        reach = round(STANDSTILL_MARGIN / self.cutoff_hz * self.rate_hz)
         return np.asarray(~binary_dilation(still, structure=np.ones((2 * reach + 1, 1))))
 
 
 def _worth(moves: NDArray[np.bool_]) -> Array:
     """What rows count, (rows,): nothing near a standstill, less in stretches too short for a diagnosis."""
     whole = Segment(0, "identify", 0, len(moves))
-    long = rows_of(parts(whole, moves), len(moves)) if not moves.all() else moves
+    long = rows_in(split_segment(whole, moves), len(moves)) if not moves.all() else moves
     return np.asarray(np.where(long, 1.0, np.where(moves, np.sqrt(SHORT), 0.0)))
 
 

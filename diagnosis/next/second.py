@@ -6,7 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.files import verdict_texts, write_texts
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.verdict_files import verdict_texts, write_texts
 from diagnosis.next.asked import Asked
 from diagnosis.next.chances import Chances, chances
 from diagnosis.next.design import Budget, excitation, generator, limits_in_force, random_point, searched
@@ -14,7 +15,6 @@ from diagnosis.next.experiment import LIBRARY, groups_of, links_of, ready
 from diagnosis.next.problem import TellApartProblem, tell_apart_problem
 from diagnosis.next.question import Name
 from diagnosis.next.verdict_file import read_verdict
-from diagnosis.run import diagnose
 from problem.arm import Arm
 from problem.errors import InputError
 from problem.excitation_problem import ExcitationProblem

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.effects.contract import Candidate
-from diagnosis.engine.solver import EXPECTED
+from armlab.diagnosis.solver import USUAL_EFFECTS
+from armlab.effects.contract import Candidate
 from diagnosis.next.moments import Index, Moments, independent, left_over, solved
 from diagnosis.next.posterior import coefficients
 from diagnosis.next.question import Law, Name, Rival, in_free_links
@@ -133,6 +133,6 @@ def _size(columns: Index, free: Index, seen: Moments, rich: Array, signal: _Sign
 def _law(candidate: Candidate, columns: Index, free: Index, gram: Array, library_places: int, joints: int) -> Law:
     """A law; what every arm has is no surprise, everything else was looked for in many places, if in any."""
     own = independent(gram, columns, free) if library_places else 0
-    looks = 1 if candidate.effect in EXPECTED else library_places * candidate.looks
+    looks = 1 if candidate.effect in USUAL_EFFECTS else library_places * candidate.looks
     freedom = own + len(candidate.shape) if own else 0
     return Law(candidate, columns, freedom, looks, len(candidate.rows) / joints)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from armlab.diagnosis.verdict_files import VERDICT_SCHEMA
 from diagnosis.next.question import Name
-from diagnosis.verdict import SCHEMA
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.errors import InputError
@@ -64,8 +64,8 @@ def read_verdict(path: Path) -> VerdictFile:
         content = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"cannot read the verdict {file}: {error}") from None
-    if not isinstance(content, dict) or content.get("schema") != SCHEMA:
-        raise InputError(f"{file} is no verdict: its 'schema' should be {SCHEMA}")
+    if not isinstance(content, dict) or content.get("schema") != VERDICT_SCHEMA:
+        raise InputError(f"{file} is no verdict: its 'schema' should be {VERDICT_SCHEMA}")
     beside = file.with_name("model.yaml")
     model = read_yaml(beside) if beside.is_file() else None
     try:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from diagnosis.files import write_texts
+from armlab.diagnosis.verdict_files import write_texts
 from diagnosis.real.study import NAMES, study
 from diagnosis.real.tell import markdown
 from diagnosis.report.words import verdict_sentences

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.result import Claim, Diagnosis
-from diagnosis.run import diagnose
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.result import Claim, Diagnosis
 from identification.real.looks import Looks
 from identification.real.recipes import RECIPES
 from recordings.load import load_recording

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.stats import chi2, norm
 
+from armlab.diagnosis.result import Diagnosis, Parameter
 from diagnosis.real.study import RealStudy, RunGain, added_mass
 from diagnosis.report.words import joint_unit, number, place, plain, probability, rows_of, told, verdict_sentences
-from diagnosis.result import Diagnosis, Parameter
 
 SPRINGS = ("gravity_compensator", "cable_stiffness")
 AGREE = 0.01

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from diagnosis.files import write_texts
+from armlab.diagnosis.verdict_files import write_texts
 from diagnosis.real_concealed.kept import kept_in
 from diagnosis.real_concealed.page import PICTURE, count_lines, markdown
 from diagnosis.real_concealed.picture import svg

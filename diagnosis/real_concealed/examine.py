@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.engine.segments import rows_of
+from armlab.diagnosis.data import rows_in
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.result import Claim, Diagnosis
 from diagnosis.real_concealed.inject import disturbed, sought_in
 from diagnosis.real_concealed.outcome import Outcome, said_of
 from diagnosis.real_concealed.plan import Case
 from diagnosis.real_concealed.reference import Reference
 from diagnosis.real_concealed.withhold import Sought, sought_of, without
-from diagnosis.result import Claim, Diagnosis
-from diagnosis.run import diagnose
 from identification.model_file import write_model
 from identification.torque_model import TorqueModel
 from problem.errors import InputError
@@ -58,7 +58,7 @@ def _measured(case: Case, found: Diagnosis, hidden: Array, wanted: tuple[Sought,
     assert found.observed is not None
     assert found.nominal is not None
     assert found.final is not None
-    rows = rows_of(found.observed.of_role("validate"), found.observed.rows)
+    rows = rows_in(found.observed.of_role("validate"), found.observed.rows)
     named = found.final + sum((each.prediction for each in found.claims if each.effect == UNKNOWN), np.zeros(1))
     answers = [each.prediction for each in found.claims if answers_one(each, wanted)]
     left = hidden[rows] - sum((each[rows] for each in answers), np.zeros(1))

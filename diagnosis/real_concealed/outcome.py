@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from diagnosis.result import Claim
+from armlab.diagnosis.result import Claim
 
 Span = tuple[float, float]
 

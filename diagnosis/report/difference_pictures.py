@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.report.axis import Axis, axis_for
 from diagnosis.report.chart import Layer, Line, chart
 from diagnosis.report.looks import GIVEN, Look
 from diagnosis.report.words import brief, joined, number
-from diagnosis.result import Diagnosis
 from recordings.run import Array, Run
 
 MILLI = 1e3  # mrad in a rad

@@ -2,12 +2,12 @@
 
 import numpy as np
 
+from armlab.diagnosis.result import Claim, Diagnosis
 from diagnosis.report.axis import axis_for
 from diagnosis.report.chart import Layer, Line, Points, chart
 from diagnosis.report.looks import FITTED_ROWS, HELD_OUT_ROWS, LAW, SURROGATE, Look
 from diagnosis.report.rows import Shown, binned, spaced, without
 from diagnosis.report.words import joint_unit, plain
-from diagnosis.result import Claim, Diagnosis
 from recordings.run import Array
 
 MOST_DOTS = 700

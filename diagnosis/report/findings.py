@@ -2,11 +2,11 @@
 
 from html import escape
 
+from armlab.diagnosis.result import Claim, Diagnosis
 from diagnosis.report.gallery import Gallery
 from diagnosis.report.html import bullets, paragraph, section
 from diagnosis.report.tables import findings_table, meaning, parameter_table
 from diagnosis.report.words import joint_unit, number, place, plain, probability, told
-from diagnosis.result import Claim, Diagnosis
 
 
 def findings(diagnosis: Diagnosis, gallery: Gallery) -> str:

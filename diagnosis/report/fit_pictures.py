@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.report.axis import Axis, axis_for
 from diagnosis.report.chart import LEFT, RIGHT, WIDTH, Layer, Level, Line, chart
 from diagnosis.report.looks import FLOOR, FOUND, GIVEN, MEASURED, REFITTED, Look
 from diagnosis.report.rows import Shown, telling_stretch
 from diagnosis.report.svg import PALE, picture, tag, text_width, words
 from diagnosis.report.words import brief, joint_unit, number
-from diagnosis.result import Diagnosis
 from recordings.run import Array
 
 STRETCH_S = 4.0

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.diagnosis.result import Claim, Diagnosis
 from diagnosis.report.arm_picture import Mark, arm_picture, telling_position
 from diagnosis.report.difference_pictures import motion_differences
 from diagnosis.report.evidence_picture import evidence_picture
@@ -12,7 +13,6 @@ from diagnosis.report.located_picture import located_pictures
 from diagnosis.report.motion_pictures import motion
 from diagnosis.report.rows import Shown, spaced
 from diagnosis.report.words import OF_LINKS, plain
-from diagnosis.result import Claim, Diagnosis
 
 POSTURES = 100  # recorded ones, of which the most telling is drawn
 MOST_LOCATED = 4  # joints whose error is drawn against every variable

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.report.axis import axis_for
 from diagnosis.report.chart import Level, Line, chart
 from diagnosis.report.evidence_picture import SPANS
 from diagnosis.report.looks import FLOOR, FOUND, GIVEN, REFITTED
 from diagnosis.report.rows import Shown, binned
 from diagnosis.report.words import joint_unit
-from diagnosis.result import Diagnosis
 from recordings.run import Array
 
 BINS = 24

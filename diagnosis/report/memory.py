@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnosis.engine.observed import Observed
+from armlab.diagnosis.data import Observed
 from recordings.run import Array
 
 LONGEST_S = 1.0

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.report.axis import Axis, axis_for
 from diagnosis.report.chart import Layer, Line, chart
 from diagnosis.report.looks import FOUND, GIVEN, MEASURED, REFITTED, Look
 from diagnosis.report.words import brief, joined, number
 from diagnosis.resimulate.dynamics import NoInertiaError
 from diagnosis.resimulate.windows import WINDOW_S, Resimulation, resimulate
-from diagnosis.result import Diagnosis
 
 MOST_WINDOWS = 3  # joints whose most telling window is drawn
 HEIGHT = 215.0

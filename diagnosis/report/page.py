@@ -1,10 +1,10 @@
 """The page: its sections one after the other, for a verdict with and without a fit."""
 
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.report import sections
 from diagnosis.report.findings import findings
 from diagnosis.report.gallery import Gallery
 from diagnosis.report.html import document
-from diagnosis.result import Diagnosis
 
 
 def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.engine.observed import Observed
-from diagnosis.engine.segments import Segment, rows_of
-from diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.data import Observed, Segment, rows_in
+from armlab.diagnosis.result import Claim, Diagnosis
 from recordings.run import Array
 
 Rows = NDArray[np.intp]
@@ -27,11 +26,11 @@ class Shown:
 
     def held_out(self, joint: int) -> NDArray[np.bool_]:
         """Rows (rows,) that took no part in the fit, and in which a joint (from 0) moves."""
-        return rows_of(self.observed.of_role("validate", joint), self.observed.rows)
+        return rows_in(self.observed.of_role("validate", joint), self.observed.rows)
 
     def used(self, joint: int) -> Rows:
         """Numbers of the rows in which a joint (from 0) moves."""
-        return np.flatnonzero(rows_of(self.observed.used(joint), self.observed.rows))
+        return np.flatnonzero(rows_in(self.observed.used(joint), self.observed.rows))
 
     def held_out_rms(self, residual: Array) -> Array:
         """Root mean square on held-out rows, (joints,)."""

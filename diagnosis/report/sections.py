@@ -3,6 +3,7 @@
 from html import escape
 from importlib.metadata import version
 
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.export.simulator import without_place
 from diagnosis.report.gallery import Gallery
 from diagnosis.report.html import bullets, figures, folded, paragraph, section, table
@@ -16,7 +17,6 @@ from diagnosis.report.words import (
     told,
     verdict_sentences,
 )
-from diagnosis.result import Diagnosis
 
 PARTS = {
     "before-after": "Before and after",

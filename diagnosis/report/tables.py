@@ -1,10 +1,10 @@
 """The tables of the page, as HTML."""
 
+from armlab.diagnosis.result import Claim, Diagnosis
 from diagnosis.report.html import table
 from diagnosis.report.memory import filter_memory_seconds, memory_seconds
 from diagnosis.report.rows import Shown
 from diagnosis.report.words import joint_unit, number, place, plain, rows_of
-from diagnosis.result import Claim, Diagnosis
 from recordings.vocabulary import EFFECT_IDS, effect_named
 
 

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from textwrap import wrap
 
+from armlab.diagnosis.result import Claim, Diagnosis
 from diagnosis.report.words import joint_unit, number, place, plain, probability, told, verdict_sentences
-from diagnosis.result import Claim, Diagnosis
 
 WIDTH = 110
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Parameter, Rival
 from diagnosis.report.memory import white
 from diagnosis.report.rows import shown
-from diagnosis.result import Claim, Diagnosis, JointFit, Parameter, Rival
 from problem.arm import Arm
 
 OF_LINKS = ("payload", "inertial_parameter_error")

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from diagnosis.files import write_texts
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.verdict_files import write_texts
 from diagnosis.report.gallery import Gallery, gallery
 from diagnosis.report.page import report_page
 from diagnosis.report.rows import shown
-from diagnosis.result import Diagnosis
 
 PAGE, FIGURES = "report.html", "figures"
 

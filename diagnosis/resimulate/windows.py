@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.engine.observed import Observed
+from armlab.diagnosis.data import Observed
+from armlab.diagnosis.result import Diagnosis
 from diagnosis.resimulate.dynamics import Body, NoInertiaError, runge_kutta
-from diagnosis.result import Diagnosis
 from problem.base_parameters import base_parameters
 from problem.regressor import observation_matrix, rigid_body_torque
 from recordings.run import Array

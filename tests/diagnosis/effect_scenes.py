@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from random_arms import random_arm
 
-from diagnosis.effects.contract import Candidate, Family, Scene
-from diagnosis.effects.library import BUILT_IN
+from armlab.effects.contract import Candidate, Family, Scene
+from armlab.effects.library import BUILT_IN
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
+from armlab.effects.contract import Scene
 from bench.cli import main
 from diagnosis.compare.changes import Change, holm
 from diagnosis.compare.compare import Comparison, compare
 from diagnosis.compare.structure import predicted
 from diagnosis.compare.tell import as_json, sentences, terminal_lines
-from diagnosis.effects.contract import Scene
 from problem.regressor import rigid_body_torque
 from recordings.load import load_recording
 from recordings.recording import Recording

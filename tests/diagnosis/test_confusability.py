@@ -12,11 +12,11 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 from told_recordings import ARM, frame, motion_at, recording_in
 
+from armlab.effects.library import library
 from bench.cli import main
 from diagnosis.confusability.card import Card, Entry, confusability
 from diagnosis.confusability.planned import Planned, planned_motions
 from diagnosis.confusability.tables import as_csv, as_json, markdown, terminal_lines
-from diagnosis.effects.library import library
 
 RECORDS = Path(__file__).parents[2] / "results" / "best_known.json"
 

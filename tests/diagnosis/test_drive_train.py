@@ -10,10 +10,9 @@ from random_arms import random_arm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from diagnosis.effects.contract import Scene
-from diagnosis.effects.drive_train import WALL_HZ, Twist, own_inertia, twisted
-from diagnosis.effects.sensitivity import along
-from diagnosis.effects.transmission import Backlash, JointElasticity
+from armlab.effects.contract import Scene
+from armlab.effects.sensitivity import directional_derivative
+from armlab.effects.transmission import WALL_HZ, Backlash, JointElasticity, Twist, felt_inertia, integrate_twist
 from problem.motion import Motion
 from recordings.run import Array
 
@@ -49,7 +48,7 @@ def torque_behind(where: Scene, law: Twist) -> Array:
         inertia = torques(now, *state, 1.0)[JOINT] - still
         return [state[1], (-still - force_of(law, inertia, *state)) / inertia]
 
-    begin = twisted(where, JOINT, law)[0, 0]
+    begin = integrate_twist(where, JOINT, law)[0, 0]
     fine = np.linspace(time[0], time[-1], FINER * (len(time) - 1) + 1)
     found = solve_ivp(motion, (time[0], time[-1]), [begin, 0.0], t_eval=fine, max_step=5e-4, rtol=1e-7, atol=1e-10)
     pairs = zip(fine, found.y.T, strict=True)
@@ -75,8 +74,8 @@ def test_a_twist_to_first_order_is_the_torque_of_the_whole_arm(law: Twist) -> No
     time, motor = waves(3, 2, 2.0)
     where = scene_of(arm, motor, time)
     moved = np.zeros((3, *motor.position.shape))
-    moved[:, :, JOINT] = twisted(where, JOINT, law)
-    ours, theirs = blurred(along(where, Motion(*moved))), blurred(torque_behind(where, law))
+    moved[:, :, JOINT] = integrate_twist(where, JOINT, law)
+    ours, theirs = blurred(directional_derivative(where, Motion(*moved))), blurred(torque_behind(where, law))
     for own, truth in zip(ours.T, theirs.T, strict=True):
         assert np.std(own - truth) < 0.15 * max(np.std(truth), 0.1 * np.std(theirs[:, JOINT]))
 
@@ -84,7 +83,7 @@ def test_a_twist_to_first_order_is_the_torque_of_the_whole_arm(law: Twist) -> No
 def test_the_inertia_of_a_joint_is_positive_and_left_to_its_links() -> None:
     arm = random_arm("RRR", seed=3)
     time, motor = waves(3, 2, 1.0)
-    inertia = own_inertia(scene_of(arm, motor, time), JOINT)
+    inertia = felt_inertia(scene_of(arm, motor, time), JOINT)
     assert inertia.shape == time.shape
     assert inertia.min() > 0
 
@@ -96,7 +95,7 @@ def test_a_scan_finds_the_gap_that_left_its_torque() -> None:
     play = Backlash.at(arm, JOINT + 1, shape=(1.1e-3,))
     left = play.columns(where)[:, :, 0] * 1.1e-3
     left[1::2] = np.nan  # rows that no filter kept
-    found = Backlash.scanned(arm, JOINT + 1, [where], [left])
+    found = Backlash.from_scan(arm, JOINT + 1, [where], [left])
     assert found[0].shape[0] == pytest.approx(1.1e-3, rel=0.3)
     assert found[0].looks > 2
 
@@ -105,7 +104,7 @@ def test_first_looks_at_a_spring_follow_the_load_at_once_or_ring() -> None:
     arm = random_arm("RRR", seed=3)
     time, motor = waves(3, 2, 4.0)
     where = scene_of(arm, motor, time)
-    rigid, ringing = JointElasticity.first_looks(arm, JOINT + 1, [where])
+    rigid, ringing = JointElasticity.initial_shapes(arm, JOINT + 1, [where])
     load = where.rigid_torque[:, JOINT]
     np.testing.assert_allclose(rigid.twist(where)[0], -load, atol=0.1 * np.abs(load).max())
     assert ringing.shape[0] < rigid.shape[0]
@@ -116,9 +115,9 @@ def test_links_that_no_arm_can_have_do_not_stop_the_integration() -> None:
     time, motor = waves(3, 2, 1.0)
     where = scene_of(arm, motor, time)
     wrong = replace(where, inertial=-1e-3 * where.inertial)
-    assert own_inertia(wrong, JOINT).min() > 0
+    assert felt_inertia(wrong, JOINT).min() > 0
     for law in (Twist(stiffness=1e6, damping_time=3e-4), Twist(gap=1e-3)):
-        assert np.isfinite(twisted(wrong, JOINT, law)).all()
+        assert np.isfinite(integrate_twist(wrong, JOINT, law)).all()
 
 
 def test_a_spring_stiffer_than_any_resonance_follows_its_load_at_once() -> None:
@@ -126,5 +125,5 @@ def test_a_spring_stiffer_than_any_resonance_follows_its_load_at_once() -> None:
     time, motor = waves(3, 2, 1.0)
     where = scene_of(arm, motor, time)
     load = where.rigid_torque[:, JOINT]
-    twist = twisted(where, JOINT, Twist(stiffness=1e9, damping_time=3e-4))[0] * 1e9
+    twist = integrate_twist(where, JOINT, Twist(stiffness=1e9, damping_time=3e-4))[0] * 1e9
     np.testing.assert_allclose(twist, -load, atol=0.05 * np.abs(load).max())

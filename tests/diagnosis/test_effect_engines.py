@@ -9,7 +9,7 @@ from effect_scenes import candidate, scene, scene_of, torque_of, waves
 from engines import inverse_dynamics, mujoco_model
 from random_arms import random_arm
 
-from diagnosis.effects.contract import Scene
+from armlab.effects.contract import Scene
 from problem.arm import Arm, Link
 from problem.inertia import link_from_centre_of_mass
 from problem.transforms import rotation_x, translation
@@ -127,7 +127,7 @@ def test_payload_is_a_heavier_body(link: int) -> None:
 def test_point_payload_is_a_small_heavy_body() -> None:
     where = short("RRR")
     body = link_from_centre_of_mass(0.7, np.array([0.1, 0.2, -0.05]), np.zeros((3, 3)))
-    point = candidate("payload", [where], 3, "point").reshaped((0.1, 0.2, -0.05))
+    point = candidate("payload", [where], 3, "point").with_shape((0.1, 0.2, -0.05))
     np.testing.assert_allclose(torque_of(point, np.array([0.7]), where), _with_body(where, 3, body), atol=MUJOCO)
 
 

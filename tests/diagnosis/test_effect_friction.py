@@ -9,11 +9,9 @@ from random_arms import random_arm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
-from diagnosis.effects.coupling import pairs_of
-from diagnosis.effects.direction import direction
-from diagnosis.effects.drift import ViscousDrift
-from diagnosis.effects.hysteresis import dahl_state
-from diagnosis.effects.warming import HeatedFriction, ThermometerFriction
+from armlab.effects.coupling import neighbour_pairs
+from armlab.effects.friction import direction_of_motion
+from armlab.effects.memory import HeatedFriction, ThermometerFriction, ViscousDrift, dahl_state
 from recordings.run import Array
 
 
@@ -72,13 +70,13 @@ def test_lugre_friction_is_that_of_its_bristles() -> None:
 
     bristles = solve_ivp(rate, (0, time[-1]), [0.0], t_eval=time, rtol=1e-8, atol=1e-10, max_step=2e-3)
     parameters = {"level": level, "static_level": static, "stiffness": stiffness, "velocity": slow}
-    friction, coefficients = family("presliding_hysteresis").restored(where.arm, (1,), parameters)
+    friction, coefficients = family("presliding_hysteresis").from_parameters(where.arm, (1,), parameters)
     torque = torque_of(friction, coefficients, where)[1:, 0]  # the first sample stands for half an interval
     np.testing.assert_allclose(torque, stiffness * bristles.y[0, 1:], atol=0.03)
 
 
 def test_stiffness_of_presliding_is_level_over_way() -> None:
-    friction = candidate("presliding_hysteresis", [scene()], 1).reshaped((0.02,))
+    friction = candidate("presliding_hysteresis", [scene()], 1).with_shape((0.02,))
     assert friction.parameters(np.array([3.0])) == {"level": 3.0, "stiffness": 150.0}
 
 
@@ -88,17 +86,17 @@ def test_the_direction_of_motion_is_its_mean_over_the_time_of_a_sample() -> None
     velocity = make_interp_spline(time, motion.velocity, k=5)
     shifts = (np.arange(1000) + 0.5) / 1000 - 0.5
     fine = np.stack([velocity(time + shift * where.step) for shift in shifts])
-    assert np.any(np.abs(direction(where, 0)) < 1)
-    np.testing.assert_allclose(direction(where, 0), np.sign(fine[:, :, 0]).mean(axis=0), atol=0.02)
-    np.testing.assert_allclose(direction(where, 0, 1), np.sign(fine.sum(axis=2)).mean(axis=0), atol=0.02)
+    assert np.any(np.abs(direction_of_motion(where, 0)) < 1)
+    np.testing.assert_allclose(direction_of_motion(where, 0), np.sign(fine[:, :, 0]).mean(axis=0), atol=0.02)
+    np.testing.assert_allclose(direction_of_motion(where, 0, 1), np.sign(fine.sum(axis=2)).mean(axis=0), atol=0.02)
 
 
 def test_stribeck_friction_falls_from_its_static_to_its_sliding_level() -> None:
     where = scene()
-    friction = candidate("stribeck_friction", [where], 1).reshaped((0.1, 2.0))
+    friction = candidate("stribeck_friction", [where], 1).with_shape((0.1, 2.0))
     velocity = where.motion.velocity[:, 0]
     torque = torque_of(friction, np.array([2.0, 1.5]), where)[:, 0] * np.sign(velocity)
-    steady = np.abs(direction(where, 0)) == 1
+    steady = np.abs(direction_of_motion(where, 0)) == 1
     assert friction.parameters(np.array([2.0, 1.5])) == {
         "level": 2.0,
         "static_level": 3.5,
@@ -115,7 +113,7 @@ def test_asymmetric_friction_brakes_by_direction(form: str, forwards: float, bac
     friction = candidate("asymmetric_friction", [where], 1, form)
     velocity = where.motion.velocity[:, 0] if form == "slopes" else np.sign(where.motion.velocity[:, 0])
     torque = torque_of(friction, np.array([2.0, 1.0]), where)[:, 0]
-    steady = np.abs(direction(where, 0)) == 1
+    steady = np.abs(direction_of_motion(where, 0)) == 1
     expected = np.where(velocity > 0, 2.0, 1.0) * velocity
     np.testing.assert_allclose(torque[steady], expected[steady])
     assert friction.parameters(np.array([2.0, 1.0]))["negative"] == 1.0
@@ -136,14 +134,14 @@ def test_load_dependent_friction_follows_the_links_and_not_the_friction_of_the_m
     friction = candidate("load_dependent_friction", [where], 2)
     rougher = replace(where, torque=where.torque + 3 * np.sign(where.motion.velocity))
     assert np.array_equal(friction.columns(where), friction.columns(rougher))
-    expected = 0.1 * np.abs(where.rigid_torque[:, 1]) * direction(where, 1)
+    expected = 0.1 * np.abs(where.rigid_torque[:, 1]) * direction_of_motion(where, 1)
     np.testing.assert_allclose(torque_of(friction, np.array([0.1]), where)[:, 1], expected)
 
 
 def test_coupled_coulomb_friction_follows_the_motor_that_turns_with_both_joints() -> None:
     where = scene()
-    coupling, coefficients = family("joint_coupling").restored(where.arm, (2, 3), {"level": 2.0})
-    both = direction(where, 1, 2)
+    coupling, coefficients = family("joint_coupling").from_parameters(where.arm, (2, 3), {"level": 2.0})
+    both = direction_of_motion(where, 1, 2)
     assert coupling.rows == (1,)
     np.testing.assert_allclose(torque_of(coupling, coefficients, where)[:, 1], 2.0 * both)
 
@@ -151,15 +149,18 @@ def test_coupled_coulomb_friction_follows_the_motor_that_turns_with_both_joints(
 def test_friction_that_gears_carry_over_has_the_direction_of_the_joint_that_it_comes_from() -> None:
     where = scene()
     parts = {"coefficient": 0.5, "level": 2.0}
-    coupling, coefficients = family("joint_coupling").restored(where.arm, (2, 3), parts, "carried")
-    expected = 2.0 * direction(where, 2) + 0.5 * where.motion.velocity[:, 2]
+    coupling, coefficients = family("joint_coupling").from_parameters(where.arm, (2, 3), parts, "carried")
+    expected = 2.0 * direction_of_motion(where, 2) + 0.5 * where.motion.velocity[:, 2]
     np.testing.assert_allclose(torque_of(coupling, coefficients, where)[:, 1], expected)
     assert "sgn(qd_3)" in coupling.equation(coefficients)
 
 
 def test_couplings_are_tried_between_neighbours_and_within_a_wrist() -> None:
-    assert pairs_of(3) == [(1, 2), (2, 1), (2, 3), (3, 2)]
-    assert set(pairs_of(6)) - {pair for pair in pairs_of(6) if abs(pair[0] - pair[1]) == 1} == {(4, 6), (6, 4)}
+    assert neighbour_pairs(3) == [(1, 2), (2, 1), (2, 3), (3, 2)]
+    assert set(neighbour_pairs(6)) - {pair for pair in neighbour_pairs(6) if abs(pair[0] - pair[1]) == 1} == {
+        (4, 6),
+        (6, 4),
+    }
 
 
 def test_drift_goes_from_its_initial_to_its_final_coefficient() -> None:

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from effect_scenes import scene_of, waves
 
-from diagnosis.effects.contract import Candidate, Scene
-from diagnosis.effects.geometry import Confusion, base_rows, confusion, rows_of
-from diagnosis.effects.library import BUILT_IN
+from armlab.effects.contract import Candidate, Scene
+from armlab.effects.library import BUILT_IN
+from armlab.effects.separability import Confusion, base_rows, candidate_rows, compute_confusion
 from problem.base_parameters import base_parameters
 from problem.robot_file import load_arm
 from recordings.filters import Butterworth
@@ -40,7 +40,7 @@ def named(*wanted: tuple[str, int | None, str]) -> list[Candidate]:
 
 def between(wanted: Sequence[tuple[str, int | None, str]], refit: bool = False) -> Confusion:
     free: Array | None = base_rows(base_parameters(scenes()[0].arm), scenes(), filters()) if refit else None
-    return confusion(named(*wanted), scenes(), filters(), free)
+    return compute_confusion(named(*wanted), scenes(), filters(), free)
 
 
 def test_asymmetric_levels_are_coulomb_friction_and_an_offset() -> None:
@@ -84,13 +84,13 @@ def test_a_delay_resembles_viscous_friction_more_than_coulomb_friction_resembles
 
 def test_a_joint_that_is_measured_well_counts_more() -> None:
     pair = named(("time_delay", None, ""), ("channel_skew", 3, "torque"))
-    alike = confusion(pair, scenes(), filters()).closest[0, 1]
-    third = confusion(pair, scenes(), filters(), noise=np.array([10.0, 10.0, 0.01])).closest[0, 1]
+    alike = compute_confusion(pair, scenes(), filters()).closest[0, 1]
+    third = compute_confusion(pair, scenes(), filters(), noise=np.array([10.0, 10.0, 0.01])).closest[0, 1]
     assert third > 0.99 > alike
 
 
 def test_rows_stand_joint_by_joint_within_a_sample() -> None:
     friction = named(("coulomb_friction", 2, ""))[0]
-    rows = rows_of(friction, scenes(), filters()).reshape(-1, 3)
+    rows = candidate_rows(friction, scenes(), filters()).reshape(-1, 3)
     assert not rows[:, [0, 2]].any()
     assert len(rows) == sum(len(range(*keep.rows.indices(4000))) for keep in filters())

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from effect_scenes import family, scene, torque_of
 
-from diagnosis.effects.contract import Candidate, Family, Scene
-from diagnosis.effects.friction import CoulombFriction
-from diagnosis.effects.library import BUILT_IN, library
-from diagnosis.effects.term import EveryJoint, Term
+from armlab.effects.contract import Candidate, Family, Scene
+from armlab.effects.friction import CoulombFriction
+from armlab.effects.library import BUILT_IN, library
+from armlab.effects.term import EveryJoint, Term
 from identification import extras
 from identification.extras import BrokenEffectError
 from problem.arm import PARAMETER_NAMES
@@ -92,7 +92,7 @@ def test_named_parameters_make_the_same_torque_again(kinds: str) -> None:
             coefficients = np.array(each.shape)
         named = each.parameters(coefficients)
         place = each.joints or (() if each.joint is None else (each.joint,))
-        again, values = family(each.effect).restored(where.arm, place, named, each.form)
+        again, values = family(each.effect).from_parameters(where.arm, place, named, each.form)
         expected, got = torque_of(each, coefficients, where), torque_of(again, values, where)
         np.testing.assert_allclose(got, expected, atol=1e-9 * (1 + np.abs(expected).max()), err_msg=str(each))
 
@@ -101,7 +101,7 @@ def test_named_parameters_make_the_same_torque_again(kinds: str) -> None:
 def test_reshaped_candidates_keep_their_place_and_take_the_shape(kinds: str) -> None:
     for each in every(kinds):
         middle = tuple(0.5 * (low + high) + 0.01 for low, high in each.bounds)
-        other = each.reshaped(middle)
+        other = each.with_shape(middle)
         assert len(each.shape) == len(each.bounds), each
         assert (other.effect, other.joint, other.joints, other.rows) == (
             each.effect, each.joint, each.joints, each.rows,
@@ -160,7 +160,7 @@ def test_users_effects_follow_the_built_in_ones(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_armlabs_own_entry_point_registers_nothing_twice(monkeypatch: pytest.MonkeyPatch) -> None:
-    registered(monkeypatch, "diagnosis.effects.library:BUILT_IN")
+    registered(monkeypatch, "armlab.effects.library:BUILT_IN")
     assert library() == BUILT_IN
 
 
@@ -188,7 +188,7 @@ def test_a_family_without_restoring_says_so() -> None:
             return []
 
     with pytest.raises(ValueError, match="sticky_seal cannot be computed"):
-        Bare().restored(scene().arm, (1,), {})
+        Bare().from_parameters(scene().arm, (1,), {})
 
 
 def test_the_effect_in_the_documentation_works() -> None:

@@ -9,8 +9,8 @@ from engines import pinocchio_model
 from random_arms import random_arm
 from scipy.interpolate import make_interp_spline
 
+from armlab.effects.contract import Scene
 from concealed.effects.channels import EncoderOffset as HiddenOffset
-from diagnosis.effects.contract import Scene
 from problem.arm import Arm
 from problem.motion import Motion
 from recordings.run import Array
@@ -81,14 +81,14 @@ def test_time_delay_is_the_torque_of_an_earlier_instant(seconds: float) -> None:
     where = scene_of(arm, motion, time, friction=0.0)
     spline = make_interp_spline(time, where.torque, k=5)
     truth = spline(np.clip(time - seconds, 0, time[-1])) - where.torque
-    late = candidate("time_delay", [where]).reshaped((seconds,))
+    late = candidate("time_delay", [where]).with_shape((seconds,))
     close(torque_of(late, np.array([seconds]), where), truth, 2e-3)
     assert late.parameters(np.array([seconds])) == {"seconds": seconds}
 
 
 def test_a_small_delay_is_told_by_the_column_of_another() -> None:
     where = scene(seconds=4.0)
-    first, exact = (candidate("time_delay", [where]).reshaped((shift,)) for shift in (0.004, 0.003))
+    first, exact = (candidate("time_delay", [where]).with_shape((shift,)) for shift in (0.004, 0.003))
     smooth = replace(where, torque=where.rigid_torque)
     column = torque_of(first, np.array([1.0]), smooth)[INNER].ravel()
     truth = torque_of(exact, np.array([0.003]), smooth)[INNER].ravel()
@@ -101,7 +101,7 @@ def test_skew_of_a_channel_is_that_channel_late(form: str) -> None:
     arm = random_arm("RRR", seed=3)
     time, motion = waves(3, 1, 4.0)
     where = scene_of(arm, motion, time, friction=0.0)
-    skew = candidate("channel_skew", [where], joint, form).reshaped((seconds,) if form == "torque" else ())
+    skew = candidate("channel_skew", [where], joint, form).with_shape((seconds,) if form == "torque" else ())
     if form == "torque":
         spline = make_interp_spline(time, where.torque[:, joint - 1], k=5)
         truth = np.zeros((len(time), 3))
@@ -117,7 +117,7 @@ def test_skew_of_a_channel_is_that_channel_late(form: str) -> None:
 def test_friction_of_a_late_channel_jumps_late_by_the_same_time() -> None:
     where = scene(seconds=4.0)
     friction_only = replace(where, torque=np.sign(where.motion.velocity))
-    late = candidate("time_delay", [friction_only]).reshaped((0.01,))
+    late = candidate("time_delay", [friction_only]).with_shape((0.01,))
     change = torque_of(late, np.array([0.01]), friction_only)[:, 0]
     jumps = np.abs(np.diff(np.sign(where.motion.velocity[:, 0]))).sum() / 2
     # between a jump and its late copy the change is two levels

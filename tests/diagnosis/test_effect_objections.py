@@ -80,7 +80,7 @@ def test_a_compensator_carries_gravity() -> None:
     assert sine.objection(-0.5 * gravity) is None
     assert "adds to gravity" in str(sine.objection(0.5 * gravity))
     linkage = candidate("gravity_compensator", [where], 2, "linkage")
-    with_gravity = linkage.reshaped((float(np.arctan2(gravity[1], gravity[0])), 0.5))
+    with_gravity = linkage.with_shape((float(np.arctan2(gravity[1], gravity[0])), 0.5))
     assert "adds to gravity" in str(with_gravity.objection(np.array([1.0, 1.0])))
     assert with_gravity.objection(np.array([-1.0, -1.0])) is None
     assert len(position) == len(where.time)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_scenes import family, scene
 
-from diagnosis.effects.contract import Candidate, Scene
+from armlab.effects.contract import Candidate, Scene
 from recordings.run import Array
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnosis.engine.floor import period_scatter
+from armlab.diagnosis.location import period_scatter
 from recordings.differentiate import differentiate
 from recordings.filters import Butterworth
 from recordings.run import Array, Run

@@ -5,54 +5,52 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from diagnosis.effects.library import library
-from diagnosis.engine.flexible import families, features
-from diagnosis.engine.folds import gain_of
-from diagnosis.engine.links import link_prior
-from diagnosis.engine.noise import noise_of
-from diagnosis.engine.observed import Observed, observe
-from diagnosis.engine.segments import Segment, parts
-from diagnosis.engine.simulation import simulation_of
-from diagnosis.engine.solver import EXPECTED, Solver, State
-from diagnosis.engine.surrogate import structure
-from diagnosis.engine.workbench import Workbench, workbench
-from diagnosis.settings import Settings
+from armlab.diagnosis.blocks import held_out_gain
+from armlab.diagnosis.data import Observed, Segment, observe, split_segment
+from armlab.diagnosis.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.links import link_prior
+from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.simulation import read_simulation
+from armlab.diagnosis.solver import USUAL_EFFECTS, Solver, State
+from armlab.diagnosis.surrogate import feature_banks, find_structure, flexible_features
+from armlab.effects.library import library
 from problem.base_parameters import base_parameters
 
 
 @pytest.fixture(scope="module")
-def bench() -> Workbench:
+def bench() -> DesignMatrix:
     recording = cases.recording(seconds=6.0)
-    simulation = simulation_of(recording, None)
+    simulation = read_simulation(recording, None)
     observed = observe(recording.runs, simulation.arm, simulation.inertial, Settings())
     base = base_parameters(simulation.arm)
     prior = link_prior(simulation.arm, base, recording.arm.parameters)
-    plain = workbench(observed, simulation, base, prior, Settings())
-    return plain.with_candidates([family for family in library() if family.effect in EXPECTED])
+    plain = build_design_matrix(observed, simulation, base, prior, Settings())
+    return plain.with_candidates([family for family in library() if family.effect in USUAL_EFFECTS])
 
 
 @pytest.fixture(scope="module")
-def observed(bench: Workbench) -> Observed:
+def observed(bench: DesignMatrix) -> Observed:
     return bench.observed
 
 
-def solved(bench: Workbench) -> Solver:
+def solved(bench: DesignMatrix) -> Solver:
     columns = bench.columns
-    return bench.solver(noise_of(columns.target, bench.observed, 0.0))[1]
+    return bench.solver(fit_noise(columns.target, bench.observed, 0.0))[1]
 
 
 def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Observed) -> None:
     coloured = lfilter([0.3], [1, -0.9], np.random.default_rng(0).standard_normal((observed.rows, 3)), axis=0)
-    noise = noise_of(coloured, observed, 0.0)
+    noise = fit_noise(coloured, observed, 0.0)
     white = noise.whitened(coloured[:, :1], 0, observed.used(0))[:, 0]
     assert np.var(white) == pytest.approx(1, abs=0.05)
     assert abs(np.mean(white[1:] * white[:-1])) < 0.06
 
 
-def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench: Workbench) -> None:
+def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench: DesignMatrix) -> None:
     solver = solved(bench)
     columns = bench.columns
-    noise = noise_of(columns.target, bench.observed, 0.0)
+    noise = fit_noise(columns.target, bench.observed, 0.0)
     state = State((0, 4, 8), (0.0, 0.0, 0.0))
     fit = solver.fit(state)
     rows, targets = [], []
@@ -69,7 +67,7 @@ def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench:
     assert fit.coefficients[fit.columns] / solver.moments.lengths[fit.columns] == pytest.approx(direct, rel=1e-5)
 
 
-def test_the_gain_of_a_group_is_what_adding_it_raises_the_score_by(bench: Workbench) -> None:
+def test_the_gain_of_a_group_is_what_adding_it_raises_the_score_by(bench: DesignMatrix) -> None:
     solver, state = solved(bench), State((1,), (0.05, 0.05, 0.05))
     gains = solver.gains(state)
     for group in (0, 5, 7):
@@ -77,7 +75,7 @@ def test_the_gain_of_a_group_is_what_adding_it_raises_the_score_by(bench: Workbe
         assert gains[group] == pytest.approx(raised, abs=1e-3)
 
 
-def test_the_loss_of_a_group_is_what_taking_it_out_changes_the_score_by(bench: Workbench) -> None:
+def test_the_loss_of_a_group_is_what_taking_it_out_changes_the_score_by(bench: DesignMatrix) -> None:
     solver, state = solved(bench), State((0, 1, 5), (0.05, 0.05, 0.05))
     losses = solver.losses(solver.fit(state))
     for group in state.groups:
@@ -85,7 +83,7 @@ def test_the_loss_of_a_group_is_what_taking_it_out_changes_the_score_by(bench: W
         assert losses[group] == pytest.approx(changed, abs=1e-3)
 
 
-def test_links_of_zero_width_leave_the_base_parameters_at_the_simulation(bench: Workbench) -> None:
+def test_links_of_zero_width_leave_the_base_parameters_at_the_simulation(bench: DesignMatrix) -> None:
     solver = solved(bench)
     fit = solver.fit(State((), (0.0, 0.0, 0.0)))
     assert not fit.coefficients.any()
@@ -102,35 +100,35 @@ def test_widths_are_the_relative_size_of_a_link_that_is_scaled() -> None:
 def test_parts_are_the_long_stretches_where_a_joint_moves() -> None:
     moving = np.ones(200, dtype=bool)
     moving[90:95] = moving[120] = False
-    found = parts(Segment(0, "identify", 10, 190), moving)
+    found = split_segment(Segment(0, "identify", 10, 190), moving)
     assert [(each.start, each.stop) for each in found] == [(10, 90), (121, 190)]
 
 
 def test_a_surrogate_finds_structure_of_other_joints_and_none_in_noise(observed: Observed) -> None:
     rng = np.random.default_rng(1)
-    made = features(observed, 0, rng)
+    made = flexible_features(observed, 0, rng)
     noise_only = 0.05 * rng.standard_normal((observed.rows, 3))
-    noise = noise_of(noise_only, observed, 0.0)
+    noise = fit_noise(noise_only, observed, 0.0)
     wave = np.sin(3 * observed.kept("position")[:, 2]) * 0.2
-    found = structure(noise_only[:, 0] + wave, 0, made, noise, observed)
+    found = find_structure(noise_only[:, 0] + wave, 0, made, noise, observed)
     assert found.gain > 0.5
     assert "position_3" in found.depends_on
-    assert structure(noise_only[:, 0], 0, made, noise, observed).gain < 0.05
+    assert find_structure(noise_only[:, 0], 0, made, noise, observed).gain < 0.05
 
 
 def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed) -> None:
     """A torque constant that falls with speed, on one joint that carries another's load."""
     rng = np.random.default_rng(2)
     left = 0.05 * rng.standard_normal(observed.rows)
-    noise = noise_of(np.column_stack([left] * 3), observed, 0.0)
+    noise = fit_noise(np.column_stack([left] * 3), observed, 0.0)
     load = np.sin(2 * observed.kept("position")[:, 2]) + observed.kept("acceleration")[:, 1] / 10
     weak = 0.02 * load * observed.kept("velocity")[:, 1] ** 2
-    found = [structure(left + weak, 1, each, noise, observed) for each in families(observed, 1, load)]
+    found = [find_structure(left + weak, 1, each, noise, observed) for each in feature_banks(observed, 1, load)]
     best = max(found, key=lambda each: each.gain)
     assert best.gain > 0.2
     assert best.p_value < 0.05
     assert set(best.depends_on) <= {"torque_2", "velocity_2"}
-    chance = [structure(left, 1, each, noise, observed) for each in families(observed, 1, load)]
+    chance = [find_structure(left, 1, each, noise, observed) for each in feature_banks(observed, 1, load)]
     assert min(each.p_value for each in chance) * len(chance) > 0.1
 
 
@@ -140,7 +138,7 @@ def test_a_gain_in_few_stretches_is_sure_but_in_one_alone_is_not() -> None:
     noise = rng.standard_normal(len(blocks))
     few = np.where(blocks % 10 == 0, 1.0, 0.0)
     once = np.where(blocks == 7, 1.0, 0.0)
-    assert gain_of(noise + few, noise, blocks).chance < 0.01
-    assert gain_of(noise + once, noise, blocks).chance > 0.01
-    assert gain_of(noise, noise + 0.1 * few, blocks).chance > 0.5
-    assert gain_of(noise + 0.3, noise, blocks).p_value < 1e-6
+    assert held_out_gain(noise + few, noise, blocks).chance < 0.01
+    assert held_out_gain(noise + once, noise, blocks).chance > 0.01
+    assert held_out_gain(noise, noise + 0.1 * few, blocks).chance > 0.5
+    assert held_out_gain(noise + 0.3, noise, blocks).p_value < 1e-6

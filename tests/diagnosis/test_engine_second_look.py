@@ -6,8 +6,8 @@ import pytest
 import yaml
 from told_recordings import frame, recording_in
 
+from armlab.diagnosis.diagnose import diagnose
 from diagnosis.command import diagnose_recording
-from diagnosis.run import diagnose
 from identification.model_file import read_model
 from recordings.load import load_recording
 

@@ -3,10 +3,10 @@
 import engine_cases as cases
 import pytest
 
-from diagnosis.ablation import AFTER_THE_SEARCH, ALL_ON, IN_THE_SEARCH, without_each
-from diagnosis.result import Diagnosis
-from diagnosis.run import diagnose
-from diagnosis.settings import GUARDS, Guards, Settings, guards_without
+from armlab.diagnosis.ablation import ALL_ON, GUARDS_AFTER_SEARCH, GUARDS_IN_SEARCH, diagnose_without_each
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import GUARDS, Guards, Settings, guards_without
 from problem.errors import InputError
 
 
@@ -28,9 +28,9 @@ def _told(found: Diagnosis) -> list[tuple[str, int | None, str]]:
 
 def test_stages_that_a_guard_has_no_part_in_need_not_be_done_again() -> None:
     recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
-    found = dict(without_each(recording))
+    found = dict(diagnose_without_each(recording))
     assert list(found) == [ALL_ON, *GUARDS]
     assert _told(found[ALL_ON]) == _told(diagnose(recording))
-    for guard in (AFTER_THE_SEARCH[2], IN_THE_SEARCH[0]):
+    for guard in (GUARDS_AFTER_SEARCH[2], GUARDS_IN_SEARCH[0]):
         alone = diagnose(recording, settings=Settings(guards=guards_without([guard])))
         assert _told(found[guard]) == _told(alone), guard

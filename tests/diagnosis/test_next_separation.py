@@ -7,8 +7,8 @@ import pytest
 from next_questions import points, told_apart
 from refusals import refusal
 
-from diagnosis.effects.friction import ViscousFriction
-from diagnosis.engine.rivals import AS_GOOD
+from armlab.diagnosis.claims import MAX_DEFICIT
+from armlab.effects.friction import ViscousFriction
 from diagnosis.next.chances import chances, decided
 from diagnosis.next.deciding import gained, log_doubt, need, strength
 from diagnosis.next.moments import left_over, solved
@@ -93,7 +93,7 @@ def pair_question(*weights: float) -> Question:
 def test_the_doubt_of_a_pair_is_the_chance_that_the_lead_is_too_small() -> None:
     gram = np.diag([25.0, 25.0])  # each explains nothing of the other, five standard errors
     lead = np.random.default_rng(0).normal(12.5, 5.0, 400_000)
-    assert np.exp(log_doubt(pair_question(1.0, 1.0), gram, 100)) == pytest.approx(np.mean(lead < AS_GOOD), rel=0.02)
+    assert np.exp(log_doubt(pair_question(1.0, 1.0), gram, 100)) == pytest.approx(np.mean(lead < MAX_DEFICIT), rel=0.02)
 
 
 def test_a_rival_that_hardly_fits_hardly_counts() -> None:
@@ -116,7 +116,7 @@ def test_a_special_law_of_friction_has_to_gain_on_held_out_data_too() -> None:
     problem = told_apart(STRIBECK, RivalSettings(effect="coulomb_friction", joint=2))
     special, usual = (rival.laws[0] for rival in problem.prepared.questions[0].rivals)
     assert need(special, usual, 9000) == pytest.approx(0.5 * 0.03 * 3000)
-    assert need(usual, special, 9000) < AS_GOOD
+    assert need(usual, special, 9000) < MAX_DEFICIT
 
 
 def test_one_usual_term_more_explains_at_its_price() -> None:

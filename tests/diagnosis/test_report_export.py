@@ -8,9 +8,9 @@ import yaml
 from numpy.testing import assert_allclose
 from told_recordings import TORQUE, frame, motion_at, recording_in
 
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.verdict_files import write_verdict
 from diagnosis.export.command import export_model
-from diagnosis.files import write_verdict
-from diagnosis.run import diagnose
 from identification.model_file import read_model
 from problem.errors import InputError
 from problem.motion import Motion

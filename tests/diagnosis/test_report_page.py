@@ -13,13 +13,13 @@ import pytest
 import yaml
 from told_recordings import frame, recording_in
 
-from diagnosis.files import verdict_texts, write_texts
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
+from armlab.diagnosis.verdict_files import verdict_texts, write_texts
 from diagnosis.report.looks import FLOOR, FOUND, GIVEN, MEASURED, REFITTED, UNKNOWN
 from diagnosis.report.memory import filter_memory_seconds, memory_seconds
 from diagnosis.report.terminal import terminal_lines
 from diagnosis.report.write import report_texts, write_report
-from diagnosis.result import Diagnosis, Rival, Unexplained
-from diagnosis.run import diagnose
 from problem.errors import InputError
 from recordings.load import load_recording
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from told_recordings import frame, recording_in
 
-from diagnosis.predicted import predicted_texts
-from diagnosis.run import diagnose
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.verdict_files import predicted_texts
 from recordings.load import load_recording
 
 

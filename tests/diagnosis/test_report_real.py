@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from told_recordings import frame, recording_in
 
+from armlab.diagnosis.result import Parameter
 from diagnosis.real.command import diagnose_public
 from diagnosis.real.study import study
 from diagnosis.real.tell import agreement
-from diagnosis.result import Parameter
 from identification.real.looks import Looks
 
 

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from told_recordings import ARM, frame, recording_in
 
+from armlab.diagnosis.diagnose import diagnose
 from diagnosis.resimulate.dynamics import Body, NoInertiaError, runge_kutta
 from diagnosis.resimulate.windows import WINDOW_S, resimulate
-from diagnosis.run import diagnose
 from problem.arm import Arm, Joint, Link
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

@@ -25,7 +25,7 @@ LINEAR = structure(every_joint("coulomb_friction", 3))
 
 @pytest.fixture(autouse=True)
 def _armlab_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    entries = [EntryPoint("armlab", "diagnosis.effects.library:BUILT_IN", "armlab.effects")]
+    entries = [EntryPoint("armlab", "armlab.effects.library:BUILT_IN", "armlab.effects")]
     monkeypatch.setattr(extras, "entry_points", lambda group: entries if group == "armlab.effects" else [])
 
 

@@ -1,0 +1,179 @@
+"""Stretches of time as the units of chance: robust covariances, and errors of stretches held out in turn."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+from scipy.stats import t as student
+
+from armlab.diagnosis.columns import Columns
+from armlab.diagnosis.data import Observed
+from armlab.diagnosis.noise import Noise
+from armlab.diagnosis.solver import Fit
+from recordings.run import ROLES, Array
+
+MAX_VARIANCE_RATIO = 1e5  # times the least variance: directions that other columns hold as well are not tested
+ROUNDING = 1e-14  # of the largest variance: rounding
+MIN_BLOCKS = 60  # of the identification rows
+BLOCK_S = 0.5  # s: longer than what whitening leaves of any tie between errors
+
+
+@dataclass(frozen=True, eq=False)
+class WhitenedRows:
+    """Whitened identification rows of a fit, per joint: the design (rows, parameters) and the errors (rows,)."""
+
+    designs: tuple[Array, ...]
+    errors: tuple[Array, ...]
+    blocks: tuple[NDArray[np.intp], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BlockCovariance:
+    """covariance: (parameters, parameters), the larger of the model's and that of blocks; degrees: of freedom."""
+
+    covariance: Array
+    degrees: float
+
+    def p_value(self, values: Array, place: Sequence[int]) -> float:
+        """Chance of values at these places at least as large, were they zero (Wald's test, F distribution)."""
+        variances, vectors = np.linalg.eigh(self.covariance[np.ix_(place, place)])
+        told = (variances > 0) & (variances < MAX_VARIANCE_RATIO * max(variances[0], ROUNDING * variances[-1]))
+        wald = float(np.sum((vectors[:, told].T @ values) ** 2 / variances[told]))
+        rank = max(int(np.sum(told)), 1)
+        return float(fisher.sf(wald / rank, rank, max(self.degrees - rank, 1)))
+
+
+def whitened_rows(
+    columns: Columns, extra: dict[int, Array], fit: Fit, lengths: Array, noise: Noise, observed: Observed
+) -> WhitenedRows:
+    """Design and errors of a fit: links, effects in their order, then the extra columns (rows, count) by joint."""
+    designs, errors, blocks = [], [], []
+    base, stretches = len(fit.links), block_numbers(observed, BLOCK_S, MIN_BLOCKS)
+    for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
+        scaled = matrix[:, :-1] / lengths[index[:-1]]
+        loading = index[:-1] < base
+        links = scaled[:, loading] @ fit.links[index[:-1][loading]]
+        effects = np.zeros((len(matrix), len(fit.columns)))
+        at = {int(column): place for place, column in enumerate(index[:-1])}
+        for place, column in enumerate(fit.columns):
+            if int(column) in at:
+                effects[:, place] = scaled[:, at[int(column)]]
+        left = matrix[:, -1] - scaled @ fit.coefficients[index[:-1]]
+        design = np.column_stack([links, effects, *([extra[joint]] if joint in extra else [])])
+        designs.append(noise.white(design, joint, observed, "identify"))
+        errors.append(noise.white(left[:, None], joint, observed, "identify")[:, 0])
+        blocks.append(noise.numbers(stretches, joint, observed, "identify"))
+    return WhitenedRows(tuple(designs), tuple(errors), tuple(blocks))
+
+
+def block_numbers(observed: Observed, length_s: float, least: int = 12) -> NDArray[np.intp]:
+    """Number of the stretch of time of each row, (rows,); none reaches over the end of a segment.
+
+    Stretches are shorter in a short recording, so that each role has some `least` of them.
+    """
+    numbers, start = np.empty(observed.rows, dtype=np.intp), 0
+    rows = {role: sum(each.stop - each.start for each in observed.of_role(role)) for role in ROLES}
+    for each in observed.segments:
+        count = each.stop - each.start
+        length = min(length_s, rows[each.role] / observed.rate_hz / least)
+        blocks = max(int(count / observed.rate_hz / length), 1)
+        numbers[each.start : each.stop] = start + np.arange(count) * blocks // count
+        start += blocks
+    return numbers
+
+
+def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> BlockCovariance:
+    """Covariance of the parameters. precision: (parameters, parameters) of their prior."""
+    gram = sum(design.T @ design for design in rows.designs) + precision
+    inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+    count = len(np.unique(np.concatenate(rows.blocks)))
+    degrees = float(max(count - 1, 1))
+    variance = sum(float(error @ error) for error in rows.errors) / max(sum(map(len, rows.errors)) - len(gram), 1)
+    model = np.asarray(inverse * max(variance, 1.0), dtype=np.float64)
+    if not robust:
+        return BlockCovariance(model, degrees)
+    sums = np.zeros((int(max(block.max() for block in rows.blocks)) + 1, len(gram)))
+    for design, error, block in zip(rows.designs, rows.errors, rows.blocks, strict=True):
+        np.add.at(sums, block, design * error[:, None])
+    meat = sums.T @ sums * count / max(count - 1, 1) + precision
+    spread = np.asarray(inverse @ meat @ inverse, dtype=np.float64)
+    ratio = np.sqrt(np.maximum(np.diag(model), 0) / np.maximum(np.diag(spread), 1e-300))
+    scale = np.maximum(ratio, 1.0)
+    return BlockCovariance(np.asarray(spread * np.outer(scale, scale)), degrees)
+
+
+FOLDS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Folds:
+    """Whitened rows of a wide fit, cut into folds of whole stretches of time. precision: of the parameters' prior."""
+
+    rows: WhitenedRows
+    targets: tuple[Array, ...]
+    precision: Array
+    grams: tuple[Array, ...]
+    products: tuple[Array, ...]
+
+    def errors(self, chosen: Sequence[int]) -> list[Array]:
+        """Held-out errors of a fit with the chosen parameters only, (rows,) for each joint."""
+        place, values = np.ix_(chosen, chosen), np.zeros((len(self.precision), FOLDS))
+        whole, towards = np.sum(self.grams, axis=0), np.sum(self.products, axis=0)
+        for fold in range(FOLDS):
+            gram = (whole - self.grams[fold] + self.precision)[place]
+            inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
+            values[chosen, fold] = inverse @ (towards - self.products[fold])[chosen]
+        return [
+            target - (design @ values)[np.arange(len(block)), block % FOLDS]
+            for target, design, block in zip(self.targets, self.rows.designs, self.rows.blocks, strict=True)
+        ]
+
+
+def split_folds(rows: WhitenedRows, values: Array, precision: Array) -> Folds:
+    """The folds of a fit's rows; values: its parameters, to give the errors back what they explain."""
+    targets = tuple(error + design @ values for error, design in zip(rows.errors, rows.designs, strict=True))
+    grams, products = [], []
+    for fold in range(FOLDS):
+        gram, product = np.zeros(precision.shape), np.zeros(len(values))
+        for target, design, block in zip(targets, rows.designs, rows.blocks, strict=True):
+            own = block % FOLDS == fold
+            gram += design[own].T @ design[own]
+            product += design[own].T @ target[own]
+        grams.append(gram)
+        products.append(product)
+    return Folds(rows, targets, precision, tuple(grams), tuple(products))
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Share by which held-out errors fall, and one-sided p-values of that.
+
+    p_value asks whether stretches of time profit alike: what a few of them hold may be a fault of theirs. chance asks
+    whether noise would make it. change: mean square of what the prediction changes by: how much the data excite it.
+    """
+
+    share: float
+    p_value: float
+    chance: float
+    change: float
+
+
+def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> Gain:
+    """The gain from errors (rows,) without and with something.
+
+    What is left times what is predicted is how far chance carries the gain, stretch by stretch; as many stretches
+    count as share the prediction's power.
+    """
+    predicted, places = without - with_it, np.unique(blocks)
+    better, power, carried = (
+        np.bincount(blocks, each)[places] for each in (without**2 - with_it**2, predicted**2, with_it * predicted)
+    )
+    gain = float(np.sum(better))
+    spread = float(np.std(better, ddof=1)) * np.sqrt(len(better)) if len(better) > 2 else 0.0
+    p_value = float(student.sf(gain / spread, len(better) - 1)) if spread > 0 else 1.0
+    noise = 2 * float(np.sqrt(carried @ carried))
+    count = float(np.sum(power)) ** 2 / max(float(power @ power), 1e-300)
+    chance = float(student.sf(gain / noise, count)) if noise > 0 else 1.0
+    return Gain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, float(np.mean(predicted**2)))

@@ -1,0 +1,261 @@
+"""Runs as the diagnosis sees them: filtered and thinned signals, and which rows identify, validate or stand still."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, binary_opening, median_filter
+
+from armlab.diagnosis.settings import Settings
+from problem.arm import Arm
+from problem.motion import Motion
+from problem.regressor import inertia_column
+from recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
+from recordings.differentiate import Signals, differentiate
+from recordings.filters import Butterworth, LowPass
+from recordings.resample import evened, sampled_at
+from recordings.run import Array, Role, Run
+
+STANDSTILL_SIGMAS = 5.0  # standard deviations of the velocity's noise: slower is standing still
+CREEP_RATIO = 0.01  # of a joint's high speed: below it friction takes any value up to its level
+HIGH_SPEED_QUANTILE = 0.95  # quantile of the speed
+MIN_STANDSTILL_S = 0.004  # s that it takes to be more than a single sample
+STANDSTILL_MARGIN = 1.5  # periods of the cut-off around a standstill: how far the filter carries it
+MIN_SEGMENT_ROWS = 40  # rows: shorter parts tell too little of the noise
+MIN_MOVING_SHARE = 0.1  # of the rows have to be left; else a joint counts as moving all the time
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """Rows [start, stop) of the stacked runs that stand together in time and share a role."""
+
+    run: int
+    role: Role
+    start: int
+    stop: int
+
+
+def moving_rows(signals: Sequence[Signals], segments: Sequence[Segment], cutoff_hz: float) -> NDArray[np.bool_]:
+    """Rows (rows, joints) in which a joint moves. cutoff_hz: of the positions."""
+    speed = np.quantile(np.abs(np.concatenate([each.motion.velocity for each in signals])), HIGH_SPEED_QUANTILE, axis=0)
+    whole = np.concatenate([_moving_rows_of_run(each, cutoff_hz, CREEP_RATIO * speed) for each in signals])
+    for joint in range(whole.shape[1]):
+        for role in ("identify", "validate"):
+            own = [each for each in segments if each.role == role]
+            left = sum(part.stop - part.start for each in own for part in split_segment(each, whole[:, joint]))
+            if left < MIN_MOVING_SHARE * sum(each.stop - each.start for each in own):
+                for each in own:
+                    whole[each.start : each.stop, joint] = True
+    return whole
+
+
+def _moving_rows_of_run(signals: Signals, cutoff_hz: float, creep: Array) -> NDArray[np.bool_]:
+    """Rows (kept, joints) in which a joint is faster than its noise and than creeping (joints,)."""
+    run = signals.run
+    frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
+    density = noise_level(frequency, spectrum, shape, run.rate_hz)
+    noise = 2 * np.pi * np.sqrt(density * cutoff_hz**3 / 3)  # of white noise, differentiated, up to the cut-off
+    slow = np.abs(signals.motion.velocity) < np.maximum(STANDSTILL_SIGMAS * noise, creep)
+    still = binary_opening(slow, structure=np.ones((max(round(MIN_STANDSTILL_S * run.rate_hz), 1), 1)))
+    low_pass = signals.filter
+    reach = STANDSTILL_MARGIN / (low_pass.cutoff_hz if isinstance(low_pass, LowPass) else cutoff_hz)
+    near = binary_dilation(still, structure=np.ones((2 * round(reach * run.rate_hz) + 1, 1)))
+    return np.asarray(~near[signals.filter.rows])
+
+
+def split_segment(segment: Segment, chosen: NDArray[np.bool_], shortest: int = MIN_SEGMENT_ROWS) -> list[Segment]:
+    """The stretches of a segment in which `chosen` (rows,) holds, short ones left out."""
+    inside = np.concatenate([[False], chosen[segment.start : segment.stop], [False]])
+    edges = np.flatnonzero(np.diff(inside.astype(np.int8))) + segment.start
+    found = [Segment(segment.run, segment.role, int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+    return [each for each in found if each.stop - each.start >= shortest]
+
+
+def rows_in(segments: Sequence[Segment], rows: int) -> NDArray[np.bool_]:
+    """Which of the stacked rows are in these segments, (rows,)."""
+    chosen = np.zeros(rows, dtype=bool)
+    for each in segments:
+        chosen[each.start : each.stop] = True
+    return chosen
+
+
+MAX_ENCODER_SHARE = 0.5  # of the torque's power density: more of it from the encoders is too much
+MIN_CUTOFF_HZ = 10.0
+MEDIAN_WIDTH = 41  # frequencies of a running median
+INERTIA_STATES = 50  # of a run, for the inertia
+
+
+def usable_cutoff(runs: Sequence[Run], arm: Arm, inertial: Array | None, highest_hz: float) -> float:
+    """The highest frequency, Hz, up to which the encoders' noise stays below the torque's power on every joint.
+
+    inertial: (10 * joints,) of the links; without them the highest is taken.
+    """
+    if inertial is None:
+        return highest_hz
+    return max(
+        min(_usable_cutoff_of_run(run, arm, inertial, highest_hz) for run in runs), min(MIN_CUTOFF_HZ, highest_hz)
+    )
+
+
+def _usable_cutoff_of_run(run: Run, arm: Arm, inertial: Array, highest_hz: float) -> float:
+    frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
+    noise = noise_level(frequency, spectrum, shape, run.rate_hz)
+    induced = np.outer(shape, np.square(_rms_inertia(run, arm, inertial)) @ noise)
+    power = _running_median(_power_density(run.torque, run.rate_hz, len(run.position) - 2))
+    allowed = np.all(induced <= MAX_ENCODER_SHARE * power[: len(induced)], axis=1)
+    too_much = np.flatnonzero(~allowed & (frequency >= MIN_CUTOFF_HZ))
+    return float(min(frequency[too_much[0]] if len(too_much) else highest_hz, highest_hz))
+
+
+def _rms_inertia(run: Run, arm: Arm, inertial: Array) -> Array:
+    """Root mean square of the mass matrix over the run, (joints, joints)."""
+    position = run.position[:: max(run.samples // INERTIA_STATES, 1)]
+    columns = [inertia_column(arm, position, joint, inertial) for joint in range(len(arm))]
+    rotors = np.diag(arm.rotor_inertia) if arm.rotor_inertia else 0.0
+    return np.asarray(np.sqrt(np.mean(np.square(np.stack(columns, axis=-1) + rotors), axis=0)))
+
+
+def _power_density(signal: Array, rate_hz: float, samples: int) -> Array:
+    """One-sided power density (frequencies, channels), on the frequencies of `samples` samples."""
+    part = signal[:samples]
+    window = np.hanning(samples)[:, None]
+    scale = 2 / (np.sum(window**2) * rate_hz)
+    return np.asarray(scale * np.abs(np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)) ** 2)
+
+
+def _running_median(power: Array) -> Array:
+    return np.asarray(median_filter(power, size=(MEDIAN_WIDTH, 1), mode="nearest") / np.log(2))
+
+
+MAX_CUTOFF_RATIO = 0.32  # of the sampling rate: the highest cut-off
+POSITION_CUTOFF_RATIO = (
+    2.0  # the positions' cut-off over that of the torque: what the torque holds, the motion has to hold too
+)
+HELD_OUT_BLOCKS = 6  # of a run, where no run validates; every third of them is held out
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """All runs, ready: signals of each, and the segments of their kept rows, stacked run after run.
+
+    calm: the motion of each run with as little noise in its accelerations as can be, for columns that differentiate
+    it further: in those the noise of the encoders would explain itself.
+    rate_hz: of the kept rows. held_out_blocks: whether blocks of time had to stand in for validation runs. moving:
+    (rows, joints), False where a joint stands still: friction at rest takes any value, and no law of motion holds.
+    """
+
+    signals: tuple[Signals, ...]
+    calm: tuple[Motion, ...]
+    segments: tuple[Segment, ...]
+    rate_hz: float
+    held_out_blocks: bool
+    moving: NDArray[np.bool_]
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return self.signals[0].motion.joints
+
+    @property
+    def rows(self) -> int:
+        """Number of kept rows."""
+        return self.segments[-1].stop
+
+    @property
+    def torque(self) -> Array:
+        """Measured torque, filtered and kept, (rows, joints)."""
+        return np.concatenate([each.torque for each in self.signals])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(each.run.name for each in self.signals)
+
+    def kept(self, signal: str) -> Array:
+        """Position, velocity or acceleration at the kept rows, (rows, joints)."""
+        return np.concatenate([getattr(each.motion, signal)[each.filter.rows] for each in self.signals])
+
+    @property
+    def time(self) -> Array:
+        """Stamps of the kept rows from the start of their runs, (rows,), s."""
+        return np.concatenate([each.time - each.run.time[0] for each in self.signals])
+
+    @property
+    def motion(self) -> Motion:
+        """The motion at the kept rows."""
+        return Motion(self.kept("position"), self.kept("velocity"), self.kept("acceleration"))
+
+    @property
+    def cutoff_hz(self) -> float:
+        """Of the filter that torque and columns share."""
+        low_pass = self.signals[0].filter
+        return low_pass.cutoff_hz if isinstance(low_pass, LowPass) else self.rate_hz / 2
+
+    def of_role(self, role: Role, joint: int | None = None) -> tuple[Segment, ...]:
+        """The segments of a role; only the parts in which a joint (from 0) moves, if one is given."""
+        own = tuple(segment for segment in self.segments if segment.role == role)
+        return (
+            own if joint is None else tuple(part for each in own for part in split_segment(each, self.moving[:, joint]))
+        )
+
+    def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
+        """Rows of a role near a standstill or a reversal of a joint (from 0)."""
+        whole = rows_in(self.of_role(role), self.rows)
+        return np.flatnonzero(whole & ~rows_in(self.of_role(role, joint), self.rows))
+
+    def stretches_at_rest(self, joint: int) -> tuple[Segment, ...]:
+        """The stretches of time of those rows."""
+        rest = ~rows_in(self.used(joint), self.rows)
+        return tuple(part for each in self.segments for part in split_segment(each, rest, 1))
+
+    def used(self, joint: int) -> tuple[Segment, ...]:
+        """The parts of all segments in which a joint (from 0) moves."""
+        return self.of_role("identify", joint) + self.of_role("validate", joint)
+
+
+def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Settings) -> Observed:
+    """Smooths, differentiates, filters and thins the runs. inertial: (10 * joints,) of the simulated links, if any."""
+    even = _to_common_rate([evened(run) for run in runs])
+    rate = even[0].rate_hz
+    cutoff = usable_cutoff(even, arm, inertial, min(settings.cutoff_hz, MAX_CUTOFF_RATIO * rate))
+    step = max(round(rate / (settings.rows_per_cutoff * cutoff)), 1)
+    motion = min(POSITION_CUTOFF_RATIO * cutoff, 0.4 * rate)
+    signals = tuple(differentiate(run, cutoff_hz=motion, torque_cutoff_hz=cutoff, step=step) for run in even)
+    calm = tuple(_smooth_motion(run, motion) for run in even)
+    blocks = not any(run.role == "validate" for run in runs)
+    segments = _split_runs(signals, blocks)
+    return Observed(signals, calm, segments, rate / step, blocks, moving_rows(signals, segments, motion))
+
+
+def _to_common_rate(runs: list[Run]) -> list[Run]:
+    """The runs at the lowest of their rates, so that one noise model serves them all."""
+    lowest = min(run.rate_hz for run in runs)
+    return [run if run.rate_hz < 1.001 * lowest else _resample(run, lowest) for run in runs]
+
+
+def _resample(run: Run, rate: float) -> Run:
+    count = int((run.time[-1] - run.time[0]) * rate)
+    return sampled_at(run, run.time[0] + np.arange(count + 1) / rate)
+
+
+def _smooth_motion(run: Run, highest_hz: float) -> Motion:
+    choice = choose_cutoff(run.position, run.rate_hz, Butterworth).cutoff_hz
+    return differentiate(run, cutoff_hz=min(choice, highest_hz)).motion
+
+
+def _split_runs(signals: Sequence[Signals], blocks: bool) -> tuple[Segment, ...]:
+    out: list[Segment] = []
+    start = 0
+    for index, each in enumerate(signals):
+        stop = start + len(each.torque)
+        if not blocks:
+            out.append(Segment(index, each.run.role, start, stop))
+        else:
+            ends = np.linspace(start, stop, HELD_OUT_BLOCKS + 1).astype(int)
+            pairs = pairwise(ends.tolist())
+            roles: list[Role] = ["validate" if number % 3 == 2 else "identify" for number in range(HELD_OUT_BLOCKS)]
+            out += [Segment(index, role, a, b) for role, (a, b) in zip(roles, pairs, strict=True)]
+        start = stop
+    return tuple(out)

@@ -1,0 +1,356 @@
+"""The evidence for each effect of a model: a robust test, the gain on held-out data, and the laws of physics."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.stats import chi2
+
+from armlab.diagnosis.blocks import (
+    BlockCovariance,
+    Folds,
+    Gain,
+    block_covariance,
+    block_numbers,
+    held_out_gain,
+    split_folds,
+    whitened_rows,
+)
+from armlab.diagnosis.data import Observed, rows_in
+from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.links import Widths
+from armlab.diagnosis.refine import prior_precision
+from armlab.diagnosis.search import contained_groups
+from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, State
+from armlab.effects.plausible import reason_implausible
+from recordings.run import Array
+
+HELD_OUT_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """The state of a round beside others, whose groups are its own and some more."""
+
+    found: FittedModel
+    state: State
+    more: frozenset[int]
+
+    @cached_property
+    def wide(self) -> Fit:
+        """The fit with everything that is compared."""
+        return self.found.solver.fit(State(tuple(sorted({*self.state.groups, *self.more})), self.state.widths))
+
+    @cached_property
+    def folds(self) -> Folds:
+        """Whitened rows of the wide fit, in folds."""
+        found, fit = self.found, self.wide
+        rows = whitened_rows(found.columns, {}, fit, found.moments.lengths, found.noise, found.bench.observed)
+        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
+        values = np.concatenate([links, fit.coefficients[fit.columns]])
+        return split_folds(rows, values, prior_precision(found.solver, fit, len(fit.inverse)))
+
+    def covariance_of(self, state: State) -> BlockCovariance:
+        """Robust covariance of the parameters of a state within the wide fit."""
+        chosen = self._chosen(state)
+        rows, fit = self.folds.rows, self.found.solver.fit(state)
+        errors = [
+            target - design[:, chosen] @ self._values(fit)
+            for target, design in zip(self.folds.targets, rows.designs, strict=True)
+        ]
+        own = type(rows)(tuple(design[:, chosen] for design in rows.designs), tuple(errors), rows.blocks)
+        precision = self.folds.precision[np.ix_(chosen, chosen)]
+        return block_covariance(own, precision, self.found.bench.settings.guards.robust_variance)
+
+    def _values(self, fit: Fit) -> Array:
+        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
+        return np.concatenate([links, fit.coefficients[fit.columns]])
+
+    def _chosen(self, state: State) -> list[int]:
+        """Where the parameters of a smaller state stand among those of the wide fit."""
+        rank = self.wide.links.shape[1]
+        at = {int(column): rank + place for place, column in enumerate(self.wide.columns)}
+        return [*range(rank), *(at[int(column)] for column in self.found.solver.fit(state).columns)]
+
+    def gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[Gain, Gain]]:
+        """Per joint the gain on validation rows, and on identification stretches held out in turn."""
+        pair = [self._in_turn(each.state) for each in (less, fit)]
+        blocks = self.folds.rows.blocks
+        return {
+            joint: (
+                self.validation_gain(fit, less, joint),
+                held_out_gain(pair[0][joint], pair[1][joint], blocks[joint]),
+            )
+            for joint in joints
+        }
+
+    def _in_turn(self, state: State) -> list[Array]:
+        """Held-out errors of a state, stretch by stretch; those of the judged state itself are kept."""
+        return self._own_errors if state == self.state else self.folds.errors(self._chosen(state))
+
+    @cached_property
+    def _own_errors(self) -> list[Array]:
+        return self.folds.errors(self._chosen(self.state))
+
+    def validation_gain(self, fit: Fit, less: Fit, joint: int) -> Gain:
+        """The gain at a joint on validation rows."""
+        observed, noise = self.found.bench.observed, self.found.noise
+        left = np.column_stack([self.found.residual_at(joint, each) for each in (less, fit)])
+        white = noise.white(left, joint, observed, "validate")
+        blocks = noise.numbers(block_numbers(observed, HELD_OUT_BLOCK_S), joint, observed, "validate")
+        return held_out_gain(white[:, 0], white[:, 1], blocks)
+
+    def validation_rms(self, fit: Fit, joint: int) -> float:
+        """What a fit leaves at a joint on validation rows, N m."""
+        observed = self.found.bench.observed
+        rows = rows_in(observed.of_role("validate", joint), observed.rows)
+        return float(np.sqrt(np.mean(self.found.residual_at(joint, fit)[rows] ** 2)))
+
+
+PUSH_LEVEL = 0.3  # of a push's peak
+MIN_PUSH_S = 0.15  # s in motion: a shorter push is a reversal
+MAX_EXTREME_SHARE = 0.5  # of the push's samples
+
+
+def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array) -> str | None:
+    """What speaks against a push at a joint (from 0), in a few words.
+
+    push: (rows,), its torque; torque: (rows,), what the model says of the joint without it, N m. A law that the library
+    lacks, a spring that stiffens or a limit, shows where position, speed or torque is at an end of its range: where
+    that end was reached but once, in this stretch, nothing tells the law from a push.
+    """
+    pushed = np.abs(push) > PUSH_LEVEL * np.abs(push).max()
+    moving = pushed & rows_in(observed.used(joint), len(push))
+    if float(np.sum(moving)) / observed.rate_hz <= MIN_PUSH_S or moving.sum() <= 0.5 * pushed.sum():
+        return "the joint hardly moves during it"
+    position, velocity = (observed.kept(name)[:, joint] for name in ("position", "velocity"))
+    others = push == 0
+    for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(torque))):
+        low, high = values[others].min(), values[others].max()
+        if np.mean((values[pushed] < low) | (values[pushed] > high)) > MAX_EXTREME_SHARE:
+            return f"no other stretch has such a {name}"
+    return None
+
+
+WIDER_LINKS_FACTOR = 3.0  # times the widest link
+MIN_EXCITATION = 0.25  # of the mean square in identification
+MAX_LOSS = 0.002  # of the validation error
+MAX_LOSS_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
+MAX_WHITENED_LOSS = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
+SINGLE_EVENT_EFFECTS = ("external_contact",)
+MIN_LOG_RATIO = float(
+    np.log(20)
+)  # units of log likelihood: of two laws with as many numbers, the one that is surely it
+WORSE_LEVEL = 0.99  # one-sided p-value of a gain, for a loss
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """p_value: of the effect being zero, robust; corrected: after everything that was looked at. gain: share by
+    which the whitened held-out error of the joint that profits most falls, held_p: one-sided, of that fall; the better
+    of validation runs and of identification stretches held out in turn. validated: the share on validation runs.
+    rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
+    of the model. objection: of physics. worse: whether validation runs are surely predicted worse. repeatable: False
+    for what happened once, in one stretch of one run: no other data can tell of it. usual: what every arm has.
+    """
+
+    joint: int
+    p_value: float
+    corrected: float
+    gain: float
+    held_p: float
+    validation_gain: float
+    rms_before: float
+    rms_after: float
+    score: float
+    objection: str | None = None
+    worse: bool = False
+    repeatable: bool = True
+    usual: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Judge:
+    """Judges the effects of a state of a round."""
+
+    found: FittedModel
+    state: State
+
+    @cached_property
+    def compared(self) -> Comparison:
+        """The state beside the simpler groups that its own contain."""
+        simpler = frozenset(other for group in self.state.groups for other in self.simpler(group))
+        return Comparison(self.found, self.state, simpler)
+
+    def effects(self) -> dict[int, Evidence]:
+        """Evidence for each group."""
+        solver, state = self.found.solver, self.state
+        fit = solver.fit(state)
+        spread, losses = self.compared.covariance_of(state), solver.losses(fit)
+        out = {}
+        for group in state.groups:
+            candidate = solver.groups[group].candidate
+            values = solver.values(fit, group)
+            objection = reason_implausible(candidate, values)
+            objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
+            tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
+            evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
+            if self.simpler(group) and not self._in_place_of_usual(group):
+                evidence = self._beyond_usual(group)
+            if candidate.effect in SINGLE_EVENT_EFFECTS:
+                evidence = replace(evidence, repeatable=False)
+                objection = self._pushed(group)
+            out[group] = replace(evidence, objection=objection, usual=candidate.effect in USUAL_EFFECTS)
+        return out
+
+    def links(self) -> dict[int, Evidence]:
+        """Evidence for each link (from 0) that is off."""
+        widths = self.state.widths or ()
+        others = {
+            link: tuple(0.0 if other == link else each for other, each in enumerate(widths))
+            for link, width in enumerate(widths)
+            if width
+        }
+        return {link: self._off(without, link + 1, len(widths)) for link, without in others.items()}
+
+    def together(self) -> Evidence:
+        """Evidence for the links being off at all."""
+        count = len(self.state.widths or ())
+        return self._off((0.0,) * count, count, count)
+
+    def _off(self, without: Widths, joints: int, looks: int) -> Evidence:
+        """Evidence for the present widths against others."""
+        fit, less = (self.found.solver.fit(each) for each in (self.state, State(self.state.groups, without)))
+        score = fit.score - less.score
+        p_value = float(np.exp(-np.clip(score, 0, 700)))  # a Bayes factor bounds the p-value from above
+        gains = {joint: self.compared.validation_gain(fit, less, joint) for joint in range(joints)}
+        both = {joint: (gain, gain) for joint, gain in gains.items()}  # links are held out in validation runs alone
+        return self._evidence(fit, less, both, (p_value, looks), score)
+
+    def looks(self, group: int) -> int:
+        """How much was looked at: every place has its equal share of the level, and divides it among its shapes.
+
+        Half of the level is for what every arm has.
+        """
+        groups = self.found.solver.groups
+        if not self.found.solver.unusual[group]:
+            return 2 * int(np.sum(~self.found.solver.unusual))
+        own = groups[group].place
+        return 2 * self.found.solver.places * sum(each.candidate.looks for each in groups if each.place == own)
+
+    def _in_wider_links(self, group: int) -> float:
+        """P-value of a group where the links may be off far more than was found; 0 for links as simulated.
+
+        What shows only because the links are thought to be off by so little is no evidence: nobody knows that width.
+        """
+        solver, state = self.found.solver, self.state
+        if not state.widths or not any(state.widths):
+            return 0.0
+        wider = solver.fit(State(state.groups, tuple(WIDER_LINKS_FACTOR * max(state.widths) for _ in state.widths)))
+        values = wider.coefficients[solver.groups[group].columns]
+        place = self._place(wider, group)
+        block = wider.inverse[np.ix_(place, place)]
+        return float(chi2.sf(values @ np.linalg.pinv(block, hermitian=True) @ values, solver.ranks[group]))
+
+    def _pushed(self, group: int) -> str | None:
+        """Against a push: see `engine.pushes`."""
+        found, candidate = self.found, self.found.solver.groups[group].candidate
+        joint, column = candidate.rows[0], int(self.found.solver.groups[group].columns[0])
+        own = found.columns.matrices[joint][:, int(np.flatnonzero(found.columns.index[joint] == column)[0])]
+        push, observed = own * found.coefficients(found.fit)[column], found.bench.observed
+        return reason_no_contact(
+            push, joint, observed, observed.torque[:, joint] - found.residual_at(joint, found.fit) - push
+        )
+
+    def simpler(self, group: int) -> tuple[int, ...]:
+        """See `simpler_than`."""
+        return contained_groups(self.found.solver.groups, group)
+
+    def _in_place_of_usual(self, group: int) -> bool:
+        """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that.
+
+        A law without a shape is usual friction by direction, and has to be better than it as others have.
+        """
+        solver, state, simpler = self.found.solver, self.state, self.simpler(group)
+        candidate = solver.groups[group].candidate
+        numbers = int(solver.ranks[group]) + len(candidate.shape)
+        if not candidate.shape or set(simpler) & set(state.groups) or numbers > solver.ranks[list(simpler)].sum():
+            return False
+        usual = State(tuple(sorted({*state.minus(group).groups, *simpler})), state.widths)
+        return solver.fit(state).score > solver.fit(usual).score + MIN_LOG_RATIO
+
+    def _beyond_usual(self, group: int) -> Evidence:
+        """The evidence against usual friction in the place of one special law, and of all at this joint."""
+        groups, state = self.found.solver.groups, self.state
+        joint, simpler = groups[group].candidate.joint, self.simpler(group)
+        special = [each for each in state.groups if groups[each].candidate.joint == joint and self.simpler(each)]
+        tested = max(self._beyond(group, simpler), self._in_wider_links(group)), self.looks(group)
+        found = list[Evidence]()
+        for taken in ([group], special):
+            less = State(tuple(sorted({*state.groups, *simpler} - set(taken))), state.widths)
+            score = self.found.solver.fit(state).score - self.found.solver.fit(less).score
+            found.append(self._against(less, tested, groups[group].candidate.rows, score))
+        return min(found, key=lambda each: each.gain)
+
+    def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
+        """Evidence for the state against a smaller one."""
+        fit, other = (self.found.solver.fit(each) for each in (self.state, less))
+        return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score)
+
+    def _tested(self, fit: Fit, spread: BlockCovariance, group: int) -> float:
+        columns = self.found.solver.groups[group].columns
+        return spread.p_value(fit.coefficients[columns], self._place(fit, group))
+
+    def _beyond(self, group: int, simpler: tuple[int, ...]) -> float:
+        """P-value of what a group explains that the simpler ones in it do not."""
+        state = State(tuple(sorted({*self.state.groups, *simpler})), self.state.widths)
+        return self._tested(self.found.solver.fit(state), self.compared.covariance_of(state), group)
+
+    def _place(self, fit: Fit, group: int) -> list[int]:
+        """Where a group's coefficients stand in a fit's covariance."""
+        columns = self.found.solver.groups[group].columns
+        start = fit.links.shape[1] + int(np.flatnonzero(fit.columns == columns[0])[0])
+        return list(range(start, start + len(columns)))
+
+    def _covariance(self, fit: Fit, spread: BlockCovariance, group: int) -> Array:
+        """Of a group's unscaled coefficients."""
+        place = self._place(fit, group)
+        lengths = self.found.moments.lengths[self.found.solver.groups[group].columns]
+        return np.asarray(spread.covariance[np.ix_(place, place)] / np.outer(lengths, lengths))
+
+    def _evidence(
+        self,
+        fit: Fit,
+        less: Fit,
+        gains: dict[int, tuple[Gain, Gain]],
+        tested: tuple[float, int],
+        score: float,
+    ) -> Evidence:
+        joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
+        validated, inside = gains[joint]
+        best = validated if validated.share >= inside.share else inside
+        held_p = min(each.p_value for each in (validated, inside) if each.share >= min(0.5 * best.share, best.share))
+        p_value, looks = tested
+        corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
+        before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
+        return Evidence(
+            joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, None,
+            _validation_refutes(validated, inside, after / before - 1 if before > 0 else 0.0),
+        )  # fmt: skip
+
+
+def _validation_refutes(validated: Gain, inside: Gain, growth: float) -> bool:
+    """Whether validation data speak against an effect: by not profiting although they excite it, or surely.
+
+    growth: of their error as it is, not whitened, as a share. A sure whitened loss that is little beside the gain in
+    identification, where they hardly excite it, is an effect whose form is not exact there.
+    """
+    if validated.change > MIN_EXCITATION * inside.change:
+        return validated.share < 0 or growth > MAX_LOSS
+    lost = validated.share < -MAX_WHITENED_LOSS * max(inside.share, 0.0) and validated.p_value > WORSE_LEVEL
+    return lost or growth > MAX_LOSS_UNEXCITED
+
+
+def count_looks(found: FittedModel) -> int:
+    """Everything that was compared: each candidate with each shape, and the alternatives of scans."""
+    return max(sum(group.candidate.looks for group in found.solver.groups), 1)

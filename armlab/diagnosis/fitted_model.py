@@ -1,0 +1,195 @@
+"""Rounds of fitting: noise from what is left, the search, better shapes, and columns that follow the new model."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armlab.diagnosis.columns import Columns, Moments
+from armlab.diagnosis.design import DesignMatrix
+from armlab.diagnosis.links import Widths
+from armlab.diagnosis.noise import Noise, fit_noise
+from armlab.diagnosis.refine import refine_shapes
+from armlab.diagnosis.search import Search, Step, background_state
+from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, Solver, State
+from armlab.diagnosis.surrogate import flexible_features, predict_structure
+from armlab.effects.contract import Family, Scene
+from problem.regressor import rigid_body_torque
+from recordings.run import Array
+
+INITIAL_LINK_WIDTH = 0.08  # of the links' errors, for the first look
+SEARCH_ROUNDS = 2
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedModel:
+    """A bench with its moments, and the state that was found on it."""
+
+    bench: DesignMatrix
+    noise: Noise
+    moments: Moments
+    solver: Solver
+    state: State
+    steps: tuple[Step, ...] = ()
+
+    @property
+    def columns(self) -> Columns:
+        """The bench's."""
+        return self.bench.columns
+
+    @property
+    def fit(self) -> Fit:
+        """The fit of the state."""
+        return self.solver.fit(self.state)
+
+    def coefficients(self, fit: Fit) -> Array:
+        """Of the unscaled columns, (size,)."""
+        return np.asarray(fit.coefficients / self.moments.lengths)
+
+    def base_parameters(self) -> tuple[Array, Array]:
+        """Deviation of the base parameters from the simulation's, and its covariance under the noise model."""
+        fit, count = self.fit, len(self.bench.base)
+        rank, lengths = fit.links.shape[1], self.moments.lengths[:count]
+        spread = fit.links @ fit.inverse[:rank, :rank] @ fit.links.T
+        return self.coefficients(fit)[:count], np.asarray(spread / np.outer(lengths, lengths))
+
+    def residual(self, fit: Fit) -> Array:
+        """What a fit leaves, (rows, joints), N m."""
+        return np.column_stack([self.residual_at(joint, fit) for joint in range(self.columns.joints)])
+
+    def residual_at(self, joint: int, fit: Fit) -> Array:
+        """What a fit leaves at one joint, (rows,), N m."""
+        return self.columns.matrices[joint][:, -1] - self.columns.torque_at(joint, self.coefficients(fit))
+
+
+def initial_link_widths(bench: DesignMatrix) -> Widths | None:
+    """Widths for a look at links that may be off: None without a nominal model or for a refit."""
+    if bench.prior is None or bench.simulation.kind == "refit":
+        return None
+    return (INITIAL_LINK_WIDTH,) * bench.prior.links
+
+
+def fit_background(bench: DesignMatrix, families: Sequence[Family], seed: int, progress: Progress) -> FittedModel:
+    """Friction and links fitted, every candidate on the bench, and errors taken as coloured for the first time.
+
+    seed: of the surrogates' random waves.
+    """
+    progress("fitting links and friction")
+    plain = bench.with_candidates(family for family in families if family.effect in USUAL_EFFECTS)
+    first = _fit_model(
+        plain, _white_noise(plain.target, plain), lambda solver: background_state(solver, initial_link_widths(plain))
+    )
+    moved = _follow_model(first)
+    progress("looking for candidates")
+    left = first.residual(first.fit)
+    rng = np.random.default_rng(seed)
+    made = tuple(flexible_features(moved.observed, joint, rng) for joint in range(moved.observed.joints))
+    whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made)
+    rough = _fit_model(
+        whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
+    )
+    forward = Search(rough.solver, replace(bench.settings.guards, backward_elimination=False), True, 0)
+    steps: list[Step] = []
+    return replace(rough, state=forward.climb(rough.state, steps))
+
+
+def _split_by_run(bench: DesignMatrix, residual: Array) -> list[Array]:
+    """A residual (rows, joints) of each run, (samples, joints), NaN at rows that were not kept."""
+    parts, start = [], 0
+    for signals in bench.observed.signals:
+        whole = np.full(signals.motion.position.shape, np.nan)
+        whole[signals.filter.rows] = residual[start : start + len(signals.torque)]
+        parts.append(whole)
+        start += len(signals.torque)
+    return parts
+
+
+def search_effects(current: FittedModel, progress: Progress) -> FittedModel:
+    """Rounds of search, shapes and model from a first round, which is let go as the next one is made."""
+    for number in range(SEARCH_ROUNDS):
+        progress(f"searching, round {number + 1}")
+        noise, known = fit_coloured_noise(current), current.state if number else None
+        bench, steps = _follow_model(current) if number else current.bench, current.steps
+        del current  # its columns, before there are others
+        searched = _search_state(bench, noise, known, True, steps)
+        progress("fitting nonlinear parameters")
+        bench, steps = bench.with_blocks(refine_shapes(bench, noise, searched.solver, searched.state)), searched.steps
+        known = searched.state
+        del searched
+        current = _fit_model(bench, noise, known, steps)
+    progress("searching, last round")
+    return _search_state(current.bench, fit_coloured_noise(current), current.state, False, current.steps)
+
+
+def _search_state(
+    bench: DesignMatrix, noise: Noise, known: State | None, afresh: bool, steps: tuple[Step, ...]
+) -> FittedModel:
+    """The best state under a noise model, from what is known already, and `afresh` from the two starts."""
+    guards, links = bench.settings.guards, len(bench.simulation.arm)
+    opened = initial_link_widths(bench)
+    at_rest = None if opened is None else (0.0,) * links
+    base = _fit_model(bench, noise, State((), at_rest))
+    starts = [] if known is None else [known]
+    if afresh:
+        starts.append(State((), at_rest))
+    if afresh and guards.background_start:
+        starts.append(background_state(base.solver, opened))
+    state, moves = Search(base.solver, guards, opened is None, links).best(starts)
+    return replace(base, state=state, steps=(*steps, *moves))
+
+
+def fit_coloured_noise(current: FittedModel) -> Noise:
+    """Noise of what a round leaves and no surrogate predicts."""
+    observed, guards = current.bench.observed, current.bench.settings.guards
+    left = current.residual(current.fit)
+    for joint, each in enumerate(current.bench.features):
+        left[:, joint] -= predict_structure(left[:, joint], joint, each, observed)
+    return fit_noise(left, observed, len(current.fit.inverse) / observed.joints, guards.prewhitening)
+
+
+def _white_noise(residual: Array, bench: DesignMatrix) -> Noise:
+    return fit_noise(residual, bench.observed, 0.0, colour=False)
+
+
+def _fit_model(
+    bench: DesignMatrix, noise: Noise, state: State | Callable[[Solver], State], steps: tuple[Step, ...] = ()
+) -> FittedModel:
+    moments, solver = bench.solver(noise)
+    chosen = state(solver) if callable(state) else state
+    return FittedModel(bench, noise, moments, solver, chosen, steps)
+
+
+def _follow_model(current: FittedModel) -> DesignMatrix:
+    """The bench with columns that follow the model of a round."""
+    bench, fit = current.bench, current.fit
+    inertial = inertial_parameters(current)
+    nominal = bench.simulation.inertial
+    change = inertial if nominal is None else inertial - nominal
+
+    def torque(scene: Scene) -> Array:
+        out = bench.simulation.torque(scene) + rigid_body_torque(scene.arm, scene.motion, change)
+        for group in fit.state.groups:
+            candidate = current.solver.groups[group].candidate
+            if candidate.of_channel:  # acts on what is recorded, itself not included
+                continue
+            out[:, list(candidate.rows)] += candidate.columns(scene) @ current.solver.values(fit, group)
+        return out
+
+    return bench.with_model(inertial, torque)
+
+
+def inertial_parameters(current: FittedModel) -> Array:
+    """Inertial parameters (10 * joints,) of the links of a round: the simulation's, and what they are off."""
+    bench, fit = current.bench, current.fit
+    base = current.coefficients(fit)[: len(bench.base)]
+    nominal = bench.simulation.inertial
+    start = np.zeros(10 * len(bench.simulation.arm)) if nominal is None else nominal
+    if bench.prior is None or fit.state.widths is None:
+        change = np.zeros(len(start))
+        change[bench.base.columns] = base
+        return np.asarray(start + change)
+    if not any(fit.state.widths):
+        return start
+    mean, _ = bench.prior.deviations(fit.state.widths, base, np.zeros((len(base), len(base))))
+    return np.asarray(start + mean)

@@ -1,0 +1,137 @@
+"""Only what passes every test stays: the weakest effect that fails one leaves, and the rest is searched anew."""
+
+from dataclasses import replace
+
+from armlab.diagnosis.evidence import Evidence, Judge
+from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.search import Search, Step
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.solver import USUAL_EFFECTS, State
+
+SINGLE_EVENT_SHARE = 1 / 3  # of the least gain: what happened once acts in a small part of the time
+SELF_EVIDENT_GAIN = 0.25  # of the held-out error: a gain that needs no other evidence for its name
+MAX_CYCLES = 3  # of withdrawing and looking again
+HELD_OUT_LEVEL = 0.05  # of the one-sided test on held-out data
+LARGE_GAIN, LARGE_GAIN_LEVEL = 0.2, 0.2  # a gain that no chance makes, though a few stretches hold most of it
+Pruned = tuple[FittedModel, dict[int, Evidence], dict[int, Evidence]]
+_State = tuple[State, dict[int, Evidence], frozenset[int]]
+
+
+def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
+    """Why an effect may not be claimed; None where it passes."""
+    guards = settings.guards
+    if guards.physics_signs and evidence.objection is not None:
+        return evidence.objection
+    if evidence.corrected > settings.level:
+        return f"p = {evidence.corrected:.2g} after correction"
+    if not evidence.usual and evidence.score < settings.least_evidence and evidence.gain < SELF_EVIDENT_GAIN:
+        return f"log evidence {evidence.score:.0f}: too little for a name"
+    least = settings.least_gain * (1.0 if evidence.repeatable else SINGLE_EVENT_SHARE)
+    if guards.heldout_gain and evidence.gain < least:
+        return f"held-out gain {100 * evidence.gain:.2g} %"
+    if not evidence.repeatable:
+        return None
+    if (
+        guards.heldout_gain
+        and not evidence.usual
+        and evidence.held_p > (LARGE_GAIN_LEVEL if evidence.gain > LARGE_GAIN else HELD_OUT_LEVEL)
+    ):
+        return f"held-out gain not sure (p = {evidence.held_p:.2g})"
+    if guards.heldout_gain and evidence.worse:
+        return f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
+    return None
+
+
+def prune(found: FittedModel) -> Pruned:
+    """The round with the effects that pass, and the evidence of those and of the links that do (from 0).
+
+    After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
+    be its copy. Then the search looks once more, without the places that were withdrawn.
+    """
+    steps = list(found.steps)
+    return _settle_links(found, _prune_and_search(found, found.state, frozenset(), steps), steps)
+
+
+def _prune_and_search(
+    found: FittedModel, state: State, banned: frozenset[int], steps: list[Step], fixed: bool = False
+) -> _State:
+    """What passes of a state, and of what the search finds once more. fixed: whether the links' widths stay."""
+    for _ in range(MAX_CYCLES):
+        state, effects, banned = _remove_failing(found, state, banned, steps)
+        known = fixed or state.widths is None
+        search = Search(found.solver, found.bench.settings.guards, known, len(state.widths or ()), banned)
+        again = search.climb(state, steps)
+        if again == state:
+            return state, effects, banned
+        state = again
+    return _remove_failing(found, state, banned, steps)
+
+
+def withdraw(found: FittedModel, groups: frozenset[int], why: str) -> Pruned:
+    """The same without some groups, and without what no longer passes; usual friction in the place of special laws."""
+    judge, steps = Judge(found, found.state), list(found.steps)
+    for group in groups:
+        candidate = found.solver.groups[group].candidate
+        steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    back = {other for group in groups for other in judge.simpler(group)}
+    state = State(tuple(sorted(set(found.state.groups) - groups | back)), found.state.widths)
+    return _settle_links(found, _remove_failing(found, state, groups, steps), steps)
+
+
+def _settle_links(found: FittedModel, passed: _State, steps: list[Step]) -> Pruned:
+    """With the links that pass; where they do not, all is tested and searched again with links as simulated."""
+    state, effects, banned = passed
+    state, links = _test_links(found, state, steps)
+    if links is None:
+        state, effects, banned = _prune_and_search(found, state, banned, steps, fixed=True)
+    return replace(found, state=state, steps=tuple(steps)), effects, links or {}
+
+
+def _remove_failing(found: FittedModel, state: State, banned: frozenset[int], steps: list[Step]) -> _State:
+    """The state without its failing effects, the weakest first; usual friction in the place of special laws."""
+    groups, settings = found.solver.groups, found.bench.settings
+    while True:
+        judge = Judge(found, state)
+        effects = judge.effects()
+        bad = {group: why for group, each in effects.items() if (why := reason_to_reject(each, settings)) is not None}
+        if not bad:
+            return state, effects, banned
+        weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
+        gone = _groups_to_remove(judge, weakest)
+        for group in gone:
+            what = groups[group].candidate
+            steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
+        places = {groups[group].place for group in gone}
+        banned |= {number for number, each in enumerate(groups) if each.place in places}
+        back = {other for group in gone for other in judge.simpler(group)}
+        state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
+
+
+def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
+    """The group that fails; usual friction beside a special law takes that law with it, if it is likelier alone."""
+    solver, state = judge.found.solver, judge.state
+    joint = solver.groups[weakest].candidate.joint
+    special = {each for each in state.groups if judge.simpler(each) and solver.groups[each].candidate.joint == joint}
+    if solver.groups[weakest].candidate.effect not in USUAL_EFFECTS or not special:
+        return {weakest}
+    usual = {other for group in special for other in judge.simpler(group)}
+    plain = State(tuple(sorted(set(state.groups) - special | usual)), state.widths)
+    return {weakest} if solver.fit(state.minus(weakest)).score > solver.fit(plain).score else special
+
+
+def _test_links(found: FittedModel, state: State, steps: list[Step]) -> tuple[State, dict[int, Evidence] | None]:
+    """The state, and the links that may be claimed: those that pass alone, or the likeliest if they do together.
+
+    They stay as wide as they were found as long as any passes: that they are off is no claim about each. None where
+    they had to be brought back to the simulation.
+    """
+    judge, settings = Judge(found, state), found.bench.settings
+    links = judge.links()
+    if not links:
+        return state, {}
+    passed = {link: each for link, each in links.items() if reason_to_reject(each, settings) is None}
+    together = judge.together()
+    if passed or reason_to_reject(together, settings) is None:
+        return state, passed or {max(links, key=lambda link: links[link].score): together}
+    steps.append(Step(f"withdrawn: links: {reason_to_reject(together, settings)}", 0.0))
+    return State(state.groups, (0.0,) * len(state.widths or ())), None

@@ -1,0 +1,236 @@
+"""The simpler laws that a law contains, and has to be better than."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from armlab.diagnosis.columns import Group
+from armlab.diagnosis.links import LINK_UNCERTAINTY_GRID, SINGLE_LINK_GRID, Widths
+from armlab.diagnosis.settings import Guards
+from armlab.diagnosis.solver import CROWD_PENALTY, USUAL_EFFECTS, Solver, State
+from armlab.effects.plausible import reason_implausible
+from recordings.run import Array
+
+SPECIAL_FRICTION = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
+           "friction_drift", "load_dependent_friction")  # fmt: skip
+USUAL_FRICTION = ("coulomb_friction", "viscous_friction")  # what every joint has
+SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
+
+
+def contained_groups(groups: Sequence[Group], number: int) -> tuple[int, ...]:
+    """Numbers of the usual friction that a special law of friction has to be better than, or of a spring's constant."""
+    candidate = groups[number].candidate
+    wanted = {name for name in candidate.replaces if name in USUAL_EFFECTS}
+    if candidate.effect in SPECIAL_FRICTION:
+        wanted |= set(USUAL_FRICTION)
+    if candidate.effect in SPRINGS:
+        wanted |= {"torque_offset"}
+    return tuple(
+        number
+        for number, each in enumerate(groups)
+        if each.candidate.effect in wanted and each.candidate.joint == candidate.joint
+    )
+
+
+EXCLUSIVE_FRICTION_LAWS = (
+    "nonlinear_viscous_friction",
+    "stribeck_friction",
+    "asymmetric_friction",
+    "presliding_hysteresis",
+)
+MAX_CANDIDATES_ASKED = 40  # best candidates of a step that are asked for their physics
+MAX_UNUSUAL_EFFECTS = 12  # effects beside friction and offsets: a start that asks for more has lost its way
+MIN_SCORE_STEP = 1e-6  # of a score: smaller steps are rounding
+MAX_MOVES = 200
+
+
+@dataclass(frozen=True)
+class Step:
+    """One move of the search, for the log."""
+
+    what: str
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """Moves that raise the score of a state. fixed: whether the links' widths may not be changed.
+    banned: groups that were withdrawn."""
+
+    solver: Solver
+    guards: Guards
+    fixed: bool
+    links: int
+    banned: frozenset[int] = frozenset()
+
+    def best(self, starts: Sequence[State]) -> tuple[State, tuple[Step, ...]]:
+        """The best state that the starts lead to, and the moves of all."""
+        steps: list[Step] = []
+        ends = [self.climb(start, steps) for start in starts]
+        if not self.fixed:
+            crossed = {State(each.groups, other.widths) for each in ends for other in ends} - set(ends)
+            ends += [self.climb(start, steps) for start in sorted(crossed, key=lambda each: each.groups)]
+        return max(ends, key=lambda end: self.solver.fit(end).score), tuple(steps)
+
+    def climb(self, state: State, steps: list[Step]) -> State:
+        """The state where no move raises the score any more."""
+        for _ in range(MAX_MOVES):
+            better = self._step(state)
+            if better is None:
+                break
+            what, state = better
+            steps.append(Step(what, self.solver.fit(state).score))
+        return state
+
+    def _step(self, state: State) -> tuple[str, State] | None:
+        here = self.solver.fit(state).score
+        for moves in (self._forward, self._backward, self._widths, self._exchanges):
+            found = [(what, other) for what, other in moves(state)]
+            if not found:
+                continue
+            what, other = max(found, key=lambda move: self.solver.fit(move[1]).score)
+            if self.solver.fit(other).score > here + MIN_SCORE_STEP:
+                return what, other
+        return None
+
+    def _forward(self, state: State) -> Iterator[tuple[str, State]]:
+        crowded = self.solver.crowd(state.groups) >= MAX_UNUSUAL_EFFECTS
+        added = None if crowded else self._addition(state)
+        if added is not None:
+            yield f"+ {self._name(added)}", self.with_group(state, added)
+
+    def with_group(self, state: State, group: int) -> State:
+        """The state with a group, without those that it replaces, or that break a law of physics at its joint then."""
+        for other in self._replaced(state, group):
+            state = state.minus(other)
+        state = state.plus(group)
+        joint = self.solver.groups[group].candidate.joint
+        for other in state.groups:
+            beside = other != group and self.solver.groups[other].candidate.joint == joint
+            if beside and self.objection(state, other) is not None:
+                state = state.minus(other)
+        return state
+
+    def _replaced(self, state: State, group: int) -> list[int]:
+        groups, candidate = self.solver.groups, self.solver.groups[group].candidate
+        return [
+            other
+            for other in state.groups
+            if groups[other].candidate.effect in candidate.replaces and groups[other].candidate.joint == candidate.joint
+        ]
+
+    def excluded(self, state: State, group: int) -> bool:
+        """Whether the state holds the group's place already, or something that contains it."""
+        candidate = self.solver.groups[group].candidate
+        inside = [self.solver.groups[other] for other in state.groups]
+        return self._late_twice(state, group) or any(
+            other.place == self.solver.groups[group].place
+            or (
+                candidate.effect in EXCLUSIVE_FRICTION_LAWS
+                and other.candidate.effect in EXCLUSIVE_FRICTION_LAWS
+                and candidate.joint == other.candidate.joint
+            )
+            or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
+            for other in inside
+        )
+
+    def _late_twice(self, state: State, group: int) -> bool:
+        """Whether a delay of all channels would stand beside several skews: the skew of one, told in many words."""
+        late = [self.solver.groups[each].candidate.effect for each in (*state.groups, group)]
+        return "time_delay" in late and late.count("channel_skew") > 1
+
+    def _addition(self, state: State, but: int | None = None) -> int | None:
+        """The group that raises the score most and breaks no law of physics."""
+        gains = self.gains(state)
+        asked = 0
+        for group in np.argsort(-gains):
+            number = int(group)
+            if gains[number] <= MIN_SCORE_STEP or asked >= MAX_CANDIDATES_ASKED:
+                return None
+            if number == but or number in self.banned or self.excluded(state, number):
+                continue
+            asked += 1
+            if self.objection(self.with_group(state, number), number) is None:
+                return number
+        return None
+
+    def gains(self, state: State) -> Array:
+        """Gain of each group, with the price of what it replaces given back."""
+        gains = self.solver.gains(state)
+        for number in self._replacing:
+            replaced = self._replaced(state, number)
+            gains[number] += sum(self.solver.prices[other] for other in replaced)
+            gains[number] += CROWD_PENALTY * sum(bool(self.solver.unusual[other]) for other in replaced)
+        return gains
+
+    @cached_property
+    def _replacing(self) -> list[int]:
+        return [number for number, group in enumerate(self.solver.groups) if group.candidate.replaces]
+
+    def objection(self, state: State, group: int) -> str | None:
+        """What physics says against a group as it is fitted in a state."""
+        if not self.guards.physics_signs:
+            return None
+        fit = self.solver.fit(state)
+        candidate = self.solver.groups[group].candidate
+        values, covariance = self.solver.values(fit, group), self.solver.covariance(fit, group)
+        return reason_implausible(candidate, values) or candidate.objection(values, covariance)
+
+    def _backward(self, state: State) -> Iterator[tuple[str, State]]:
+        if not self.guards.backward_elimination or not state.groups:
+            return
+        losses = self.solver.losses(self.solver.fit(state))
+        group = max(losses, key=lambda each: losses[each])
+        if losses[group] > 0:
+            yield f"- {self._name(group)}", state.minus(group)
+
+    def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
+        if not self.guards.backward_elimination:
+            return
+        for group in state.groups:
+            for without in self._without(state, group):
+                added = self._addition(without, group)
+                if added is not None:
+                    yield f"{self._name(group)} -> {self._name(added)}", self.with_group(without, added)
+
+    def _without(self, state: State, group: int) -> list[State]:
+        """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
+        bare, usual = state.minus(group), contained_groups(self.solver.groups, group)
+        back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
+        own, free = self.solver.groups[group].candidate, bare
+        for other in bare.groups:  # one law may stand for all friction of a joint, and no part alone makes room for it
+            beside = self.solver.groups[other].candidate
+            if own.effect == USUAL_FRICTION[0] and beside.effect in USUAL_FRICTION and beside.joint == own.joint:
+                free = free.minus(other)
+        return list(dict.fromkeys((bare, back, free)))
+
+    def _widths(self, state: State) -> Iterator[tuple[str, State]]:
+        if self.fixed or state.widths is None:
+            return
+        for widths in self._neighbours(state.widths):
+            yield f"links off by {widths}", State(state.groups, widths)
+
+    def _neighbours(self, widths: Widths) -> Iterator[Widths]:
+        """All links alike, or one link changed."""
+        yield from ((size,) * self.links for size in (0.0, *LINK_UNCERTAINTY_GRID))
+        for size in (0.0, *SINGLE_LINK_GRID):
+            for link in range(self.links):
+                yield tuple(size if other == link else width for other, width in enumerate(widths))
+
+    def _name(self, group: int) -> str:
+        candidate = self.solver.groups[group].candidate
+        where = "" if candidate.joint is None else f" {candidate.joint}"
+        shape = "" if not candidate.shape else f" {tuple(round(value, 4) for value in candidate.shape)}"
+        return f"{candidate.effect}{where}{shape}"
+
+
+def background_state(solver: Solver, widths: Widths | None) -> State:
+    """Friction and offset on every joint."""
+    chosen = [
+        number
+        for number, group in enumerate(solver.groups)
+        if group.candidate.effect in USUAL_EFFECTS and group.variant == 0
+    ]
+    return State(tuple(chosen), widths)

@@ -1,0 +1,130 @@
+"""The simulation that a recording is compared with, and recordings that cannot be compared with any."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.diagnosis.data import Observed
+from armlab.diagnosis.settings import Baseline
+from identification.model_file import read_model
+from identification.scene import Scene, scene_of
+from identification.torque_model import TorqueModel
+from problem.arm import Arm
+from problem.errors import InputError
+from problem.regressor import rigid_body_torque
+from recordings.checks.fit import fit_findings
+from recordings.differentiate import Signals
+from recordings.recording import Recording
+from recordings.run import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """kind: the baseline. inertial: (10 * joints,) of its links, None where there are none. model: its friction
+    and other terms, None for a plain robot file.
+    """
+
+    kind: Baseline
+    arm: Arm
+    inertial: Array | None
+    model: TorqueModel | None = None
+
+    def torque(self, scene: Scene) -> Array:
+        """Simulated torque of the motion of a scene, (samples, joints); zeros where there is no simulation."""
+        if self.model is not None:
+            return self.model.torque_in(scene)
+        out = np.zeros(scene.torque.shape)
+        if self.inertial is not None:
+            out = rigid_body_torque(self.arm, scene.motion, self.inertial)
+        if self.arm.rotor_inertia:
+            out = out + np.asarray(self.arm.rotor_inertia) * scene.motion.acceleration
+        return out
+
+    def filtered(self, signals: Signals) -> Array:
+        """Simulated torque through the filter of the measured one, (kept, joints)."""
+        if self.kind == "simulated" and signals.run.simulated_torque is not None:
+            return np.asarray(signals.filter(signals.run.simulated_torque))
+        return np.asarray(signals.filter(self.torque(scene_of(signals.run, signals.motion, self.arm))))
+
+
+def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulation:
+    """The simulation of a recording; InputError where the wanted baseline is not there."""
+    kind: Baseline = baseline or ("nominal" if _has_nominal(recording) else "refit")
+    if kind == "nominal" and not _has_nominal(recording):
+        raise InputError(f"--baseline nominal: {recording.arm.name} has no `links` and {recording.name} no simulation")
+    if kind == "simulated" and any(run.simulated_torque is None for run in recording.runs):
+        raise InputError(f"--baseline simulated: not every run of {recording.name} has columns of simulated_torque")
+    arm = recording.arm
+    if recording.simulation is None:
+        return Simulation(kind, arm, arm.parameters if arm.links is not None else None)
+    model = read_model(recording.simulation)
+    if len(model.arm) != len(arm):
+        joints = f"{len(model.arm)} joints, the recording {len(arm)}"
+        raise InputError(f"{recording.simulation} has {joints}: it is a model of another arm")
+    inertial = model.inertial if model.inertial is not None else model.structure.full(model.base_values)
+    return Simulation(kind, arm, inertial, model)
+
+
+def _has_nominal(recording: Recording) -> bool:
+    return recording.arm.links is not None or recording.simulation is not None
+
+
+MIN_DURATION_S = 2.0  # s of motion in all runs that identify
+MIN_TRAVEL = 1e-3  # rad (m): less is no motion
+UNIT_FACTOR = 3.0  # a torque that is so many times too large or too small on all joints is in another unit
+MIN_EXPLAINED_SHARE = (
+    0.3  # of the torque's scatter: a simulation that explains less on a joint says nothing about its unit
+)
+NO_EXPLAINED_SHARE = 0.02  # of it, on every joint: no simulation of this arm
+
+
+def reason_unusable(recording: Recording) -> str | None:
+    """The reason in a sentence; None for a recording that can be used."""
+    runs = recording.with_role("identify") or recording.runs
+    seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
+    if seconds < MIN_DURATION_S:
+        return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
+    travel = np.max([np.ptp(run.position, axis=0) for run in recording.runs], axis=0)
+    if not np.any(travel > MIN_TRAVEL):
+        return "No joint moves in any run: there is nothing that the torques could be compared with."
+    silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
+    if silent:
+        return f"The torque of joint {', '.join(map(str, silent))} never changes: is the right column named?"
+    swapped = next((each for each in fit_findings(runs, recording.arm) if each.kind == "swapped_channels"), None)
+    return None if swapped is None else f"The {swapped.text}. Put the columns right before looking for physics."
+
+
+def reason_misread(observed: Observed, simulation: Simulation) -> str | None:
+    """Torque in a wrong unit or of the wrong sign, or the robot of another arm: where all joints say so together."""
+    if simulation.kind == "refit" or simulation.inertial is None:
+        return None
+    gains, shares = _torque_gains(observed, simulation)
+    told = shares > MIN_EXPLAINED_SHARE
+    if shares.max() < NO_EXPLAINED_SHARE:
+        return (
+            "The simulation explains next to nothing of any joint's torque: the robot file of another arm, or torque "
+            "columns that are none?"
+        )
+    factor = float(np.median(gains[told])) if told.any() else 1.0
+    if factor < 0:
+        return "The measured torque has the opposite sign of the simulated one: turn its sign in `transmission`."
+    if factor > UNIT_FACTOR or factor < 1 / UNIT_FACTOR:
+        return f"The measured torque is about {factor:.3g} times the simulated one: another unit, or gains missing?"
+    return None
+
+
+def _torque_gains(observed: Observed, simulation: Simulation) -> tuple[Array, Array]:
+    """Per joint the factor between measured and simulated torque, friction fitted, and the share it explains."""
+    simulated = np.concatenate([simulation.filtered(signals) for signals in observed.signals])
+    measured, velocity = observed.torque, observed.kept("velocity")
+    gains, shares = [], []
+    for joint in range(observed.joints):
+        friction = np.column_stack([velocity[:, joint], np.sign(velocity[:, joint]), np.ones(observed.rows)])
+        column, torque = (
+            each - friction @ np.linalg.lstsq(friction, each)[0] for each in (simulated[:, joint], measured[:, joint])
+        )
+        power = float(column @ column)
+        gain = float(column @ torque) / power if power > 0 else 0.0
+        gains.append(gain)
+        shares.append(gain**2 * power / max(float(torque @ torque), 1e-300))
+    return np.array(gains), np.array(shares)

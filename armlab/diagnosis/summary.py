@@ -1,0 +1,29 @@
+"""The verdict in a paragraph that a person can read."""
+
+from collections.abc import Sequence
+
+from armlab.diagnosis.result import Claim, JointFit, Status
+
+MAX_FINDINGS_TOLD = 6  # findings that are told; the others are counted
+
+
+def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit]) -> str:
+    """What is missing and how much better the model then predicts."""
+    if status == "none":
+        worst = max((each.after for each in fits), default=0.0)
+        return f"Nothing is missing: the simulation explains the recording down to its noise (at most {worst:.3g} N m)."
+    told = "; ".join(_describe_claim(claim) for claim in claims[:MAX_FINDINGS_TOLD])
+    more = f"; and {len(claims) - MAX_FINDINGS_TOLD} more" if len(claims) > MAX_FINDINGS_TOLD else ""
+    best = max(fits, key=lambda each: each.before - each.after)
+    gain = f"On held-out data the error of joint {best.joint} falls from {best.before:.3g} to {best.after:.3g} N m."
+    return f"The simulation misses {told}{more}. {gain}"
+
+
+def _describe_claim(claim: Claim) -> str:
+    name = claim.effect.replace("_", " ")
+    link = claim.effect in ("payload", "inertial_parameter_error")
+    where = "" if claim.joint is None else f" at {'link' if link else 'joint'} {claim.joint}"
+    if claim.effect == "unknown":
+        return f"something unknown{where} that depends on {', '.join(claim.depends_on)}"
+    rivals = " or ".join(dict.fromkeys(each.effect.replace("_", " ") for each in claim.rivals))
+    return f"{name}{where}{f' (or {rivals})' if rivals else ''}: {claim.equation}"

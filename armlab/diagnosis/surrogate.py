@@ -1,0 +1,347 @@
+"""Flexible regressions that stand in for physics without a name.
+
+Splines and random waves (Rahimi and Recht 2007) of the joints' motion and of time, fitted by ridge regression. Only
+what they predict on data that took no part counts.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from armlab.diagnosis.blocks import Gain, block_numbers, held_out_gain
+from armlab.diagnosis.data import Observed, Segment, rows_in
+from armlab.diagnosis.noise import Noise
+from recordings.run import Array
+
+RIDGES = tuple(10.0 ** np.arange(-6.0, 2.0))  # of the mean squared length of a feature
+FOLD_S = 2.0  # s: stretches that choose the ridge in turn
+
+Thirds = tuple[tuple[Array, ...], tuple[Array, ...], NDArray[np.intp]]
+
+
+def time_thirds(observed: Observed, joint: int) -> NDArray[np.intp]:
+    """Stretches of time of the identification rows, in turn; -1 elsewhere."""
+    learn = rows_in(observed.of_role("identify", joint), observed.rows)
+    return np.where(learn, block_numbers(observed, FOLD_S) % 3, -1)
+
+
+def products_by_third(white: Array, target: Array, thirds: NDArray[np.intp], chosen: NDArray[np.bool_]) -> Thirds:
+    """Products of the chosen rows, third by third."""
+    parts = [white[chosen & (thirds == fold)] for fold in range(3)]
+    goals = [target[chosen & (thirds == fold)] for fold in range(3)]
+    grams = tuple(part.T @ part for part in parts)
+    return grams, tuple(part.T @ goal for part, goal in zip(parts, goals, strict=True)), thirds
+
+
+def predict_in_turn(
+    values: Array,
+    rows: NDArray[np.bool_],
+    observed: Observed,
+    ridge: float,
+    grams: tuple[Array, ...],
+    products: tuple[Array, ...],
+) -> Array:
+    """Predictions of the chosen rows, each from the thirds that it does not belong to."""
+    thirds = block_numbers(observed, FOLD_S)[rows] % 3
+    out = np.empty(len(thirds))
+    for fold in range(3):
+        gram = np.sum(grams, axis=0) - grams[fold] + ridge * np.eye(values.shape[1])
+        weights = np.linalg.solve(gram, np.sum(products, axis=0) - products[fold])
+        out[thirds == fold] = values[rows][thirds == fold] @ weights
+    return out
+
+
+def errors_in_turn(
+    white: Array,
+    target: Array,
+    thirds: NDArray[np.intp],
+    ridge: float,
+    grams: tuple[Array, ...],
+    products: tuple[Array, ...],
+) -> Array:
+    """Errors of each third where the others have been learnt from, (rows,)."""
+    out, whole, towards = target.copy(), np.sum(grams, axis=0), np.sum(products, axis=0)
+    for fold in range(3):
+        weights = np.linalg.solve(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
+        out[thirds == fold] -= white[thirds == fold] @ weights
+    return out
+
+
+def best_ridge(grams: tuple[Array, ...], products: tuple[Array, ...]) -> tuple[float, Array]:
+    """The ridge that predicts each third best from the others, and the weights with it on all."""
+    count = len(products[0])
+    ridges = np.array(RIDGES) * sum(float(np.trace(gram)) for gram in grams) / max(count, 1)
+    errors = np.zeros(len(ridges))
+    whole, towards = np.sum(grams, axis=0), np.sum(products, axis=0)
+    for own, product in zip(grams, products, strict=True):
+        values, vectors = np.linalg.eigh(whole - own)
+        turned = vectors.T @ (towards - product)
+        for number, ridge in enumerate(ridges):
+            weights = vectors @ (turned / (np.maximum(values, 0) + ridge))
+            errors[number] += weights @ own @ weights - 2 * weights @ product
+    best = float(ridges[int(np.argmin(errors))])
+    return best, np.linalg.solve(whole + best * np.eye(count), towards)
+
+
+HATS, FINE_HATS = 8, 16  # piecewise linear functions of a variable
+MAX_PAIRS = 6  # of other joints
+FEW_JOINTS = 4  # an arm with more gets fewer waves a pair
+WAVES = 16  # random waves of a pair of variables
+SIGN_WIDTHS = (0.005, 0.02, 0.06, 0.2, 0.6)  # of the top speed: widths of smooth signs of the velocity
+PRODUCT_POSITIONS, PRODUCT_SPEEDS = 4, 5  # piecewise linear functions of each of two variables, for their products
+POSITION_HATS, FINE_POSITION_HATS = 12, 24  # of a position, for what differs from place to place
+MEMORIES_S = (0.02, 0.1, 0.5)  # s: of lagged signs, for what depends on the way since a reversal
+
+
+Part = tuple[Array, tuple[str, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """values: (rows, features). variables: per feature the names of what it depends on.
+
+    folds: (rows,), which third of the identification rows each belongs to, -1 for none. grams: of each third.
+    """
+
+    values: Array
+    variables: tuple[frozenset[str], ...]
+    folds: NDArray[np.intp]
+    grams: tuple[Array, ...]
+
+
+def flexible_features(observed: Observed, joint: int, rng: np.random.Generator) -> Features:
+    """Features for one joint at the kept rows."""
+    position, velocity, acceleration = (observed.kept(name) for name in ("position", "velocity", "acceleration"))
+    waves = WAVES if observed.joints <= FEW_JOINTS else WAVES // 2
+    parts: list[Part] = []
+
+    def add(columns: Array, *variables: str) -> None:
+        parts.append((columns, variables))
+
+    for other in range(observed.joints):
+        add(_hats(position[:, other]), f"position_{other + 1}")
+        add(_hats(velocity[:, other]), f"velocity_{other + 1}")
+        if other != joint:
+            pair = f"position_{joint + 1}", f"position_{other + 1}"
+            add(_waves(position[:, [joint, other]], rng, waves), *pair)
+            add(_waves(velocity[:, [joint, other]], rng, waves), f"velocity_{joint + 1}", f"velocity_{other + 1}")
+            add(
+                _waves(np.column_stack([position[:, joint], velocity[:, other]]), rng, waves),
+                pair[0],
+                f"velocity_{other + 1}",
+            )
+    for first, second in list(combinations([other for other in range(observed.joints) if other != joint], 2))[
+        :MAX_PAIRS
+    ]:
+        add(_waves(position[:, [first, second]], rng, waves), f"position_{first + 1}", f"position_{second + 1}")
+    own = f"velocity_{joint + 1}"
+    add(_hats(acceleration[:, joint]), f"acceleration_{joint + 1}")
+    add(_waves(np.column_stack([position[:, joint], velocity[:, joint]]), rng), f"position_{joint + 1}", own)
+    add(_waves(np.column_stack([velocity[:, joint], acceleration[:, joint]]), rng), own, f"acceleration_{joint + 1}")
+    signs = _smooth_signs(velocity[:, joint])
+    add(signs, own)
+    add(_hats(position[:, joint], FINE_HATS) * signs[:, 2:3], own, f"position_{joint + 1}")
+    add(_lags(observed, signs[:, 1]), own)
+    add(_lags(observed, velocity[:, joint]), own)
+    clock = observed.time
+    add(_hats(clock), "time")
+    add(np.column_stack([clock, clock**2]) * signs[:, 2:3], own, "time")
+    add(np.column_stack([clock, clock**2]) * velocity[:, [joint]], own, "time")
+    return _standardise(observed, joint, parts)
+
+
+def feature_banks(observed: Observed, joint: int, load: Array) -> Iterator[Features]:
+    """Few features each, of one kind of dependence. load: torque of the model at the joint, (rows,), N m.
+
+    What depends on little drowns in the noise of what does not matter where hundreds of features are taught at once.
+    """
+    position, velocity, acceleration = (observed.kept(name) for name in ("position", "velocity", "acceleration"))
+    signals = ("torque", "position", "velocity", "acceleration")
+    torque, place, speed, change = (f"{name}_{joint + 1}" for name in signals)
+    own, signs = velocity[:, joint], _smooth_signs(velocity[:, joint])
+    turn = signs[:, 2:3]
+    loaded = [
+        (_hats(load), (torque,)),
+        (load[:, None] * _hats(own), (torque, speed)),
+        (turn * _hats(load), (torque, speed)),
+    ]
+    fast = [_hats(own, FINE_HATS), signs, _lags(observed, signs[:, 1]), _lags(observed, own)]
+    mapped = [
+        turn * _hats(position[:, joint], FINE_POSITION_HATS),
+        own[:, None] * _hats(position[:, joint], POSITION_HATS),
+    ]
+    yield _standardise(observed, joint, loaded)
+    yield _standardise(observed, joint, [(columns, (speed,)) for columns in fast])
+    yield _standardise(observed, joint, [(columns, (place, speed)) for columns in mapped])
+    yield _standardise(observed, joint, [(_hats(position[:, joint], FINE_POSITION_HATS), (place,))])
+    yield _standardise(observed, joint, [(_products(own, acceleration[:, joint], PRODUCT_SPEEDS), (speed, change))])
+    for other in range(observed.joints):
+        if other != joint:
+            theirs = f"velocity_{other + 1}"
+            both = _products(position[:, joint], position[:, other], PRODUCT_POSITIONS)
+            smooth = _smooth_signs(velocity[:, other])
+            moved = [_hats(velocity[:, other]), smooth, _lags(observed, smooth[:, 2])]
+            moved.append(_lags(observed, velocity[:, other]))
+            yield _standardise(observed, joint, [(both, (place, f"position_{other + 1}"))])
+            yield _standardise(observed, joint, [(columns, (theirs,)) for columns in moved])
+
+
+def _standardise(observed: Observed, joint: int, parts: Sequence[Part]) -> Features:
+    """Features of columns (rows, count) with the variables that they depend on; constant ones left out."""
+    matrix = np.column_stack([columns for columns, _ in parts])
+    names = [frozenset(variables) for columns, variables in parts for _ in range(columns.shape[1])]
+    matrix = matrix - matrix.mean(axis=0)
+    spread = matrix.std(axis=0)
+    kept = spread > 1e-9
+    chosen = tuple(name for name, wanted in zip(names, kept, strict=True) if wanted)
+    scaled, thirds = matrix[:, kept] / spread[kept], time_thirds(observed, joint)
+    grams = tuple(scaled[thirds == fold].T @ scaled[thirds == fold] for fold in range(3))
+    return Features(scaled, chosen, thirds, grams)
+
+
+def _hats(values: Array, hats: int = HATS) -> Array:
+    """Piecewise linear functions between quantiles of the values, (rows, hats)."""
+    knots = np.unique(np.quantile(values, np.linspace(0, 1, hats)))
+    if len(knots) < 3:
+        return np.empty((len(values), 0))
+    return np.column_stack([np.interp(values, knots, unit) for unit in np.eye(len(knots))])
+
+
+def _products(one: Array, other: Array, hats: int) -> Array:
+    """Every function of one variable times every one of the other, (rows, products)."""
+    first, second = _hats(one, hats), _hats(other, hats)
+    return (first[:, :, None] * second[:, None, :]).reshape(len(one), first.shape[1] * second.shape[1])
+
+
+def _waves(values: Array, rng: np.random.Generator, count: int = WAVES) -> Array:
+    spread = values.std(axis=0)
+    scaled = (values - values.mean(axis=0)) / np.where(spread > 0, spread, 1)
+    frequency = rng.normal(0, 1.0, (values.shape[1], count))
+    return np.asarray(np.cos(scaled @ frequency + rng.uniform(0, 2 * np.pi, count)))
+
+
+def _smooth_signs(velocity: Array) -> Array:
+    top = max(float(np.abs(velocity).max()), 1e-9)
+    return np.column_stack([np.tanh(velocity / (speed * top)) for speed in SIGN_WIDTHS])
+
+
+def _lags(observed: Observed, values: Array) -> Array:
+    """First-order lags of a signal, run by run."""
+    lengths = np.cumsum([len(each.torque) for each in observed.signals])[:-1]
+    out = []
+    for memory in MEMORIES_S:
+        keep = float(np.exp(-1 / (memory * observed.rate_hz)))
+        parts = [lfilter([1 - keep], [1, -keep], part, zi=[keep * part[0]])[0] for part in np.split(values, lengths)]
+        out.append(np.concatenate(parts))
+    return np.column_stack(out)
+
+
+BLOCK_S = 1.0  # s: stretches of time that are compared on held-out data
+MIN_NOISE_GAIN = 0.02  # of the held-out error, for the noise
+MIN_STRUCTURE_GAIN = 0.03  # of the held-out error: less may be what known effects are known too little of
+STRUCTURE_LEVEL = 0.05  # p-value below which a prediction counts as no noise: else whitening would hide what is slow
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """What a surrogate predicts of a joint's residual.
+
+    gain: share by which the whitened held-out error falls, p_value: of chance making that (see `Gain`); the surer of
+    validation rows and of identification stretches held out in turn. validated: on validation rows alone. share: of
+    the validation variance as it is. prediction: (rows,), N m. depends_on: variables, most important first.
+    """
+
+    joint: int
+    gain: float
+    p_value: float
+    validation_gain: float
+    share: float
+    prediction: Array
+    depends_on: tuple[str, ...]
+
+
+def predict_structure(residual: Array, joint: int, made: Features, observed: Observed) -> Array:
+    """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
+    products = tuple(made.values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
+    ridge, weights = best_ridge(made.grams, products)
+    predicted = made.values @ weights
+    rows = rows_in(observed.of_role("validate", joint), observed.rows)
+    numbers, learn = block_numbers(observed, BLOCK_S), made.folds >= 0
+    validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
+    turned = errors_in_turn(made.values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
+    inside = held_out_gain(residual[learn], turned, numbers[learn])
+    sure = any(each.share > MIN_NOISE_GAIN and each.chance < STRUCTURE_LEVEL for each in (validated, inside))
+    return predicted if sure else np.zeros(len(residual))
+
+
+def find_structure(residual: Array, joint: int, made: Features, noise: Noise, observed: Observed) -> Structure:
+    """What the features predict of a residual (rows,) of a joint: whitened, or as it is.
+
+    A slow structure that no surrogate foretold has passed for coloured noise, and whitening would hide it. As slow
+    noise would pass for structure, it counts only if validation runs have it, too.
+    """
+    plain = Noise(tuple(np.ones(1) for _ in noise.taps), tuple(1.0 for _ in noise.taps), noise.resting)
+    whitened, raw = (_find_structure(residual, joint, made, each, observed) for each in (noise, plain))
+    ways = [whitened, raw] if raw.validation_gain > MIN_STRUCTURE_GAIN else [whitened]
+    return min(ways, key=lambda each: (each.gain <= MIN_STRUCTURE_GAIN, each.p_value))
+
+
+def _order_of_doubt(gain: Gain) -> tuple[bool, float]:
+    return gain.share <= MIN_STRUCTURE_GAIN, gain.chance
+
+
+def _find_structure(residual: Array, joint: int, made: Features, noise: Noise, observed: Observed) -> Structure:
+    learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
+    both = (*learn, *judge)
+    white, target = noise.whitened(made.values, joint, both), noise.whitened(residual[:, None], joint, both)[:, 0]
+    lost = noise.lost(joint)
+    known = np.arange(len(target)) < sum(each.stop - each.start - lost for each in learn)
+    grams, products, thirds = products_by_third(
+        white, target, _stretch_numbers(both, lost, observed, FOLD_S) % 3, known
+    )
+    ridge, weights = best_ridge(grams, products)
+    blocks = _stretch_numbers(both, lost, observed, BLOCK_S)
+    validated = held_out_gain(target[~known], target[~known] - white[~known] @ weights, blocks[~known])
+    all_grams, all_products, folds = products_by_third(white, target, thirds, np.ones(len(target), dtype=bool))
+    turned = errors_in_turn(white, target, folds, ridge, all_grams, all_products)
+    inside = held_out_gain(target, turned, blocks)
+    best = min((validated, inside), key=_order_of_doubt)
+    rows = rows_in(judge, observed.rows)
+    prediction = made.values @ weights
+    if best is inside:
+        prediction[rows] = predict_in_turn(made.values, rows, observed, ridge, all_grams, all_products)
+    power = float(np.mean(residual[rows] ** 2))
+    share = 1 - float(np.mean((residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
+    pair = (white[~known], target[~known]) if best is validated else (white, target)
+    worth = best.share > MIN_STRUCTURE_GAIN
+    found = _important_variables(made, np.sum(grams, axis=0), np.sum(products, axis=0), pair, ridge) if worth else ()
+    return Structure(joint, best.share, best.chance, validated.share, share, prediction, found)
+
+
+def _important_variables(
+    made: Features, gram: Array, products: Array, judged: tuple[Array, Array], ridge: float
+) -> tuple[str, ...]:
+    """Variables without which the gain falls by a tenth or more, most important first."""
+    columns, target = judged
+    power = float(target @ target)
+
+    def gain(kept: NDArray[np.bool_]) -> float:
+        own = gram[np.ix_(kept, kept)] + ridge * np.eye(int(kept.sum()))
+        weights = np.linalg.solve(own, products[kept])
+        return 1 - float(np.sum((target - columns[:, kept] @ weights) ** 2)) / power
+
+    whole, lost = gain(np.ones(len(products), dtype=bool)), {}
+    for variable in sorted(frozenset().union(*made.variables)):
+        lost[variable] = whole - gain(np.array([variable not in each for each in made.variables]))
+    important = [name for name in sorted(lost, key=lambda each: -lost[each]) if lost[name] > 0.1 * whole]
+    return tuple(important[:4]) or tuple(sorted(lost, key=lambda each: -lost[each])[:1])
+
+
+def _stretch_numbers(segments: Sequence[Segment], lost: int, observed: Observed, length_s: float) -> NDArray[np.intp]:
+    """Number of the stretch of time of each whitened row."""
+    numbers = block_numbers(observed, length_s)
+    return np.concatenate([numbers[each.start + lost : each.stop] for each in segments])

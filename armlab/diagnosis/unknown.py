@@ -1,0 +1,87 @@
+"""Structure that the library leaves: findings without a name, and names that it contradicts."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armlab.diagnosis.data import rows_in
+from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.noise import Noise
+from armlab.diagnosis.result import Claim
+from armlab.diagnosis.solver import State
+from armlab.diagnosis.surrogate import MIN_STRUCTURE_GAIN, Structure, feature_banks, find_structure
+from armlab.effects.next_experiment import next_experiment
+from recordings.run import Array
+
+HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
+UNKNOWN_LEVEL = 0.03  # of the test between stretches of time, after all surrogates that were tried
+
+
+def predict_residual_structure(found: FittedModel, noise: Noise) -> tuple[Structure, ...]:
+    """What surrogates predict of each joint's residual, friction and offsets fitted that may not be claimed."""
+    usual = {number for number, unusual in enumerate(found.solver.unusual) if not unusual}
+    state = State(tuple(sorted({*found.state.groups, *usual})), found.state.widths)
+    residual = found.residual(found.solver.fit(state))
+    return tuple(_surest_structure(found, residual[:, joint], joint, noise) for joint in range(residual.shape[1]))
+
+
+def _surest_structure(found: FittedModel, residual: Array, joint: int, noise: Noise) -> Structure:
+    """What the surest surrogate predicts of a joint's residual (rows,), its p-value that of the best of all."""
+    observed = found.bench.observed
+    few = feature_banks(observed, joint, observed.torque[:, joint] - residual)
+    tried = [find_structure(residual, joint, each, noise, observed) for each in (found.bench.features[joint], *few)]
+    best = min(tried, key=lambda each: (each.gain <= MIN_STRUCTURE_GAIN, each.p_value))
+    return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
+
+
+def is_structured(each: Structure) -> bool:
+    """Whether it is more than chance, and large enough to matter."""
+    return each.gain > MIN_STRUCTURE_GAIN and each.p_value < UNKNOWN_LEVEL
+
+
+def make_unknown_claim(found: FittedModel, each: Structure, residual: Array) -> Claim:
+    """The finding `unknown` at a joint, with its surrogate's prediction."""
+    observed = found.bench.observed
+    rows = rows_in(observed.of_role("validate", each.joint), observed.rows)
+    before = float(np.sqrt(np.mean(residual[rows, each.joint] ** 2)))
+    after = float(np.sqrt(np.mean((residual[rows, each.joint] - each.prediction[rows]) ** 2)))
+    tried = observed.joints
+    evidence = Evidence(
+        each.joint, each.p_value, min(1.0, each.p_value * tried), each.gain, each.p_value, each.validation_gain,
+        before, after,
+        -0.5 * len(residual) * float(np.log(max(1 - each.gain, 1e-6))),
+    )  # fmt: skip
+    prediction = np.zeros(residual.shape)
+    prediction[:, each.joint] = each.prediction
+    joint = each.joint + 1
+    return Claim(
+        "unknown", joint, (joint,), (), f"tau_{joint} += f({', '.join(each.depends_on)})", evidence, prediction,
+        next_experiment=next_experiment("unknown", ()), depends_on=each.depends_on,
+    )  # fmt: skip
+
+
+MAX_RESIDUAL_RATIO = 1.0  # of the held-out error power that a law explains
+FORM_ERROR_SHARE = 0.25  # of the same: what the form of a law may be wrong by
+
+
+def names_contradicted_by_residual(claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> frozenset[int]:
+    """The groups or links whose names do not hold; friction and offsets, which every arm has, keep theirs."""
+    over = {each.joint: _predicted_share(each) for each in left if is_structured(each)}
+    return frozenset(
+        number
+        for number, each in claimed.items()
+        if not each.usual and over.get(each.joint, 0.0) > MAX_RESIDUAL_RATIO * each.gain
+    )
+
+
+def is_form_error(each: Structure, effects: Mapping[int, Evidence]) -> bool:
+    """Whether structure is what the form of a law that is named at this joint leaves."""
+    explained = [own.gain for own in effects.values() if own.joint == each.joint and not own.usual]
+    return _predicted_share(each) <= FORM_ERROR_SHARE * max(explained, default=0.0)
+
+
+def _predicted_share(each: Structure) -> float:
+    """Of what the surrogate predicts, as a share of the error that the model leaves."""
+    return each.gain / (1 + each.gain)

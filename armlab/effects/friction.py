@@ -1,0 +1,359 @@
+"""Friction without memory: Coulomb, viscous, powers of velocity, Stribeck, by direction, by load."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from armlab.effects.contract import Scene, Value
+from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number, format_sum, top_speed
+from problem.arm import Arm
+from recordings.run import Array
+from recordings.vocabulary import VISCOUS
+
+PARTS_PER_SAMPLE = 4  # of a sample's interval, for friction with memory
+
+
+def direction_of_motion(scene: Scene, *joints: int) -> Array:
+    """Mean of sgn(qd) over the interval from half a sample before to half a sample after, (samples,).
+
+    joints: from 0; of several, the sign of the sum of their velocities. The velocity is taken as a straight line
+    within the interval. The sign at the sample itself is off by up to one at each reversal, and by as much as the
+    sampling is slow.
+    """
+    velocity = scene.motion.velocity[:, list(joints)].sum(axis=1)
+    change = np.abs(scene.motion.acceleration[:, list(joints)].sum(axis=1)) * scene.step / 2
+    steady = change <= np.abs(velocity)
+    return np.asarray(np.where(steady, np.sign(velocity), velocity / np.where(steady, 1.0, change)))
+
+
+def directions_apart(scene: Scene, joint: int) -> tuple[Array, Array]:
+    """Shares of that interval that a joint, from 0, moves forwards, and (negative) backwards: (samples,) each."""
+    side = direction_of_motion(scene, joint)
+    return (1 + side) / 2, (side - 1) / 2
+
+
+def positions_within_samples(scene: Scene, joint: int) -> Array:
+    """Positions of a joint, from 0, at the middles of four parts of each sample's interval: (4 * samples,)."""
+    motion = scene.motion
+    shift = ((np.arange(PARTS_PER_SAMPLE) + 0.5) / PARTS_PER_SAMPLE - 0.5) * scene.step
+    way = motion.velocity[:, joint, None] * shift + motion.acceleration[:, joint, None] * shift**2 / 2
+    way[0] = np.where(shift > 0, way[0], 0.0)  # at rest before the run
+    return np.asarray((motion.position[:, joint, None] + way).ravel())
+
+
+def mean_within_samples(fine: Array) -> Array:
+    """Means over the parts of each sample's interval, (samples,)."""
+    return np.asarray(fine.reshape(-1, PARTS_PER_SAMPLE).mean(axis=1))
+
+
+POWER_EXPONENTS = (0.3, 0.5, 0.7, 1.5, 2.0, 3.0)
+POWER_EXPONENT_RANGE = (0.25, 4.0)
+
+
+@dataclass(frozen=True)
+class CoulombFriction(Term):
+    """level sgn(qd)."""
+
+    effect = "coulomb_friction"
+    names = ("level",)
+
+    def columns(self, scene: Scene) -> Array:
+        """The direction of motion."""
+        return self._stacked(direction_of_motion(scene, self.own))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The level."""
+        return {"level": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau_{self.joint} += {format_number(coefficients[0])} sgn(qd_{self.joint})"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a level."""
+        return cls.at(arm, joints[0]), np.array([parameters["level"]])
+
+
+@dataclass(frozen=True)
+class ViscousFriction(Term):
+    """coefficient qd."""
+
+    effect = "viscous_friction"
+    names = ("coefficient",)
+
+    def columns(self, scene: Scene) -> Array:
+        """The velocity."""
+        return self._stacked(scene.motion.velocity[:, self.own])
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The coefficient."""
+        return {"coefficient": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau_{self.joint} += {format_number(coefficients[0])} qd_{self.joint}"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a coefficient."""
+        return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
+
+
+@dataclass(frozen=True)
+class PowerFriction(Term):
+    """coefficient |qd|^exponent sgn(qd); shape: the exponent."""
+
+    effect = "nonlinear_viscous_friction"
+    names = ("coefficient", "exponent")
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Root, quadratic and cubic friction, and between."""
+        return [cls.at(arm, joint, shape=(exponent,), bounds=(POWER_EXPONENT_RANGE,)) for exponent in POWER_EXPONENTS]
+
+    def columns(self, scene: Scene) -> Array:
+        """The power of velocity with its sign."""
+        return self._stacked(signed_power(scene.motion.velocity[:, self.own], self.shape[0]))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """Coefficient and exponent."""
+        return {"coefficient": float(coefficients[0]), "exponent": self.shape[0]}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        own = self.joint
+        return f"tau_{own} += {format_number(coefficients[0])} |qd_{own}|^{format_number(self.shape[0])} sgn(qd_{own})"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a coefficient and an exponent."""
+        shape = (float(parameters["exponent"]),)
+        return cls.at(arm, joints[0], shape=shape, bounds=(POWER_EXPONENT_RANGE,)), np.array(
+            [parameters["coefficient"]]
+        )
+
+
+def signed_power(velocity: Array, exponent: float) -> Array:
+    """|velocity|^exponent with the sign of velocity."""
+    return np.asarray(np.sign(velocity) * np.abs(velocity) ** exponent)
+
+
+COULOMB_FRICTION = EveryJoint("coulomb_friction", (CoulombFriction,))
+VISCOUS_FRICTION = EveryJoint("viscous_friction", (ViscousFriction,))
+NONLINEAR_VISCOUS = EveryJoint("nonlinear_viscous_friction", (PowerFriction,))
+
+
+STRIBECK_SPEEDS = (0.01, 0.03, 0.1)  # Stribeck velocities of a first look
+STRIBECK_SPEED_RANGE = (0.002, 0.3)  # of the top speed
+STRIBECK_EXPONENTS = (1.0, 2.0)  # Tustin's, and the Gaussian
+STRIBECK_EXPONENT_RANGE = (0.5, 2.5)
+
+
+@dataclass(frozen=True)
+class StribeckFriction(Term):
+    """(level + (static_level - level) exp(-(|qd| / velocity)^exponent)) sgn(qd); shape: velocity, exponent."""
+
+    effect = "stribeck_friction"
+    names = ("level", "static_level", "velocity", "exponent")
+    replaces = ("coulomb_friction",)
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Velocities from a hundredth of the top speed up, with both usual exponents."""
+        top = top_speed(scenes, joint)
+        bounds = ((STRIBECK_SPEED_RANGE[0] * top, STRIBECK_SPEED_RANGE[1] * top), STRIBECK_EXPONENT_RANGE)
+        shapes = [(share * top, exponent) for share in STRIBECK_SPEEDS for exponent in STRIBECK_EXPONENTS]
+        return [cls.at(arm, joint, shape=shape, bounds=bounds) for shape in shapes]
+
+    def columns(self, scene: Scene) -> Array:
+        """Coulomb's column, and what static friction adds to it near rest."""
+        velocity = scene.motion.velocity[:, self.own]
+        side = direction_of_motion(scene, self.own)
+        return self._stacked(side, side * self._rise(velocity))
+
+    def _rise(self, velocity: Array) -> Array:
+        scale, exponent = self.shape
+        return np.asarray(np.exp(-((np.abs(velocity) / scale) ** exponent)))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """Both levels, velocity and exponent."""
+        level, rise = (float(value) for value in coefficients)
+        return {"level": level, "static_level": level + rise, "velocity": self.shape[0], "exponent": self.shape[1]}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        own, (scale, exponent) = self.joint, self.shape
+        inner = f"exp(-(|qd_{own}|/{format_number(scale)})^{format_number(exponent)})"
+        return f"tau_{own} += ({format_sum((coefficients[0], ''), (coefficients[1], inner))}) sgn(qd_{own})"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """Friction that feeds energy in, or that rises from rest."""
+        spread = 0.0 if covariance is None else SIGN_SIGMAS * float(np.sqrt(max(covariance[1, 1], 0.0)))
+        if coefficients[1] + spread < 0:
+            return "static friction below sliding friction"
+        return super().objection(coefficients, covariance)
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with its four parameters."""
+        level, static, scale, exponent = (float(parameters[name]) for name in cls.names)
+        bounds = ((scale / 10, scale * 10), STRIBECK_EXPONENT_RANGE)
+        return cls.at(arm, joints[0], shape=(scale, exponent), bounds=bounds), np.array([level, static - level])
+
+
+STRIBECK = EveryJoint("stribeck_friction", (StribeckFriction,))
+
+
+@dataclass(frozen=True)
+class ByDirection(Term):
+    """positive |qd|^exponent where qd > 0, -negative |qd|^exponent where qd < 0."""
+
+    effect = "asymmetric_friction"
+    names = ("positive", "negative", "exponent")
+    exponent: ClassVar[float]
+
+    def columns(self, scene: Scene) -> Array:
+        """The law forwards, and backwards."""
+        if not self.exponent:
+            return self._stacked(*directions_apart(scene, self.own))
+        velocity = scene.motion.velocity[:, self.own]
+        return self._stacked(np.maximum(velocity, 0), np.minimum(velocity, 0))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """One value a direction; both positive where they brake."""
+        return {"positive": float(coefficients[0]), "negative": float(coefficients[1]), "exponent": self.exponent}
+
+    def unit(self, name: str) -> str:
+        """Unit of a level or a slope."""
+        if name == "exponent":
+            return "1"
+        unit = super().unit(name)
+        return f"{unit}.s/{'rad' if self.kind == 'revolute' else 'm'}" if self.exponent else unit
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        what = f"|qd_{self.joint}|" if self.exponent else ""
+        forwards, backwards = format_sum((coefficients[0], what)), format_sum((-coefficients[1], what))
+        return f"tau_{self.joint} += {forwards} for qd_{self.joint} > 0, {backwards} for qd_{self.joint} < 0"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A direction in which it drives."""
+        spread = np.zeros(2) if covariance is None else SIGN_SIGMAS * np.sqrt(np.maximum(np.diag(covariance), 0))
+        # an offset of the sensor may exceed friction one way: only a loop that gains energy is impossible
+        loop = 0.0 if covariance is None else SIGN_SIGMAS * float(np.sqrt(max(covariance.sum(), 0.0)))
+        if coefficients.sum() + loop < 0:
+            return "friction that drives over a loop"
+        if self.exponent and np.any(coefficients + spread < 0):
+            return "friction that drives in one direction"
+        return None
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a value a direction; levels or slopes, as the exponent says."""
+        form = Levels if float(parameters["exponent"]) == 0 else Slopes
+        if form.exponent != float(parameters["exponent"]):
+            raise ValueError(f"exponent of asymmetric_friction should be 0 or 1, not {parameters['exponent']}")
+        chosen: Any = form.at(arm, joints[0])
+        return chosen, np.array([parameters["positive"], parameters["negative"]], dtype=float)
+
+
+@dataclass(frozen=True)
+class Slopes(ByDirection):
+    """Viscous friction by direction."""
+
+    form = "slopes"
+    exponent = 1.0
+    replaces = ("viscous_friction",)
+
+
+@dataclass(frozen=True)
+class Levels(ByDirection):
+    """Coulomb friction by direction."""
+
+    form = "levels"
+    exponent = 0.0
+    replaces = ("coulomb_friction", "torque_offset")
+
+
+@dataclass(frozen=True)
+class LevelsAndSlopes(Term):
+    """positive + positive_slope qd where qd > 0, -negative + negative_slope qd where qd < 0."""
+
+    effect = "asymmetric_friction"
+    form = "levels and slopes"
+    names = ("positive", "negative", "positive_slope", "negative_slope")
+    replaces = ("coulomb_friction", "viscous_friction", "torque_offset")
+
+    def columns(self, scene: Scene) -> Array:
+        """Both laws forwards and backwards."""
+        velocity = scene.motion.velocity[:, self.own]
+        forwards, backwards = np.maximum(velocity, 0), np.minimum(velocity, 0)
+        return self._stacked(*directions_apart(scene, self.own), forwards, backwards)
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """A level and a slope each direction; positive where they brake."""
+        return dict(zip(self.names, coefficients.tolist(), strict=True))
+
+    def unit(self, name: str) -> str:
+        """Unit of a level or a slope."""
+        if name.endswith("slope"):
+            return VISCOUS.unit_for(self.kind)
+        return super().unit(name)
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its numbers."""
+        own = f"qd_{self.joint}"
+        forwards = format_sum((coefficients[0], ""), (coefficients[2], own))
+        backwards = format_sum((-coefficients[1], ""), (coefficients[3], own))
+        return f"tau_{self.joint} += {forwards} for {own} > 0, {backwards} for {own} < 0"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A loop that gains energy at low speed, or at high."""
+        for place in (slice(0, 2), slice(2, 4)):
+            block = None if covariance is None else covariance[place, place]
+            spread = 0.0 if block is None else SIGN_SIGMAS * float(np.sqrt(max(float(block.sum()), 0.0)))
+            if coefficients[place].sum() + spread < 0:
+                return "friction that drives over a loop"
+        return None
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with its four parameters."""
+        return cls.at(arm, joints[0]), np.array([float(parameters[name]) for name in cls.names])
+
+
+ASYMMETRIC = EveryJoint("asymmetric_friction", (Levels, Slopes, LevelsAndSlopes))
+
+
+@dataclass(frozen=True)
+class LoadFriction(Term):
+    """coefficient |tau_rigid| sgn(qd): the load is what the links need, from the model, never measured."""
+
+    effect = "load_dependent_friction"
+    names = ("coefficient",)
+    follows_model = True
+
+    def columns(self, scene: Scene) -> Array:
+        """The load with the sign of motion."""
+        load = np.abs(scene.rigid_torque[:, self.own])
+        return self._stacked(load * direction_of_motion(scene, self.own))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The coefficient."""
+        return {"coefficient": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        own = self.joint
+        return f"tau_{own} += {format_number(coefficients[0])} |tau_rigid_{own}| sgn(qd_{own})"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with a coefficient."""
+        return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
+
+
+LOAD_DEPENDENT = EveryJoint("load_dependent_friction", (LoadFriction,))

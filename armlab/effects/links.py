@@ -1,0 +1,275 @@
+"""Bodies that the simulation does not have or has wrong: payloads and errors of a link's inertial parameters."""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from typing import Any, Self
+
+import numpy as np
+
+from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.term import SIGN_SIGMAS, Term, format_number
+from identification.pseudo_inertia import basis
+from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
+from problem.motion import Motion
+from problem.regressor import observation_matrix, rigid_body_torque
+from recordings.run import Array
+
+LINK_PROBES = 100  # random states that show which parameters an arm feels
+MIN_INDEPENDENT_SHARE = 1e-8  # of a column's length: below is rounding; its root for a smallest singular value
+
+
+def torque_of_parameters(scene: Scene, link: int, sets: Array) -> Array:
+    """Torque at the joints up to a link (from 1) for sets (sets, 10) of its parameters: (samples, link, sets)."""
+    motion = scene.motion
+    arm = scene.arm.first(link)  # joints behind the link do not feel it
+    part = Motion(*(each[:, :link] for each in (motion.position, motion.velocity, motion.acceleration)))
+    out = np.empty((len(scene.time), link, len(sets)))
+    for index, ten in enumerate(sets):
+        out[:, :, index] = rigid_body_torque(arm, part, np.append(np.zeros(10 * (link - 1)), ten))
+    return out
+
+
+@lru_cache(maxsize=64)
+def felt_parameters(arm: Arm, link: int) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Which of a link's ten parameters an arm feels: an independent set, and those that stand for themselves.
+
+    The others of the set stand for sums with parameters of the same link that are not in it.
+    """
+    matrix = _link_columns(arm, link)
+    lengths = np.linalg.norm(matrix, axis=0)
+    felt: list[int] = []
+    for index in np.flatnonzero(lengths > MIN_INDEPENDENT_SHARE * lengths.max()).tolist():
+        trial = matrix[:, [*felt, index]] / lengths[[*felt, index]]
+        if np.linalg.svd(trial, compute_uv=False)[-1] > MIN_INDEPENDENT_SHARE**0.5:
+            felt.append(index)
+    if not felt:
+        return (), ()
+    others = [index for index in range(10) if index not in felt]
+    sums = np.abs(np.linalg.lstsq(matrix[:, felt], matrix[:, others])[0]).max(axis=1, initial=0.0)
+    clear = tuple(index for index, share in zip(felt, sums, strict=True) if share < MIN_INDEPENDENT_SHARE**0.5)
+    return tuple(felt), clear
+
+
+def felt_values(arm: Arm, link: int, ten: Array) -> Array:
+    """Values of the felt parameters that act like all ten (10,)."""
+    matrix, (felt, _) = _link_columns(arm, link), felt_parameters(arm, link)
+    return np.asarray(np.linalg.lstsq(matrix[:, list(felt)], matrix @ ten)[0])
+
+
+def _link_columns(arm: Arm, link: int) -> Array:
+    probe = Motion(*np.random.default_rng(1).uniform(-2, 2, (3, LINK_PROBES, len(arm))))
+    return observation_matrix(arm, probe)[:, 10 * (link - 1) : 10 * link]
+
+
+@dataclass(frozen=True)
+class LinkTerm(Term):
+    """An effect of a link: the joints before it feel it."""
+
+    @classmethod
+    def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
+        """The effect at a link, from 1."""
+        return cls(joint, (joint,), tuple(range(joint)), **details)
+
+    @property
+    def link(self) -> int:
+        """The link, from 1."""
+        return self.joints[0]
+
+    @classmethod
+    @abstractmethod
+    def is_visible(cls, arm: Arm, link: int) -> bool:
+        """Whether the arm's torques show it."""
+
+
+@dataclass(frozen=True)
+class Body(LinkTerm):
+    """Up to ten inertial parameters: those that the arm feels.
+
+    felt: indices of an independent set of the ten. clear: those of them that stand for themselves, in no sum with
+    others. Where all are clear they are told as mass, centre and inertia; else each by its own name, one that is
+    not clear standing for the sum that the arm feels.
+    """
+
+    names = ("mass", "centre", "inertia")
+    felt: tuple[int, ...] = tuple(range(10))
+    clear: tuple[int, ...] = tuple(range(10))
+
+    @classmethod
+    def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
+        """The effect at a link, from 1."""
+        felt, clear = felt_parameters(arm, joint)
+        return super().at(arm, joint, felt=felt, clear=clear, **details)
+
+    def columns(self, scene: Scene) -> Array:
+        """Torque of each felt parameter at one."""
+        return torque_of_parameters(scene, self.link, np.eye(10)[list(self.felt)])
+
+    def ten(self, coefficients: Array) -> Array:
+        """All ten parameters about the link's frame, zero where nothing is felt."""
+        full = np.zeros(10)
+        full[list(self.felt)] = coefficients
+        return full
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """Mass, centre and inertia of what is added, about the link's frame; or what the arm feels of them."""
+        ten = self.ten(coefficients)
+        if len(self.clear) == 10 and ten[0]:
+            centre, inertia = tuple((ten[1:4] / ten[0]).tolist()), tuple(ten[4:].tolist())
+            return {"mass": float(ten[0]), "centre": centre, "inertia": inertia}
+        return {self._name(index): float(ten[index]) for index in self.felt}
+
+    def _name(self, index: int) -> str:
+        return "mass" if index == 0 and index in self.clear else PARAMETER_NAMES[index]
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter."""
+        return PARAMETER_UNITS[PARAMETER_NAMES.index(name)] if name in PARAMETER_NAMES else super().unit(name)
+
+    def equation(self, coefficients: Array) -> str:
+        """The parameters with their numbers."""
+        named = zip(self.felt, coefficients.tolist(), strict=True)
+        return ", ".join(f"{PARAMETER_NAMES[index]}_{self.link} += {format_number(value)}" for index, value in named)
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The body with mass, centre and inertia about the link's frame, or with single ones of the ten."""
+        unknown = set(parameters) - {*cls.names, *PARAMETER_NAMES}
+        if unknown:
+            raise ValueError(f"{cls.effect} has parameters {', '.join(cls.names)}, not {', '.join(sorted(unknown))}")
+        ten = np.array([float(parameters.get(name, 0.0)) for name in PARAMETER_NAMES])
+        ten[0] += float(parameters.get("mass", 0.0))
+        ten[1:4] += ten[0] * np.array(parameters.get("centre", np.zeros(3)))
+        ten[4:] += np.array(parameters.get("inertia", np.zeros(6)))
+        return cls.at(arm, joints[0]), felt_values(arm, joints[0], ten)
+
+
+@dataclass(frozen=True)
+class LinkFamily(Family):
+    """One place a form and link that shows it."""
+
+    effect: str
+    terms: tuple[type[LinkTerm], ...]
+
+    def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
+        """Each form at each link."""
+        places = [(term, link) for term in self.terms for link in range(1, len(arm) + 1) if term.is_visible(arm, link)]
+        return [list(term.initial_shapes(arm, link, scenes)) for term, link in places]
+
+    def from_parameters(
+        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
+    ) -> tuple[Candidate, Array]:
+        """The form of that name, or a point where a centre but no inertia is given; joints: the link."""
+        point = "centre" in parameters and "inertia" not in parameters
+        wanted = form or ("point" if point else self.terms[0].form)
+        for term in self.terms:
+            if term.form == wanted:
+                return term.from_parameters(arm, joints, parameters)
+        raise ValueError(f"{self.effect} has the forms {', '.join(term.form for term in self.terms)}, not {wanted}")
+
+
+MAX_CENTRE_M = 0.5  # m: a payload's centre is no further from its link's frame
+POINT_CENTRES = tuple(product((0.0, 0.15), repeat=3))  # m, of a first look
+
+
+@dataclass(frozen=True)
+class Payload(Body):
+    """A body carried by a link: a body has a positive semidefinite pseudo-inertia (Wensing, Kim and Slotine 2018)."""
+
+    effect = "payload"
+    form = "body"
+
+    @classmethod
+    def is_visible(cls, arm: Arm, link: int) -> bool:
+        """Whether the arm can weigh the link."""
+        return 0 in felt_parameters(arm, link)[1]
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A payload that no body can be: of negative mass, or with an impossible spread of it."""
+        if len(self.felt) < 10:
+            return _negative_mass(coefficients[self.felt.index(0)], covariance, self.felt.index(0))
+        values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", self.ten(coefficients), basis()))
+        slopes = np.einsum("a,pab,b->p", vectors[:, 0], basis(), vectors[:, 0])
+        spread = (
+            0.0 if covariance is None else SIGN_SIGMAS * float(np.sqrt(max(float(slopes @ covariance @ slopes), 0.0)))
+        )
+        if values[0] + spread + 1e-9 * abs(values[-1]) < 0:
+            return "no body has such a mass, centre and inertia"
+        return None
+
+
+@dataclass(frozen=True)
+class PointPayload(LinkTerm):
+    """A mass at one point of a link; shape: the point in the link's frame, m."""
+
+    effect = "payload"
+    form = "point"
+    names = ("mass", "centre")
+
+    @classmethod
+    def is_visible(cls, arm: Arm, link: int) -> bool:
+        """On the flange alone, if it feels where a mass is: elsewhere a small mass is a wrong number of the link."""
+        return link == len(arm) and bool({1, 2, 3} & set(felt_parameters(arm, link)[0]))
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """The link's frame, and points around it."""
+        return [
+            cls.at(arm, joint, shape=centre, bounds=((-MAX_CENTRE_M, MAX_CENTRE_M),) * 3) for centre in POINT_CENTRES
+        ]
+
+    def columns(self, scene: Scene) -> Array:
+        """Torque of one kilogram there."""
+        x, y, z = self.shape
+        ten = [1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
+        return torque_of_parameters(scene, self.link, np.array([ten]))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """Mass and centre."""
+        return {"mass": float(coefficients[0]), "centre": self.shape}
+
+    def equation(self, coefficients: Array) -> str:
+        """The mass and where it is."""
+        place = ", ".join(format_number(value) for value in self.shape)
+        return f"link {self.link} carries {format_number(coefficients[0])} kg at ({place}) m"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A negative mass."""
+        return _negative_mass(coefficients[0], covariance, 0)
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The mass at its centre."""
+        centre = tuple(float(value) for value in parameters["centre"])
+        return cls.at(arm, joints[0], shape=centre, bounds=((-MAX_CENTRE_M, MAX_CENTRE_M),) * 3), np.array(
+            [parameters["mass"]]
+        )
+
+
+def _negative_mass(mass: float, covariance: Array | None, place: int) -> str | None:
+    spread = 0.0 if covariance is None else SIGN_SIGMAS * float(np.sqrt(max(covariance[place, place], 0.0)))
+    return "a negative mass" if mass + spread < 0 else None
+
+
+PAYLOAD = LinkFamily("payload", (Payload, PointPayload))
+
+
+@dataclass(frozen=True)
+class InertialError(Body):
+    """What has to be added to a link's parameters, of either sign."""
+
+    effect = "inertial_parameter_error"
+
+    @classmethod
+    def is_visible(cls, arm: Arm, link: int) -> bool:
+        """Whether the arm feels anything of the link."""
+        return bool(felt_parameters(arm, link)[0])
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """None: the simulation's link may be too heavy as well as too light."""
+        return None
+
+
+INERTIAL_ERROR = LinkFamily("inertial_parameter_error", (InertialError,))

@@ -1,0 +1,150 @@
+"""What most effects share: a place at one joint, units of the vocabulary, positive parameters."""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from armlab.effects.contract import Candidate, Family, Scene, Value
+from problem.arm import Arm
+from recordings.run import Array
+from recordings.vocabulary import Kind, effect_named
+
+SIGN_SIGMAS = 2.0  # standard errors beyond which a sign counts as wrong
+DERIVATIVE_STEP = 1e-6  # of a coefficient, for derivatives of named parameters
+MIN_TRAVEL = 1e-3  # rad (m): a joint that moves less has no friction or stiffness to show
+
+
+@dataclass(frozen=True)
+class Term(Candidate):
+    """An effect at one joint: the place, and what follows from the vocabulary.
+
+    names: parameters as `parameters` gives them; a model file with these names means this form. kind: how the
+    joint moves, for units.
+    """
+
+    joint: int | None
+    joints: tuple[int, ...]
+    rows: tuple[int, ...]
+    kind: Kind = "revolute"
+    shape: tuple[float, ...] = ()
+    bounds: tuple[tuple[float, float], ...] = ()
+    looks: int = 1
+    names: ClassVar[tuple[str, ...]]
+
+    @classmethod
+    def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
+        """The effect at a joint, from 1."""
+        return cls(joint, (joint,), (joint - 1,), arm.joints[joint - 1].kind, **details)
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """The effect at a joint with each shape worth a first look."""
+        return [cls.at(arm, joint)]
+
+    @classmethod
+    @abstractmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect and the coefficients that have these parameters."""
+
+    @property
+    def own(self) -> int:
+        """The joint where the torque appears, from 0."""
+        return self.rows[0]
+
+    def with_shape(self, shape: tuple[float, ...]) -> Self:
+        """The same effect at the same place with other nonlinear parameters."""
+        return replace(self, shape=shape)
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter, from the vocabulary."""
+        return effect_named(self.effect).parameter(name).unit_for(self.kind)
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """Names the parameter that should be positive and is not."""
+        positive = {each.name for each in effect_named(self.effect).parameters if each.positive}
+        for name, value in self.parameters(coefficients).items():
+            if (
+                name in positive
+                and isinstance(value, float)
+                and value + self._doubt(name, coefficients, covariance) < 0
+            ):
+                return f"{name} {value:.3g} {self.unit(name)} should be positive"
+        return None
+
+    def _doubt(self, name: str, coefficients: Array, covariance: Array | None) -> float:
+        """CERTAIN standard errors of a scalar parameter, by the delta method."""
+        if covariance is None:
+            return 0.0
+        slope = np.empty(len(coefficients))
+        for index, change in enumerate(np.diag(DERIVATIVE_STEP * np.maximum(np.abs(coefficients), 1e-12))):
+            more, less = (self.parameters(coefficients + sign * change)[name] for sign in (1, -1))
+            slope[index] = (np.asarray(more) - np.asarray(less)) / (2 * change[index])
+        return SIGN_SIGMAS * float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
+
+    def _stacked(self, *columns: Array) -> Array:
+        """Columns (samples,) of one joint as the contract wants them."""
+        return np.stack(columns, axis=-1)[:, None, :]
+
+
+@dataclass(frozen=True)
+class EveryJoint(Family):
+    """A family whose places are the joints, in one form or several.
+
+    resting: whether a joint that never moves can show it, too.
+    """
+
+    effect: str
+    terms: tuple[type[Term], ...]
+    resting: bool = False
+
+    def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
+        """One list for each form at each joint that moves."""
+        joints = [joint for joint in range(1, len(arm) + 1) if self.resting or joint_moves(scenes, joint)]
+        places = [list[Candidate](term.initial_shapes(arm, joint, scenes)) for term in self.terms for joint in joints]
+        return [place for place in places if place]
+
+    def from_parameters(
+        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
+    ) -> tuple[Candidate, Array]:
+        """The form that has these names, with its coefficients; ValueError for other names."""
+        return form_from_parameters(self.terms, arm, joints, parameters, form)
+
+
+def form_from_parameters(
+    terms: Sequence[type[Term]], arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str
+) -> tuple[Candidate, Array]:
+    """The form of that name, or the one with the most names among the parameters; ValueError for none."""
+    named = [term for term in terms if not form or term.form == form]
+    for term in sorted(named, key=lambda each: -len(each.names)):
+        if set(term.names) <= set(parameters):
+            return term.from_parameters(arm, joints, parameters)
+    if not named:
+        raise ValueError(f"{terms[0].effect} has the forms {', '.join(term.form for term in terms)}, not {form}")
+    wanted = " or ".join(", ".join(term.names) for term in named)
+    raise ValueError(f"{terms[0].effect} has parameters {wanted}, not {', '.join(parameters) or 'none'}")
+
+
+def joint_moves(scenes: Sequence[Scene], joint: int) -> bool:
+    """Whether a joint (from 1) moves in any run."""
+    return any(np.ptp(scene.motion.position[:, joint - 1]) > MIN_TRAVEL for scene in scenes)
+
+
+def top_speed(scenes: Sequence[Scene], joint: int) -> float:
+    """Highest speed of a joint (from 1) over all runs, rad/s (m/s)."""
+    return max(float(np.abs(scene.motion.velocity[:, joint - 1]).max()) for scene in scenes)
+
+
+def format_number(value: float) -> str:
+    """A number for an equation: four digits."""
+    return f"{value:.4g}"
+
+
+def format_sum(*terms: tuple[float, str]) -> str:
+    """`2 sgn(qd_1) - 0.5 qd_1` of coefficients and what they multiply."""
+    text = " ".join(
+        f"{'-' if value < 0 else '+'} {format_number(abs(value))}{' ' + what if what else ''}" for value, what in terms
+    )
+    return text.removeprefix("+ ") if text.startswith("+") else text.replace("- ", "-", 1)

@@ -1,0 +1,147 @@
+"""Channels that were recorded late: the torque of all joints, or one channel.
+
+Built from finite shifts of the model's torque, for friction jumps where a derivative would be infinite.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.sensitivity import delay_signal, directional_derivative
+from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
+from problem.arm import Arm
+from problem.motion import Motion
+from recordings.run import Array
+
+SHIFTS = (1e-3, 4e-3, -4e-3)  # s, of a first look
+LONGEST = 0.03  # s
+
+
+@dataclass(frozen=True)
+class LateTorque(Term):
+    """tau(t - seconds) instead of tau(t) at its joints; shape: the shift that the column is made of, s.
+
+    The column is (tau(t - shift) - tau(t)) / shift, so that the coefficient is the delay in seconds: exact
+    where it is the shift, first order elsewhere.
+    """
+
+    follows_model = True
+    of_channel = True
+    names = ("seconds",)
+
+    def columns(self, scene: Scene) -> Array:
+        """One column, at all its joints."""
+        torque, shift = scene.torque[:, list(self.rows)], self.shape[0]
+        return ((delay_signal(scene, torque, shift) - torque) / shift)[:, :, None]
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """Seconds, positive where torque lags."""
+        return {"seconds": float(coefficients[0])}
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Both signs: at a jump of friction they differ."""
+        return [cls.at(arm, joint, shape=(shift,), bounds=((-LONGEST, LONGEST),)) for shift in SHIFTS]
+
+    def with_shape(self, shape: tuple[float, ...]) -> Self:
+        """The same with another shift, kept away from zero, where the column would be 0 / 0."""
+        return super().with_shape((float(np.copysign(max(abs(shape[0]), 1e-5), shape[0])),))
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with its delay."""
+        seconds = float(parameters["seconds"])
+        late = cls.at(arm, joints[0] if joints else 1, shape=(1e-3,), bounds=((-LONGEST, LONGEST),))
+        return late.with_shape((seconds,)), np.array([seconds])
+
+
+@dataclass(frozen=True)
+class TimeDelay(LateTorque):
+    """Torque of all joints late."""
+
+    effect = "time_delay"
+
+    @classmethod
+    def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
+        """The effect of the whole robot."""
+        return cls(None, (), tuple(range(len(arm))), **details)
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau(t) = tau_model(t - {format_number(coefficients[0])} s)"
+
+
+@dataclass(frozen=True)
+class TorqueSkew(LateTorque):
+    """Torque of one joint late."""
+
+    effect = "channel_skew"
+    form = "torque"
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"tau_{self.joint}(t) = tau_model_{self.joint}(t - {format_number(coefficients[0])} s)"
+
+
+@dataclass(frozen=True)
+class PositionSkew(Term):
+    """Position of one joint early by `seconds` against everything else: its torque seems late."""
+
+    effect = "channel_skew"
+    form = "position"
+    names = ("seconds",)
+    follows_model = True
+
+    @classmethod
+    def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
+        """The effect at a joint; every joint's torque feels it."""
+        return cls(joint, (joint,), tuple(range(len(arm))), **details)
+
+    def columns(self, scene: Scene) -> Array:
+        """Derivative of the rigid torque when this joint runs later."""
+        index = self.joint - 1 if self.joint else 0
+        motion, change = scene.motion, np.zeros((3, *scene.motion.position.shape))
+        change[0, :, index] = -motion.velocity[:, index]
+        change[1, :, index] = -motion.acceleration[:, index]
+        change[2, :, index] = -np.gradient(motion.acceleration[:, index], scene.step)
+        column = directional_derivative(scene, Motion(*change))
+        friction = scene.torque[:, index] - scene.rigid_torque[:, index]  # follows this joint's motion, too
+        column[:, index] += (delay_signal(scene, friction, SHIFTS[0]) - friction) / SHIFTS[0]
+        return column[:, :, None]
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """Seconds, positive where torque lags behind this position."""
+        return {"seconds": float(coefficients[0])}
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        return f"q_{self.joint}(t) = q_recorded_{self.joint}(t - {format_number(coefficients[0])} s)"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The effect with its delay."""
+        return cls.at(arm, joints[0]), np.array([parameters["seconds"]])
+
+
+@dataclass(frozen=True)
+class DelayFamily(Family):
+    """One place: the whole robot."""
+
+    effect: str = "time_delay"
+
+    def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
+        """The delay with each shift of a first look."""
+        return [list(TimeDelay.initial_shapes(arm, 1, scenes))]
+
+    def from_parameters(
+        self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
+    ) -> tuple[Candidate, Array]:
+        """The delay with its seconds."""
+        return form_from_parameters((TimeDelay,), arm, joints, parameters, form)
+
+
+TIME_DELAY = DelayFamily()
+CHANNEL_SKEW = EveryJoint("channel_skew", (TorqueSkew, PositionSkew))

@@ -1,0 +1,273 @@
+"""A drive train that gives: elastic joints and play.
+
+The link's angle is q = theta + twist, theta the recorded angle of the motor. The links ask for the rigid torque at
+theta and, to first order, for their own inertia times the acceleration of the twist; the drive train gives the force
+of its spring or of its walls: inertia twist'' = -load - force(twist, twist'). It is integrated in time.
+"""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from armlab.effects._drive_train import ffi, lib
+
+from armlab.effects.contract import Candidate, Scene, Value
+from armlab.effects.sensitivity import directional_derivative, joint_displacement
+from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
+from problem.arm import Arm
+from problem.motion import Motion
+from problem.native import pointer
+from recordings.run import Array
+
+PHASE_STEP = 0.1  # rad of the fastest oscillation a step
+WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
+MAX_RESONANCE_HZ = 400.0  # of a resonance: stiffer springs follow their load at once, whatever the model's inertia is
+MIN_INERTIA_RATIO = (
+    0.01  # of the greatest inertia that the joint feels in the run: a model may be wrong enough to have less
+)
+
+
+@dataclass(frozen=True)
+class Twist:
+    """Stiffness in N m/rad, damping_time in s (damping over stiffness); or a gap in rad."""
+
+    stiffness: float = 0.0
+    damping_time: float = 0.0
+    gap: float = 0.0
+
+
+def felt_inertia(scene: Scene, joint: int) -> Array:
+    """Inertia that a joint (from 0) feels of the links, its rotor left out, (samples,), kg m2 (kg): above zero."""
+    inertia = scene.own_inertia[:, joint]
+    return np.maximum(inertia, max(MIN_INERTIA_RATIO * float(np.abs(inertia).max()), 1e-9))
+
+
+def integrate_twist(scene: Scene, joint: int, law: Twist) -> Array:
+    """Twist of a joint (from 0), its speed and its acceleration, (3, samples); at rest with its load at the start."""
+    slow = 0.0 if law.gap > 0 else law.stiffness / (2 * np.pi * MAX_RESONANCE_HZ) ** 2
+    inertia = np.maximum(felt_inertia(scene, joint), slow)
+    load = np.ascontiguousarray(scene.rigid_torque[:, joint])
+    wall = 2 * np.pi * WALL_HZ
+    stiffness, damping = (wall**2, 2 * wall) if law.gap > 0 else (law.stiffness, law.damping_time * law.stiffness)
+    train = ffi.new("DriveTrain *", [stiffness, damping, law.gap])
+    out = np.empty((3, len(load)))
+    lib.twist_of_drive_train(
+        train, len(load), scene.step, _half_steps(scene, law, inertia), pointer(load),
+        pointer(np.ascontiguousarray(inertia)), pointer(out),
+    )  # fmt: skip
+    return out
+
+
+def _half_steps(scene: Scene, law: Twist, inertia: Array) -> int:
+    """Half the steps from sample to sample that follow the fastest oscillation."""
+    if law.gap > 0:
+        return int(np.ceil(scene.step * 2 * np.pi * WALL_HZ / PHASE_STEP / 2))
+    pitch = float(np.sqrt(law.stiffness / inertia.min()))
+    return int(np.ceil(scene.step * max(pitch, law.damping_time * pitch**2) / PHASE_STEP / 2))
+
+
+RIGID_HZ = 200.0  # a resonance that no recording shows: the twist follows the load at once
+MIN_RESONANCE_HZ = 3.0
+RESONANCES_HZ = (RIGID_HZ, 25.0)  # for a first look
+DAMPING_TIME = 3e-4  # s, of steel gears: a fiftieth of the critical damping at 20 Hz
+GAPS = (1e-4, 6e-4, 4e-3)  # rad, for a first look
+GAP_RANGE = (1e-5, 5e-2)
+SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 16)
+KEPT_GAPS = 2  # gaps of a scan
+
+
+@dataclass(frozen=True)
+class Transmission(Term):
+    """A twist of the drive train by the load that it carries, per unit of the coefficient; all joints feel it.
+
+    measured: factor of the recorded difference between link and motor, where there is one: then the columns
+    follow the difference itself, scaled to the law.
+    """
+
+    follows_model = True
+    measured: float | None = None
+
+    @classmethod
+    def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
+        """The effect at a joint, felt by all."""
+        return cls(joint, (joint,), tuple(range(len(arm))), arm.joints[joint - 1].kind, **details)
+
+    @property
+    def index(self) -> int:
+        """The joint that gives, from 0."""
+        return self.joints[0] - 1
+
+    @property
+    @abstractmethod
+    def law(self) -> tuple[Twist, float]:
+        """The drive train of this shape, and the coefficient that it has."""
+
+    def with_recorded(self, scenes: Sequence[Scene]) -> Self:
+        """With the coefficient that the recorded differences have over the law; as it is without them."""
+        pairs = [(self.twist(scene)[0], recorded_difference(scene, self.index)) for scene in scenes]
+        if any(recorded is None for _, recorded in pairs):
+            return self
+        law, recorded = (np.concatenate([np.asarray(pair[side]) for pair in pairs]) for side in (0, 1))
+        law = law - law.mean()
+        factor = float(law @ recorded / (law @ law)) if law.any() else 0.0
+        return replace(self, measured=factor or None)
+
+    def twist(self, scene: Scene) -> Array:
+        """Twist, its speed and its acceleration for a coefficient of one, (3, samples)."""
+        law, coefficient = self.law
+        return integrate_twist(scene, self.index, law) / coefficient
+
+    def columns(self, scene: Scene) -> Array:
+        """Derivative of the rigid torque along the change."""
+        twist, recorded = self.twist(scene), recorded_difference(scene, self.index)
+        if self.measured and recorded is not None:  # zeros of the two encoders may differ
+            change = joint_displacement(scene, self.index, twist[0].mean() + recorded / self.measured)
+        else:
+            moved = np.zeros((3, *scene.motion.position.shape))
+            moved[:, :, self.index] = twist
+            change = Motion(*moved)
+        return directional_derivative(scene, change)[:, :, None]
+
+
+@dataclass(frozen=True)
+class JointElasticity(Transmission):
+    """A spring (Spong 1987). Coefficient: the compliance that the torque shows.
+
+    shape: the stiffness that its resonance has, N m/rad.
+    """
+
+    effect = "joint_elasticity"
+    names = ("stiffness",)
+
+    @property
+    def law(self) -> tuple[Twist, float]:
+        """The spring, and its compliance."""
+        return Twist(self.shape[0], DAMPING_TIME), 1 / self.shape[0]
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Resonances beyond and within what a recording shows, by the recorded difference where there is one."""
+        inertia = float(np.mean([felt_inertia(scene, joint - 1).mean() for scene in scenes]))
+        lowest, *looks = (inertia * (2 * np.pi * hertz) ** 2 for hertz in (MIN_RESONANCE_HZ, *RESONANCES_HZ))
+        bounds = ((lowest, looks[0]),)
+        return [cls.at(arm, joint, shape=(each,), bounds=bounds).with_recorded(scenes) for each in looks]
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The stiffness: the coefficient is its inverse."""
+        stiffness = float(1 / coefficients[0]) if coefficients[0] else float("inf")
+        return {"stiffness": stiffness, "resonant_stiffness": self.shape[0]}
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter: both are stiffnesses."""
+        return super().unit("stiffness")
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        stiffness = format_number(1 / coefficients[0] if coefficients[0] else np.inf)
+        return f"q_{self.joint} = theta_{self.joint} - tau_{self.joint} / {stiffness}"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The spring with these parameters; its resonance follows its stiffness where no other is known."""
+        stiffness = float(parameters["stiffness"])
+        resonant = float(parameters.get("resonant_stiffness", stiffness))
+        spring = cls.at(arm, joints[0], shape=(resonant,), bounds=((resonant / 2, resonant * 2),))
+        return spring, np.array([1 / stiffness])
+
+
+@dataclass(frozen=True)
+class Backlash(Transmission):
+    """Play between two walls that do not bounce. Coefficient: the gap that the torque shows.
+
+    shape: the gap that is crossed, rad.
+    """
+
+    effect = "backlash"
+    names = ("gap",)
+    closely = True
+
+    @property
+    def law(self) -> tuple[Twist, float]:
+        """The play, and its gap."""
+        return Twist(gap=self.shape[0]), self.shape[0]
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """A few gaps, by the recorded difference where there is one."""
+        return [each.with_recorded(scenes) for each in cls._gaps(arm, joint, GAPS)]
+
+    @classmethod
+    def from_scan(cls, arm: Arm, joint: int, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[Self]:
+        """The gaps whose torque at the joint resembles most what is left there; first looks with a recorded one."""
+        looks = cls.initial_shapes(arm, joint, scenes)
+        if looks[0].measured is not None:
+            return looks
+        gaps = cls._gaps(arm, joint, SCANNED_GAPS.tolist())
+        alike = _resemblance(gaps, scenes, residuals, joint - 1)
+        return [replace(gaps[place], looks=len(gaps)) for place in np.argsort(-alike)[:KEPT_GAPS]]
+
+    @classmethod
+    def _gaps(cls, arm: Arm, joint: int, gaps: Sequence[float]) -> list[Self]:
+        return [cls.at(arm, joint, shape=(gap,), bounds=(GAP_RANGE,)) for gap in gaps]
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The whole gap."""
+        return {"gap": float(coefficients[0]), "crossed_gap": self.shape[0]}
+
+    def unit(self, name: str) -> str:
+        """Unit of a parameter: both are gaps."""
+        return super().unit("gap")
+
+    def equation(self, coefficients: Array) -> str:
+        """The law with its number."""
+        own = self.joint
+        return f"q_{own} = theta_{own} - {format_number(coefficients[0])}/2 sgn(tau_{own})"
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        """The play with its gap."""
+        gap = float(parameters["gap"])
+        crossed = float(parameters.get("crossed_gap", gap))
+        return cls.at(arm, joints[0], shape=(crossed,), bounds=(GAP_RANGE,)), np.array([gap])
+
+
+@dataclass(frozen=True)
+class BacklashFamily(EveryJoint):
+    """Play at every joint, its gap by a scan of what is left."""
+
+    effect: str = "backlash"
+    terms: tuple[type[Term], ...] = (Backlash,)
+
+    def scan(self, arm: Arm, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[list[Candidate]]:
+        """The best gaps of a fine grid at each joint that moves."""
+        joints = [joint for joint in range(1, len(arm) + 1) if joint_moves(scenes, joint)]
+        return [list[Candidate](Backlash.from_scan(arm, joint, scenes, residuals)) for joint in joints]
+
+
+def recorded_difference(scene: Scene, joint: int) -> Array | None:
+    """Link angle less motor angle, (samples,), less their mean; None where it was not recorded."""
+    if scene.link_position is None:
+        return None
+    difference = scene.link_position[:, joint] - scene.motion.position[:, joint]
+    return None if np.isnan(difference).any() else np.asarray(difference - difference.mean())
+
+
+def _resemblance(
+    shapes: Sequence[Transmission], scenes: Sequence[Scene], residuals: Sequence[Array], joint: int
+) -> Array:
+    """Share of what is left at a joint (from 0) that each shape explains there, by the inertia of the twist alone."""
+    products = np.zeros((3, len(shapes)))
+    for scene, residual in zip(scenes, residuals, strict=True):
+        rows = np.flatnonzero(np.isfinite(residual[:, joint]))
+        left, inertia = residual[rows, joint], felt_inertia(scene, joint)
+        width = max(int(np.median(np.diff(rows))), 1) if len(rows) > 1 else 1
+        for place, shape in enumerate(shapes):
+            torque = np.convolve(inertia * shape.twist(scene)[2], np.full(width, 1 / width), "same")[rows]
+            products[:, place] += torque @ left, torque @ torque, left @ left
+    return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
+
+
+JOINT_ELASTICITY = EveryJoint("joint_elasticity", (JointElasticity,))
+BACKLASH = BacklashFamily()

@@ -1,1 +1,0 @@
-"""The library of effects, one family a file."""
