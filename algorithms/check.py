@@ -4,21 +4,108 @@
     check_algorithm(MyAlgorithm)
 
 It passes in silence, or raises BrokenPromiseError at the first promise that is broken.
+
+Algorithms are watched on small problems, whose objectives and recorded steps stand here too.
 """
 
 import dataclasses
 import pickle
 import random
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from algorithms.contract import AnyAlgorithm, Array
-from algorithms.rehearsal import Game, Step, bowl, first_population, flat, holed_bowl, moves, play
+from algorithms.contract import AnyAlgorithm, Array, Box, uniform_points
+from algorithms.driver import clip
 
-CRASHES = (
+BetweenCalls = Callable[[Any, list[Array]], Any]
+
+
+class Game(NamedTuple):
+    """A problem and how long it is played; the first population counts as a step."""
+
+    objective: Callable[[Array], Array]
+    points: int = 8
+    dimensions: int = 3
+    horizon: int = 6
+    steps: int = 7
+
+
+class Step(NamedTuple):
+    """One ask and tell, as the caller saw it; changed: whether tell wrote into the caller's arrays."""
+
+    asked: Array
+    X: Array
+    fitness: Array
+    incumbent: Array
+    incumbent_fitness: float
+    finished: bool
+    changed: bool
+
+
+def do_nothing(state: Any, arrays: list[Array]) -> Any:
+    """Do nothing between the calls."""
+    return state
+
+
+def play(algorithm: AnyAlgorithm, game: Game, seed: int = 1, between: BetweenCalls = do_nothing) -> list[Step]:
+    """All steps of one game."""
+    return list(play_steps(algorithm, game, np.random.default_rng(seed), between))
+
+
+def play_steps(
+    algorithm: AnyAlgorithm, game: Game, rng: np.random.Generator, between: BetweenCalls = do_nothing
+) -> Iterator[Step]:
+    """Step by step; `between` may swap the state and spoil the caller's arrays after every call."""
+    box, population = search_box(game), first_population(game)
+    state = algorithm.init(algorithm.Params(), population, box, game.horizon, rng)
+    state = between(state, [population])
+    for _ in range(game.steps):
+        asked, state = algorithm.ask(state)
+        seen, X = asked.copy(), clip(asked, box)
+        state = between(state, [asked])
+        fitness = game.objective(X)
+        told = X.copy(), fitness.copy()
+        state = algorithm.tell(state, X, fitness)
+        changed = not (np.array_equal(told[0], X) and np.array_equal(told[1], fitness, equal_nan=True))
+        state = between(state, [X, fitness])
+        best, value = algorithm.incumbent(state)
+        step = Step(seen, *told, best.copy(), value, algorithm.finished(state), changed)
+        state = between(state, [best])
+        yield step
+
+
+def search_box(game: Game) -> Box:
+    """Neither centred nor of equal widths."""
+    lower = np.linspace(-1.0, -2.0, game.dimensions)
+    return Box(lower, lower + np.linspace(2.5, 4.0, game.dimensions))
+
+
+def first_population(game: Game) -> Array:
+    """The same points (points, dimensions) in every game of that size."""
+    return uniform_points(game.points, search_box(game), np.random.default_rng(0))
+
+
+def bowl(X: Array) -> Array:
+    """Sum of squares about 0.3, less 1, so that values of both signs occur."""
+    fitness: Array = np.square(X - 0.3).sum(axis=1) - 1.0
+    return fitness
+
+
+def holed_bowl(X: Array) -> Array:
+    """The bowl, with NaN, +inf and -inf in turn where the first coordinate is below 0."""
+    holes = np.resize([np.nan, np.inf, -np.inf], len(X))
+    return np.where(X[:, 0] < 0.0, holes, bowl(X))
+
+
+def constant_objective(value: float) -> Callable[[Array], Array]:
+    """An objective that has one value everywhere."""
+    return lambda X: np.full(len(X), value)
+
+
+CRASH_ERRORS = (
     ArithmeticError,
     AttributeError,
     LookupError,
@@ -31,10 +118,10 @@ CRASHES = (
 OCCASIONS = {
     "on a bowl": Game(bowl),
     "in one dimension": Game(bowl, dimensions=1),
-    "on a constant objective": Game(flat(7.0), horizon=13, steps=14),
+    "on a constant objective": Game(constant_objective(7.0), horizon=13, steps=14),
     "when fitness is NaN or infinite at many points": Game(holed_bowl),
-    "when fitness is NaN everywhere": Game(flat(np.nan)),
-    "when fitness is infinite everywhere": Game(flat(np.inf)),
+    "when fitness is NaN everywhere": Game(constant_objective(np.nan)),
+    "when fitness is infinite everywhere": Game(constant_objective(np.inf)),
     "with a horizon of no iterations": Game(bowl, horizon=0, steps=1),
     "beyond its horizon": Game(bowl, horizon=2),
 }
@@ -61,7 +148,7 @@ def check_parameters(algorithm: AnyAlgorithm) -> None:
     name, params = getattr(algorithm, "name", None), getattr(algorithm, "Params", None)
     _demand(isinstance(name, str) and name, algorithm, "has no `name`, a string that is not empty")
     if not (isinstance(params, type) and dataclasses.is_dataclass(params)):
-        raise _broken(algorithm, "has no dataclass `Params`")
+        raise _broken_promise(algorithm, "has no dataclass `Params`")
     missing = [f.name for f in dataclasses.fields(params) if f.default is f.default_factory]  # both are MISSING
     _demand(not missing, algorithm, f"has Params without a default: {', '.join(missing)}")
     _demand(_is_frozen(params()), algorithm, "has Params that are not frozen")
@@ -69,16 +156,16 @@ def check_parameters(algorithm: AnyAlgorithm) -> None:
 
 def check_global_randomness(algorithm: AnyAlgorithm) -> None:
     """The random states that belong to the whole program are left as they are."""
-    before = _global_randomness()
-    with _crashes_named(algorithm, "on a bowl"):
+    before = _global_random_state()
+    with _name_crashes(algorithm, "on a bowl"):
         play(algorithm, Game(bowl))
-    _demand(_global_randomness() == before, algorithm, "draws from the global random state of numpy or Python")
+    _demand(_global_random_state() == before, algorithm, "draws from the global random state of numpy or Python")
 
 
 def check_occasion(algorithm: AnyAlgorithm, occasion: str) -> None:
     """What it asks for and which best it reports, in one of OCCASIONS."""
     game = OCCASIONS[occasion]
-    with _crashes_named(algorithm, occasion):
+    with _name_crashes(algorithm, occasion):
         steps = play(algorithm, game)
     check_points(algorithm, occasion, game, steps)
     for told in range(1, len(steps) + 1):
@@ -116,27 +203,29 @@ def check_incumbent(algorithm: AnyAlgorithm, occasion: str, steps: list[Step]) -
 
 def check_sharing(algorithm: AnyAlgorithm, game: Game) -> None:
     """Neither side sees what the other does to its arrays after a call."""
-    with _crashes_named(algorithm, "when the caller overwrites arrays that are its own"):
-        overwritten = play(algorithm, game, between=_overwritten)
+    with _name_crashes(algorithm, "when the caller overwrites arrays that are its own"):
+        overwritten = play(algorithm, game, between=_overwrite_arrays)
     problem = "keeps the caller's arrays or gives away its own: its path changes when they are overwritten"
-    _demand(_same(play(algorithm, game), overwritten), algorithm, problem)
+    _demand(_same_path(play(algorithm, game), overwritten), algorithm, problem)
 
 
 def check_randomness(algorithm: AnyAlgorithm, game: Game) -> None:
     """The path follows from the generator that was given, and nothing is shared between two runs."""
     alone = play(algorithm, game)
-    _demand(_same(alone, play(algorithm, game)), algorithm, "takes another path when it gets the same generator again")
-    pair = (moves(algorithm, game, np.random.default_rng(seed)) for seed in (1, 2))
+    _demand(
+        _same_path(alone, play(algorithm, game)), algorithm, "takes another path when it gets the same generator again"
+    )
+    pair = (play_steps(algorithm, game, np.random.default_rng(seed)) for seed in (1, 2))
     together = [step for step, _ in zip(*pair, strict=True)]
-    _demand(_same(alone, together), algorithm, "takes another path while a second run goes on beside it")
+    _demand(_same_path(alone, together), algorithm, "takes another path while a second run goes on beside it")
 
 
 def check_pickle(algorithm: AnyAlgorithm, game: Game) -> None:
     """A run that is pickled and read back after every call takes the same path."""
-    with _crashes_named(algorithm, "when its State is pickled and read back"):
-        resumed = play(algorithm, game, between=_pickled)
+    with _name_crashes(algorithm, "when its State is pickled and read back"):
+        resumed = play(algorithm, game, between=_pickle_and_read_back)
     problem = "takes another path when its State is pickled and read back: something is left out"
-    _demand(_same(play(algorithm, game), resumed), algorithm, problem)
+    _demand(_same_path(play(algorithm, game), resumed), algorithm, problem)
 
 
 def _is_frozen(params: Any) -> bool:
@@ -147,36 +236,36 @@ def _is_frozen(params: Any) -> bool:
     return False
 
 
-def _overwritten(state: Any, arrays: list[Array]) -> Any:
+def _overwrite_arrays(state: Any, arrays: list[Array]) -> Any:
     for array in arrays:
         array.fill(12345.0)
     return state
 
 
-def _pickled(state: Any, arrays: list[Array]) -> Any:
+def _pickle_and_read_back(state: Any, arrays: list[Array]) -> Any:
     return pickle.loads(pickle.dumps(state))
 
 
-def _global_randomness() -> bytes:
+def _global_random_state() -> bytes:
     return pickle.dumps((random.getstate(), np.random.get_state()))  # noqa: NPY002
 
 
-def _same(left: list[Step], right: list[Step]) -> bool:
+def _same_path(left: list[Step], right: list[Step]) -> bool:
     return all(np.array_equal(a.asked, b.asked) for a, b in zip(left, right, strict=True))
 
 
 @contextmanager
-def _crashes_named(algorithm: AnyAlgorithm, occasion: str) -> Iterator[None]:
+def _name_crashes(algorithm: AnyAlgorithm, occasion: str) -> Iterator[None]:
     try:
         yield
-    except CRASHES as error:
-        raise _broken(algorithm, f"crashes {occasion}: {error!r}") from error
+    except CRASH_ERRORS as error:
+        raise _broken_promise(algorithm, f"crashes {occasion}: {error!r}") from error
 
 
 def _demand(kept: object, algorithm: AnyAlgorithm, problem: str) -> None:
     if not kept:
-        raise _broken(algorithm, problem)
+        raise _broken_promise(algorithm, problem)
 
 
-def _broken(algorithm: AnyAlgorithm, problem: str) -> BrokenPromiseError:
+def _broken_promise(algorithm: AnyAlgorithm, problem: str) -> BrokenPromiseError:
     return BrokenPromiseError(f"Algorithm {algorithm.__name__} {problem}.")

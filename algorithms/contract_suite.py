@@ -19,7 +19,7 @@ from algorithms.check import (
 )
 from algorithms.contract import AnyAlgorithm
 
-_WITH_PROGRESS, _WITHOUT = OCCASIONS["on a bowl"], OCCASIONS["on a constant objective"]
+_GAME_WITH_PROGRESS, _GAME_WITHOUT_PROGRESS = OCCASIONS["on a bowl"], OCCASIONS["on a constant objective"]
 
 
 class AlgorithmContract:
@@ -48,13 +48,13 @@ class AlgorithmContract:
         check_occasion(self.algorithm, "beyond its horizon")
 
     def test_the_same_generator_gives_the_same_path_whatever_runs_beside_it(self) -> None:
-        check_randomness(self.algorithm, _WITH_PROGRESS)
-        check_randomness(self.algorithm, _WITHOUT)
+        check_randomness(self.algorithm, _GAME_WITH_PROGRESS)
+        check_randomness(self.algorithm, _GAME_WITHOUT_PROGRESS)
 
     def test_it_shares_no_array_with_its_caller(self) -> None:
-        check_sharing(self.algorithm, _WITH_PROGRESS)
-        check_sharing(self.algorithm, _WITHOUT)
+        check_sharing(self.algorithm, _GAME_WITH_PROGRESS)
+        check_sharing(self.algorithm, _GAME_WITHOUT_PROGRESS)
 
     def test_a_state_that_is_pickled_and_read_back_goes_on_as_before(self) -> None:
-        check_pickle(self.algorithm, _WITH_PROGRESS)
-        check_pickle(self.algorithm, _WITHOUT)
+        check_pickle(self.algorithm, _GAME_WITH_PROGRESS)
+        check_pickle(self.algorithm, _GAME_WITHOUT_PROGRESS)

@@ -48,7 +48,7 @@ class DE:
 
     @staticmethod
     def ask(state: DEState) -> tuple[Array, DEState]:
-        return (_trials(state) if state.started else state.population.copy()), state
+        return (_build_trials(state) if state.started else state.population.copy()), state
 
     @staticmethod
     def tell(state: DEState, X: Array, fitness: Array) -> DEState:
@@ -69,7 +69,7 @@ class DE:
         return False
 
 
-def _trials(state: DEState) -> Array:
+def _build_trials(state: DEState) -> Array:
     X, params = state.population, state.params
     r1, r2, r3 = distinct_others(len(X), state.rng)
     mutants = X[r2]

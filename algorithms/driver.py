@@ -1,4 +1,8 @@
-"""The loop that every algorithm runs in: ask, into the box, evaluate, keep the best, tell."""
+"""The loop that every algorithm runs in: ask, bring into the box, evaluate, keep the best, tell.
+
+Bound policies bring asked points into the box, coordinate by coordinate. Each is a function of the points (n, d) and
+the box alone and leaves a coordinate inside as it is, to the bit.
+"""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -7,8 +11,41 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.bounds import bound_policy
 from algorithms.contract import AnyAlgorithm, Array, Box, as_loss
+
+BoundPolicy = Callable[[Array, Box], Array]
+
+
+def clip(X: Array, box: Box) -> Array:
+    """A coordinate outside goes to the bound it crossed."""
+    return np.minimum(np.maximum(X, box.lower), box.upper)
+
+
+def reflect(X: Array, box: Box) -> Array:
+    """A coordinate outside is mirrored at the bound, as often as it takes to be inside."""
+    width = box.upper - box.lower
+    return _replace_outside(X, box, box.upper - np.abs(np.mod(X - box.lower, 2 * width) - width))
+
+
+def wrap(X: Array, box: Box) -> Array:
+    """A coordinate outside comes in again at the opposite bound."""
+    return _replace_outside(X, box, box.lower + np.mod(X - box.lower, box.upper - box.lower))
+
+
+def _replace_outside(X: Array, box: Box, replacement: Array) -> Array:
+    inside = (box.lower <= X) & (box.upper >= X)
+    return np.where(inside, X, clip(replacement, box))  # clip: rounding may leave the box by one bit
+
+
+BOUND_POLICIES: dict[str, BoundPolicy] = {"clip": clip, "reflect": reflect, "wrap": wrap}
+
+
+def bound_policy(name: str) -> BoundPolicy:
+    """The policy of that name; raises ValueError with the known names."""
+    if name not in BOUND_POLICIES:
+        raise ValueError(f"unknown bound policy {name!r}: choose one of {', '.join(BOUND_POLICIES)}")
+    return BOUND_POLICIES[name]
+
 
 Objective = Callable[[Array], Array]
 
@@ -64,7 +101,7 @@ def minimise(
     """Run an algorithm from the first population (n, d) until the budget is used up or it is finished.
 
     objective: (n, d) -> (n,), smaller is better. evaluations: the budget, never exceeded.
-    bounds: name of the policy in `algorithms.bounds`. Points are never rescaled.
+    bounds: name of the policy in `algorithms.driver`. Points are never rescaled.
     Raises ValueError for a budget below 1, an impossible box, or an objective that returns another shape.
     """
     _check_problem(box, population, evaluations)
@@ -73,7 +110,7 @@ def minimise(
     batches = list(iterate(algorithm, state, objective, box, evaluations, bounds))
     if not batches:
         raise ValueError(f"algorithm {algorithm.name!r} was finished before its first population")
-    return summary(batches)
+    return summarise_batches(batches)
 
 
 def iterate(
@@ -104,7 +141,7 @@ def iterate(
         yield Batch(X, fitness, algorithm.incumbent(state)[1], state)
 
 
-def summary(batches: Sequence[Batch]) -> Result:
+def summarise_batches(batches: Sequence[Batch]) -> Result:
     """The Result of one run from its batches, in order (at least one)."""
     X = np.concatenate([batch.X for batch in batches])
     losses = as_loss(np.concatenate([batch.fitness for batch in batches]))

@@ -14,11 +14,62 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from algorithms.contract import Array, Box, as_loss
-from algorithms.success_history import SuccessHistory
 
-SMALLEST = 4
+MEMORY_SPREAD = 0.1  # of both distributions about a memory entry
+
+
+@dataclass
+class SuccessHistory:
+    """Entries (H,) each of scaling factors and crossover rates; a rate of NaN is the terminal value: always 0.
+
+    place: the entry that is replaced next.
+    """
+
+    scaling: Array
+    crossover: Array
+    place: int = 0
+
+    def rates(self, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Scaling factors and crossover rates for n points, (n,) each (Tanabe 2013, eq. 8-9)."""
+        entry = (rng.random(n) * len(self.scaling)).astype(np.intp)
+        rates = self.crossover[entry] + MEMORY_SPREAD * ndtri(rng.random(n))
+        return _draw_scaling_factors(self.scaling[entry], rng), np.clip(np.nan_to_num(rates, nan=0.0), 0.0, 1.0)
+
+    def learn(self, scaling: Array, crossover: Array, gain: Array) -> None:
+        """Replace an entry by the means of what succeeded, (k,) each, weighted by the gain in fitness."""
+        if not len(gain):
+            return
+        weights = _finite_gains(gain) / _finite_gains(gain).sum()
+        ended = np.isnan(self.crossover[self.place]) or crossover.max() == 0.0
+        self.crossover[self.place] = np.nan if ended else lehmer_mean(crossover, weights)
+        self.scaling[self.place] = lehmer_mean(scaling, weights)
+        self.place = (self.place + 1) % len(self.scaling)
+
+
+def lehmer_mean(values: Array, weights: Array) -> float:
+    """Sum of weighted squares over the weighted sum (Tanabe 2014, eq. 7)."""
+    return float((weights * values**2).sum() / (weights * values).sum())
+
+
+def _finite_gains(gain: Array) -> Array:
+    """Gains (k,) divided by the largest finite one; a step out of the losses counts as much as that one."""
+    finite: NDArray[np.bool_] = np.isfinite(gain)
+    largest = gain[finite].max() if finite.any() else 1.0
+    return np.where(finite, gain, largest) / largest
+
+
+def _draw_scaling_factors(centres: Array, rng: np.random.Generator) -> Array:
+    """Cauchy about the centres (n,), drawn again where not positive, 1 at most."""
+    factors = np.zeros(len(centres))
+    while (again := factors <= 0.0).any():
+        factors[again] = centres[again] + MEMORY_SPREAD * np.tan(np.pi * (rng.random(int(again.sum())) - 0.5))
+    return np.minimum(factors, 1.0)
+
+
+MIN_POPULATION = 4
 
 
 @dataclass(frozen=True)
@@ -56,7 +107,7 @@ class LSHADE:
     @staticmethod
     def init(params: LSHADEParams, population: Array, box: Box, horizon: int, rng: np.random.Generator) -> LSHADEState:
         n, d = population.shape
-        if n < SMALLEST:
+        if n < MIN_POPULATION:
             raise ValueError(f"L-SHADE takes a target and three others: {n} points are too few")
         history = SuccessHistory(*np.full((2, params.history), 0.5))
         fitness = np.full(n, np.inf)
@@ -67,7 +118,7 @@ class LSHADE:
         if not state.evaluations:
             return state.population.copy(), state
         state.scaling, state.crossover = state.history.rates(len(state.population), state.rng)
-        return _trials(state), state
+        return _build_trials(state), state
 
     @staticmethod
     def tell(state: LSHADEState, X: Array, fitness: Array) -> LSHADEState:
@@ -91,12 +142,12 @@ class LSHADE:
         return False
 
 
-def _trials(state: LSHADEState) -> Array:
+def _build_trials(state: LSHADEState) -> Array:
     X, rng = state.population, state.rng
     n, d = X.shape
     place = np.floor(rng.random(n) * _best_count(state)).astype(np.intp)
-    best = _best_ones(state)[place]
-    first, second = _donors(n, n + len(state.archive), rng)
+    best = _order_by_fitness(state)[place]
+    first, second = _draw_donors(n, n + len(state.archive), rng)
     others = np.concatenate([X, state.archive])
     mutants = X + state.scaling[:, None] * (X[best] - X + X[first] - others[second])
     crossed = rng.random((n, d)) < state.crossover[:, None]
@@ -104,7 +155,7 @@ def _trials(state: LSHADEState) -> Array:
     return np.where(crossed, mutants, X)
 
 
-def _best_ones(state: LSHADEState) -> NDArray[np.intp]:
+def _order_by_fitness(state: LSHADEState) -> NDArray[np.intp]:
     return np.argsort(state.fitness, kind="stable")
 
 
@@ -112,7 +163,7 @@ def _best_count(state: LSHADEState) -> int:
     return max(round(state.params.best_share * len(state.population)), 2)
 
 
-def _donors(n: int, total: int, rng: np.random.Generator) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _draw_donors(n: int, total: int, rng: np.random.Generator) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """For each of n targets another of the n, and a third of `total`; the three are different."""
     target = np.arange(n)
     first = (rng.random(n) * (n - 1)).astype(np.intp)
@@ -134,8 +185,8 @@ def _learn(state: LSHADEState, loss: Array) -> None:
 def _shrink(state: LSHADEState) -> None:
     """Linear population size reduction (eq. 10); the worst points go, and chance takes from the archive."""
     share = min(state.evaluations / state.planned, 1.0)
-    size = round(state.first_size + (SMALLEST - state.first_size) * share)
-    kept = np.sort(_best_ones(state)[:size])
+    size = round(state.first_size + (MIN_POPULATION - state.first_size) * share)
+    kept = np.sort(_order_by_fitness(state)[:size])
     state.population, state.fitness = state.population[kept], state.fitness[kept]
     room = round(state.params.archive_ratio * size)
     if len(state.archive) > room:

@@ -22,7 +22,7 @@ from typing import Literal
 import numpy as np
 
 from algorithms.contract import Array, Box, uniform_points
-from algorithms.swarm import Swarm, fly, global_best, land, new_swarm
+from algorithms.spso import Swarm, fly, global_best, land, new_swarm
 
 
 @dataclass(frozen=True)
@@ -93,18 +93,18 @@ class MuPSO:
 
     @staticmethod
     def finished(state: MuPSOState) -> bool:
-        return _abandoned(state) and global_best(state.swarm)[1] <= state.params.abandonment_threshold  # eq. 7
+        return _is_abandoned(state) and global_best(state.swarm)[1] <= state.params.abandonment_threshold  # eq. 7
 
 
 def _fly(state: MuPSOState) -> None:
     params = state.params
     progress = min(state.iteration / max(state.horizon, 1), 1.0)
-    w = _geometric(params.first_inertia, params.last_inertia, progress)  # eq. 3
-    c2 = _geometric(params.first_social, params.last_social, progress)  # eq. 4
+    w = _geometric_schedule(params.first_inertia, params.last_inertia, progress)  # eq. 3
+    c2 = _geometric_schedule(params.first_social, params.last_social, progress)  # eq. 4
     fly(state.swarm, w, params.cognitive, c2, state.rng)
 
 
-def _geometric(first: float, last: float, progress: float) -> float:
+def _geometric_schedule(first: float, last: float, progress: float) -> float:
     """first * n**it with n chosen so that `last` is reached at the horizon; progress = it / horizon."""
     return first * float((last / first) ** progress)
 
@@ -120,12 +120,12 @@ def _count_stagnation(state: MuPSOState) -> None:
     state.fitness = fitness
 
 
-def _abandoned(state: MuPSOState) -> bool:
+def _is_abandoned(state: MuPSOState) -> bool:
     return state.q >= state.params.abandonment_limit
 
 
 def _must_mutate(state: MuPSOState) -> bool:
-    return _abandoned(state) and global_best(state.swarm)[1] > state.params.mutation_threshold  # eq. 7
+    return _is_abandoned(state) and global_best(state.swarm)[1] > state.params.mutation_threshold  # eq. 7
 
 
 def _mutate(state: MuPSOState) -> None:

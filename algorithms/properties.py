@@ -12,8 +12,8 @@ from algorithms.contract import AnyAlgorithm, Array, Box, uniform_points
 from algorithms.driver import iterate, minimise, planned_iterations
 
 SWARM_SIZE, DIMENSIONS, EVALUATIONS = 50, 15, 1550
-REFERENCE = Box(np.full(DIMENSIONS, -1.0), np.full(DIMENSIONS, 3.0))  # the origin inside, not in the centre
-UNIT = Box(np.zeros(DIMENSIONS), np.ones(DIMENSIONS))
+REFERENCE_BOX = Box(np.full(DIMENSIONS, -1.0), np.full(DIMENSIONS, 3.0))  # the origin inside, not in the centre
+UNIT_BOX = Box(np.zeros(DIMENSIONS), np.ones(DIMENSIONS))
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,9 @@ class Properties:
     noise_share_on_bounds: float
 
 
-def measure(algorithm: AnyAlgorithm, repetitions: int = 40, seed: int = 0, bounds: str = "clip") -> Properties:
+def measure_properties(
+    algorithm: AnyAlgorithm, repetitions: int = 40, seed: int = 0, bounds: str = "clip"
+) -> Properties:
     """All facts about an algorithm, from two runs a path and so many repetitions on noise."""
     best = best_points_on_noise(algorithm, repetitions, seed, bounds)
     return Properties(
@@ -43,22 +45,22 @@ def measure(algorithm: AnyAlgorithm, repetitions: int = 40, seed: int = 0, bound
 
 def path_deviation(algorithm: AnyAlgorithm, offset: float, factor: float, seed: int, bounds: str) -> float:
     """How far the path leaves its own after x -> factor * x + offset of box, population and objective."""
-    here = path(algorithm, 1.0, 0.0, seed, bounds)
-    there = path(algorithm, factor, offset, seed, bounds)
-    width = REFERENCE.upper - REFERENCE.lower
+    here = evaluated_points(algorithm, 1.0, 0.0, seed, bounds)
+    there = evaluated_points(algorithm, factor, offset, seed, bounds)
+    width = REFERENCE_BOX.upper - REFERENCE_BOX.lower
     return float(np.abs(((there - offset) / factor - here) / width).max())
 
 
-def path(algorithm: AnyAlgorithm, factor: float, offset: float, seed: int, bounds: str) -> Array:
+def evaluated_points(algorithm: AnyAlgorithm, factor: float, offset: float, seed: int, bounds: str) -> Array:
     """All evaluated points (1550, d) on a bowl that lies at 0.7 of the reference coordinates."""
-    box = Box(*(factor * bound + offset for bound in REFERENCE))
+    box = Box(*(factor * bound + offset for bound in REFERENCE_BOX))
     weights = np.arange(1.0, DIMENSIONS + 1.0)
 
     def bowl(X: Array) -> Array:
         fitness: Array = (weights * np.square((X - offset) / factor - 0.7)).sum(axis=1)
         return fitness
 
-    population = factor * uniform_points(SWARM_SIZE, REFERENCE, np.random.default_rng(seed)) + offset
+    population = factor * uniform_points(SWARM_SIZE, REFERENCE_BOX, np.random.default_rng(seed)) + offset
     horizon = planned_iterations(EVALUATIONS, SWARM_SIZE)
     state = algorithm.init(algorithm.Params(), population, box, horizon, np.random.default_rng(seed + 1))
     batches = iterate(algorithm, state, bowl, box, EVALUATIONS, bounds)
@@ -73,10 +75,10 @@ def best_points_on_noise(algorithm: AnyAlgorithm, repetitions: int, seed: int, b
 
 def _best_point_on_noise(algorithm: AnyAlgorithm, rng: np.random.Generator, bounds: str) -> Array:
     noise, own = rng.spawn(2)
-    population = uniform_points(SWARM_SIZE, UNIT, rng)
+    population = uniform_points(SWARM_SIZE, UNIT_BOX, rng)
 
     def objective(X: Array) -> Array:
         return noise.random(len(X))
 
     params = algorithm.Params()
-    return minimise(algorithm, params, objective, UNIT, population, EVALUATIONS, own, bounds).best_x
+    return minimise(algorithm, params, objective, UNIT_BOX, population, EVALUATIONS, own, bounds).best_x

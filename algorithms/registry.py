@@ -10,7 +10,7 @@ from importlib.metadata import EntryPoint, entry_points
 
 from algorithms.contract import AnyAlgorithm
 
-GROUP = "armlab.algorithms"
+ENTRY_POINT_GROUP = "armlab.algorithms"
 
 _BUILT_IN = {
     "mupso": "algorithms.mupso:MuPSO",
@@ -21,25 +21,25 @@ _BUILT_IN = {
     "de": "algorithms.de:DE",
     "random-search": "algorithms.random_search:RandomSearch",
     "cma-es": "algorithms.cmaes:CMAES",
-    "ipop-cma-es": "algorithms.ipop_cmaes:IPOPCMAES",
+    "ipop-cma-es": "algorithms.cmaes:IPOPCMAES",
     "l-shade": "algorithms.lshade:LSHADE",
 }
 
 _PEERS = {
-    "scipy-de": "algorithms.adapters.scipy_peer:ScipyDE",
-    "pygmo-pso": "algorithms.adapters.pygmo_peers:PygmoPSO",
-    "pygmo-gwo": "algorithms.adapters.pygmo_peers:PygmoGWO",
-    "pygmo-de": "algorithms.adapters.pygmo_peers:PygmoDE",
-    "mealpy-pso": "algorithms.adapters.mealpy_peers:MealpyPSO",
-    "mealpy-woa": "algorithms.adapters.mealpy_peers:MealpyWOA",
-    "mealpy-gwo": "algorithms.adapters.mealpy_peers:MealpyGWO",
-    "mealpy-goa": "algorithms.adapters.mealpy_peers:MealpyGOA",
-    "mealpy-de": "algorithms.adapters.mealpy_peers:MealpyDE",
-    "pymoo-pso": "algorithms.adapters.pymoo_peers:PymooPSO",
-    "pymoo-de": "algorithms.adapters.pymoo_peers:PymooDE",
-    "nevergrad-pso": "algorithms.adapters.nevergrad_peers:NevergradPSO",
-    "nevergrad-de": "algorithms.adapters.nevergrad_peers:NevergradDE",
-    "pycma": "algorithms.adapters.cma_peer:Pycma",
+    "scipy-de": "algorithms.peers.scipy_adapter:ScipyDE",
+    "pygmo-pso": "algorithms.peers.pygmo_adapter:PygmoPSO",
+    "pygmo-gwo": "algorithms.peers.pygmo_adapter:PygmoGWO",
+    "pygmo-de": "algorithms.peers.pygmo_adapter:PygmoDE",
+    "mealpy-pso": "algorithms.peers.mealpy_adapter:MealpyPSO",
+    "mealpy-woa": "algorithms.peers.mealpy_adapter:MealpyWOA",
+    "mealpy-gwo": "algorithms.peers.mealpy_adapter:MealpyGWO",
+    "mealpy-goa": "algorithms.peers.mealpy_adapter:MealpyGOA",
+    "mealpy-de": "algorithms.peers.mealpy_adapter:MealpyDE",
+    "pymoo-pso": "algorithms.peers.pymoo_adapter:PymooPSO",
+    "pymoo-de": "algorithms.peers.pymoo_adapter:PymooDE",
+    "nevergrad-pso": "algorithms.peers.nevergrad_adapter:NevergradPSO",
+    "nevergrad-de": "algorithms.peers.nevergrad_adapter:NevergradDE",
+    "pycma": "algorithms.peers.cma_adapter:Pycma",
 }
 
 
@@ -53,7 +53,7 @@ class BrokenAlgorithmError(ValueError):
 
 def names() -> list[str]:
     """Registered names, without peers: the built-in ones in the paper's order, then the plug-ins'."""
-    plug_ins = sorted(entry.name for entry in entry_points(group=GROUP))
+    plug_ins = sorted(entry.name for entry in entry_points(group=ENTRY_POINT_GROUP))
     return list(dict.fromkeys([*_BUILT_IN, *plug_ins]))
 
 
@@ -70,35 +70,35 @@ def load(name: str) -> AnyAlgorithm:
     """
     entries = [entry for entry in _entries() if entry.name == name]
     if not entries:
-        raise UnknownAlgorithmError(f"unknown algorithm {name!r}: {_advice(name)}")
+        raise UnknownAlgorithmError(f"unknown algorithm {name!r}: {_name_hint(name)}")
     if len(entries) > 1:
         places = " and ".join(entry.value for entry in entries)
         raise BrokenAlgorithmError(f"algorithm {name!r} is registered more than once: {places}")
-    return _import(entries[0])
+    return _load_entry(entries[0])
 
 
 def _entries() -> list[EntryPoint]:
-    built_in = [EntryPoint(name, value, GROUP) for name, value in (_BUILT_IN | _PEERS).items()]
-    return [*built_in, *entry_points(group=GROUP)]
+    built_in = [EntryPoint(name, value, ENTRY_POINT_GROUP) for name, value in (_BUILT_IN | _PEERS).items()]
+    return [*built_in, *entry_points(group=ENTRY_POINT_GROUP)]
 
 
-def _advice(name: str) -> str:
+def _name_hint(name: str) -> str:
     near = get_close_matches(name, [*names(), *peer_names()], n=1)
     return f"did you mean {near[0]!r}?" if near else f"choose one of {', '.join(names())}"
 
 
-def _import(entry: EntryPoint) -> AnyAlgorithm:
+def _load_entry(entry: EntryPoint) -> AnyAlgorithm:
     try:
         algorithm: AnyAlgorithm = entry.load()
     except ModuleNotFoundError as error:
         if entry.name not in _PEERS:
-            raise _not_imported(entry, error) from error
+            raise _import_failure(entry, error) from error
         missing = f"algorithm {entry.name!r} needs the package {error.name!r}"
         raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[peers]'") from error
     except (ImportError, AttributeError, SyntaxError) as error:
-        raise _not_imported(entry, error) from error
+        raise _import_failure(entry, error) from error
     return algorithm
 
 
-def _not_imported(entry: EntryPoint, error: Exception) -> BrokenAlgorithmError:
+def _import_failure(entry: EntryPoint, error: Exception) -> BrokenAlgorithmError:
     return BrokenAlgorithmError(f"algorithm {entry.name!r} ({entry.value}) cannot be imported: {error}")

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Excitation trajectories, identification and diagnosis of robot arms."""

@@ -1,26 +1,31 @@
-"""The configuration of an experiment: one YAML file, typed, with every mistake told in one line."""
+"""The configuration of an experiment: one YAML file, typed, hyper-parameters and names of algorithms checked; every
+mistake is reported in one line.
+"""
 
+from dataclasses import MISSING, fields
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_type_hints
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, create_model, model_validator
 
-from bench.engines.contract import Executor
-from problem.settings import Settings, validate
+from algorithms.contract import AnyAlgorithm
+from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings, read_yaml, validate
+from bench.executors.contract import ExecutorSettings
 from problem.suite import instances, suites
-from problem.yaml_input import read_yaml
 
 
-def _as_list(value: Any) -> Any:
+def _to_tuple(value: Any) -> Any:
     return value if isinstance(value, tuple) else (value,)
 
 
-def _as_problems(value: Any) -> Any:
+def _expand_problems(value: Any) -> Any:
     """One problem or many; the name of a suite stands for all its problems, also in `{suite: NAME, penalty: ...}`."""
-    return tuple(problem for item in _as_list(value) for problem in _of_suite(item))
+    return tuple(problem for item in _to_tuple(value) for problem in _expand_suite(item))
 
 
-def _of_suite(item: Any) -> tuple[Any, ...]:
+def _expand_suite(item: Any) -> tuple[Any, ...]:
     if isinstance(item, str) and item in suites():
         return tuple(instances(item))
     if not isinstance(item, dict) or "suite" not in item:
@@ -33,7 +38,7 @@ def _of_suite(item: Any) -> tuple[Any, ...]:
     )
 
 
-def _as_choice(value: Any) -> Any:
+def _to_choice(value: Any) -> Any:
     return {"name": value} if isinstance(value, str) else value
 
 
@@ -66,7 +71,7 @@ def _split_label(value: Any) -> Any:
 
 
 PositiveInt = Annotated[int, Field(ge=1)]
-OneOrMany = Annotated[tuple[PositiveInt, ...], BeforeValidator(_as_list), Field(min_length=1)]
+OneOrMany = Annotated[tuple[PositiveInt, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
 
 
 class Experiment(Settings):
@@ -81,10 +86,10 @@ class Experiment(Settings):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
     problem: Annotated[
         tuple[Annotated[ProblemChoice, BeforeValidator(_split_label)], ...],
-        BeforeValidator(_as_problems),
+        BeforeValidator(_expand_problems),
         Field(min_length=1),
     ]
-    algorithms: Annotated[tuple[Annotated[AlgorithmChoice, BeforeValidator(_as_choice)], ...], Field(min_length=1)]
+    algorithms: Annotated[tuple[Annotated[AlgorithmChoice, BeforeValidator(_to_choice)], ...], Field(min_length=1)]
     swarm_size: OneOrMany
     iterations: OneOrMany | None = None
     evaluations: OneOrMany | None = None
@@ -93,7 +98,7 @@ class Experiment(Settings):
     bounds: Literal["clip", "reflect", "wrap"] = "clip"
     output: Literal["table", "convergence", "swarm_sizes", "rivals"] = "table"
     printed: bool = False
-    executor: Executor | None = None
+    executor: ExecutorSettings | None = None
     trial_timeout_s: Annotated[float, Field(gt=0)] | None = None
 
     @model_validator(mode="after")
@@ -137,3 +142,30 @@ class Experiment(Settings):
 def read_experiment(path: Path) -> Experiment:
     """The experiment in a YAML file; raises InputError, in one line, for any mistake in it."""
     return validate(Experiment, read_yaml(path), str(path))
+
+
+def parse_params(params_type: type[Any], data: dict[str, Any], where: str) -> Any:
+    """A `Params` with the given values and its defaults for the others.
+
+    Raises InputError, in one line, for a name it does not have, a wrong type, or a value it refuses.
+    """
+    hints = get_type_hints(params_type)
+    known: dict[str, Any] = {field.name: (hints[field.name], _field_default(field)) for field in fields(params_type)}
+    model: type[Settings] = create_model(params_type.__name__, __base__=Settings, **known)
+    checked = validate(model, data, where)
+    try:
+        return params_type(**dict(checked))
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _field_default(field: Any) -> Any:
+    return ... if field.default is MISSING else field.default
+
+
+def find_algorithm(name: str, where: str) -> AnyAlgorithm:
+    """The algorithm of that name; raises InputError, in one line, if there is none or it cannot be used."""
+    try:
+        return load(name)
+    except (UnknownAlgorithmError, BrokenAlgorithmError) as error:
+        raise InputError(f"{where}: {error}") from None

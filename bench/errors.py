@@ -1,4 +1,4 @@
-"""How a run can end before its results are written."""
+"""Errors that end a run before its results are written."""
 
 
 class StoppedError(Exception):

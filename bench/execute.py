@@ -1,10 +1,17 @@
-"""The way of one trial through problem and driver; this is what a worker process runs."""
+"""One trial: what is run and the key of its outcome, the run itself, and what it leaves behind.
 
+This is what a worker process runs.
+"""
+
+import dataclasses
+import hashlib
+import json
 import time
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +19,90 @@ from numpy.typing import NDArray
 from algorithms.contract import AnyAlgorithm, Array, Box, as_loss
 from algorithms.driver import Result, minimise
 from algorithms.registry import load
-from bench.outcome import Curves, Outcome
 from bench.seeds import first_population, own_stream
-from bench.trial import Trial
 from problem.contract import Evaluation, Problem
 from problem.registry import ProblemSettings
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of one algorithm on one problem; what it holds decides the outcome to the bit.
+
+    params: the algorithm's own `Params`. evaluations: the budget. repetition: counts from 0.
+    """
+
+    problem: ProblemSettings
+    algorithm: str
+    params: Any
+    swarm_size: int
+    evaluations: int
+    bounds: str
+    seed: int
+    repetition: int
+
+    @property
+    def problem_text(self) -> str:
+        """The problem's settings as canonical text."""
+        return _problem_text(self.problem)
+
+    @property
+    def params_text(self) -> str:
+        """The hyper-parameters as canonical text."""
+        return canonical(dataclasses.asdict(self.params))
+
+    def key(self, code: str) -> str:
+        """SHA-256 of the trial's content and of the code (see `fingerprint`) that would run it."""
+        content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        content |= {"problem": self.problem_text, "params": self.params_text, "code": code}
+        return hashlib.sha256(canonical(content).encode()).hexdigest()
+
+    def __str__(self) -> str:
+        return (
+            f"{self.algorithm} on {self.problem_text}, swarm size {self.swarm_size}, "
+            f"{self.evaluations} evaluations, repetition {self.repetition}"
+        )
+
+
+def canonical(content: Any) -> str:
+    """JSON with sorted keys and no spaces: equal content gives equal text."""
+    return json.dumps(content, sort_keys=True, separators=(",", ":"))
+
+
+@lru_cache(maxsize=64)
+def _problem_text(problem: ProblemSettings) -> str:
+    return canonical(problem.model_dump(mode="json"))  # once for all trials on it
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Convergence, one entry a population (k,), of the problem's own figure without weights and penalty.
+
+    evaluations: used up to and with the population.
+    best_*: of the best point so far. present_*: of the algorithm's own present best.
+    """
+
+    evaluations: Array
+    best_value: Array
+    best_violation: Array
+    present_value: Array
+    present_violation: Array
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The end of a trial: its best point (d,) and what the problem says of it.
+
+    value: the problem's own figure, e.g. the condition number, without weights and penalty.
+    violation: 0 when feasible. fitness: what was minimised. seconds: of processor time, for the search alone.
+    """
+
+    value: float
+    violation: float
+    fitness: float
+    evaluations: int
+    seconds: float
+    best_x: Array
+    curves: Curves
 
 
 @dataclass(frozen=True)
@@ -28,7 +114,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class _Tape:
+class _RecordedObjective:
     """The objective that an algorithm sees, and all that the problem said along the way."""
 
     problem: Problem
@@ -58,38 +144,40 @@ def _run_guarded(trial: Trial) -> Outcome | Failure:
 
 def run_trial(trial: Trial) -> Outcome:
     """Search once, from the first population and the stream that the trial's names give."""
-    tape = _Tape(built(trial.problem))
+    tape = _RecordedObjective(build_problem(trial.problem))
     began = time.process_time()
-    result = _search(trial, tape)
-    return _outcome(result, tape, time.process_time() - began)
+    result = _run_search(trial, tape)
+    return _make_outcome(result, tape, time.process_time() - began)
 
 
 def replay(trial: Trial) -> Result:
     """The search of `run_trial` with the algorithm's last state, which no outcome keeps."""
-    return _search(trial, _Tape(built(trial.problem)))
+    return _run_search(trial, _RecordedObjective(build_problem(trial.problem)))
 
 
-def _search(trial: Trial, tape: _Tape) -> Result:
+def _run_search(trial: Trial, tape: _RecordedObjective) -> Result:
     name = tape.problem.name
     box = Box(tape.problem.lower, tape.problem.upper)
     start = first_population(trial.seed, name, trial.repetition, trial.swarm_size, box)
     rng = own_stream(trial.seed, name, trial.algorithm, trial.params_text, trial.repetition)
-    return minimise(loaded(trial.algorithm), trial.params, tape, box, start, trial.evaluations, rng, trial.bounds)
+    return minimise(
+        load_algorithm(trial.algorithm), trial.params, tape, box, start, trial.evaluations, rng, trial.bounds
+    )
 
 
 @lru_cache(maxsize=8)
-def built(settings: ProblemSettings) -> Problem:
+def build_problem(settings: ProblemSettings) -> Problem:
     """The problem, built once a process: it is cheaper to build than to send."""
     return settings.build()
 
 
 @lru_cache
-def loaded(name: str) -> AnyAlgorithm:
+def load_algorithm(name: str) -> AnyAlgorithm:
     """The algorithm, looked up once a process: the entry points of a large environment take long to read."""
     return load(name)
 
 
-def _outcome(result: Result, tape: _Tape, seconds: float) -> Outcome:
+def _make_outcome(result: Result, tape: _RecordedObjective, seconds: float) -> Outcome:
     best = tape.problem.evaluate(result.best_x[None])
     return Outcome(
         value=float(best.value[0]),
@@ -98,16 +186,16 @@ def _outcome(result: Result, tape: _Tape, seconds: float) -> Outcome:
         evaluations=int(result.evaluations),
         seconds=seconds,
         best_x=result.best_x,
-        curves=_curves(result, tape),
+        curves=_make_curves(result, tape),
     )
 
 
-def _curves(result: Result, tape: _Tape) -> Curves:
+def _make_curves(result: Result, tape: _RecordedObjective) -> Curves:
     fitness = as_loss(tape.column("fitness"))
     value = np.append(tape.column("value"), np.nan)
     violation = np.append(tape.column("violation"), np.inf)
-    best = _index_of(result.best_so_far, fitness)
-    present = _index_of(result.present_best, fitness)
+    best = _first_index_of(result.best_so_far, fitness)
+    present = _first_index_of(result.present_best, fitness)
     return Curves(
         evaluations=np.asarray(result.history_evaluations, dtype=float),
         best_value=value[best],
@@ -117,7 +205,7 @@ def _curves(result: Result, tape: _Tape) -> Curves:
     )
 
 
-def _index_of(wanted: Array, fitness: Array) -> NDArray[np.intp]:
+def _first_index_of(wanted: Array, fitness: Array) -> NDArray[np.intp]:
     """For each wanted figure the first evaluation that gave it; one past the end if none did."""
     order = np.argsort(fitness, kind="stable")
     place = np.minimum(np.searchsorted(fitness[order], wanted), len(fitness) - 1)

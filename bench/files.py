@@ -1,4 +1,4 @@
-"""Results on the disk: whole files or none, and never over the results of another configuration."""
+"""Result files on the disk: written whole or not at all, and never over the results of another configuration."""
 
 import os
 import tempfile
@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import zip_longest
 from pathlib import Path
 
-from problem.errors import InputError
+from armlab.common.errors import InputError
 
 
 def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
@@ -48,11 +48,11 @@ def check_folder(folder: Path, name: str, settings: str) -> None:
     if found is None and (folder / f"{name}.csv").exists():
         raise InputError(f"{folder}/{name}.csv is there without {there.name}, which tells its origin: {way_out}")
     if found not in (None, settings):
-        difference = _first_difference(str(found), settings)
+        difference = _describe_first_difference(str(found), settings)
         raise InputError(f"{folder} holds results of another configuration ({difference}): {way_out}")
 
 
-def _first_difference(found: str, settings: str) -> str:
+def _describe_first_difference(found: str, settings: str) -> str:
     pairs = zip_longest(found.splitlines(), settings.splitlines(), fillvalue="nothing")
     old, new = next(((old, new) for old, new in pairs if old != new), ("other line ends", "ours"))
     return f"'{old.strip()}' there, '{new.strip()}' here"

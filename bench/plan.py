@@ -1,18 +1,18 @@
-"""From a configuration to its trials, each with the names under which it stands in tables and figures."""
+"""The trials of a configuration, each with its labels and its key in the run store, and which of our algorithms stand
+beside which peers.
+"""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, overload
+from typing import Any, cast, overload
 
 from algorithms.contract import AnyAlgorithm
-from bench.config import AlgorithmChoice, Experiment, ProblemChoice
-from bench.execute import built
-from bench.fingerprint import fingerprint
-from bench.lookup import find_algorithm
-from bench.params import parse_params
-from bench.trial import Trial
-from problem.errors import InputError
+from algorithms.registry import load, peer_names
+from armlab.common.errors import InputError
+from bench.config import AlgorithmChoice, Experiment, ProblemChoice, find_algorithm, parse_params
+from bench.execute import Trial, build_problem
+from bench.provenance import fingerprint
 from problem.registry import ProblemSettings, parse_problem
 
 
@@ -82,18 +82,18 @@ class Plan(Sequence[Entry]):
         found = [one for one in self.series if (one.problem, one.first.swarm_size, one.first.evaluations) == cell]
         return [one.entry(repetition) for one in found for repetition in range(self.repetitions)]
 
-    def firsts(self) -> list[Entry]:
+    def first_entries(self) -> list[Entry]:
         """The first repetition of each series: all labels and settings that there are."""
         return [series.entry(0) for series in self.series]
 
 
-def plan(experiment: Experiment, where: str) -> Plan:
+def plan_trials(experiment: Experiment, where: str) -> Plan:
     """All trials in the order of the configuration: problem, swarm size, budget, algorithm, repetition.
 
     Raises InputError, in one line, for a problem, an algorithm or a hyper-parameter that is not right.
     """
-    problems = [(choice.label, _problem(choice, where)) for choice in experiment.problem]
-    contestants = [_contestant(choice, where) for choice in experiment.algorithms]
+    problems = [(choice.label, _parse_problem(choice, where)) for choice in experiment.problem]
+    contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
     codes = {
         (label, contestant.label): fingerprint(contestant.algorithm, problem.model_dump(mode="json"))
         for (label, problem), contestant in product(problems, contestants)
@@ -102,7 +102,7 @@ def plan(experiment: Experiment, where: str) -> Plan:
         Series(
             label,
             contestant.label,
-            _trial(experiment, problem, contestant, swarm_size, evaluations),
+            _first_trial(experiment, problem, contestant, swarm_size, evaluations),
             codes[label, contestant.label],
         )
         for label, problem in problems
@@ -113,24 +113,24 @@ def plan(experiment: Experiment, where: str) -> Plan:
     return Plan(tuple(series), experiment.repetitions)
 
 
-def _problem(choice: ProblemChoice, where: str) -> ProblemSettings:
+def _parse_problem(choice: ProblemChoice, where: str) -> ProblemSettings:
     """The problem's settings, after it was built once: not all mistakes show before."""
     place = f"problem of {where}"
     settings = parse_problem(choice.settings, place)
     try:
-        built(settings)
+        build_problem(settings)
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
     return settings
 
 
-def _contestant(choice: AlgorithmChoice, where: str) -> _Contestant:
+def _make_contestant(choice: AlgorithmChoice, where: str) -> _Contestant:
     algorithm = find_algorithm(choice.name, f"'algorithms' in {where}")
     params = parse_params(algorithm.Params, choice.params, f"params of {choice.name} in {where}")
     return _Contestant(choice.label or choice.name, algorithm, choice.name, params)
 
 
-def _trial(
+def _first_trial(
     experiment: Experiment, problem: ProblemSettings, contestant: _Contestant, swarm_size: int, evaluations: int
 ) -> Trial:
     """The first repetition."""
@@ -144,3 +144,17 @@ def _trial(
         seed=experiment.seed,
         repetition=0,
     )
+
+
+def rival_pairs(entries: Iterable[Entry]) -> list[tuple[str, str]]:
+    """Labels of ours and theirs, for every peer whose rival takes part."""
+    labels = dict.fromkeys((entry.algorithm, entry.trial.algorithm) for entry in entries)
+    ours = {name: label for label, name in reversed(labels)}
+    peers = [(label, _rival_name(name)) for label, name in labels if name in peer_names()]
+    return [(ours[rival], label) for label, rival in peers if rival in ours]
+
+
+def _rival_name(name: str) -> str:
+    from algorithms.peers.peer import Peer  # only where a peer takes part
+
+    return cast(type[Peer], load(name)).rival

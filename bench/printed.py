@@ -1,4 +1,4 @@
-"""The numbers that the paper prints, to stand beside ours; they live in `printed.yaml`, each with its place."""
+"""The numbers that the paper prints, to stand beside ours; they are in `printed.yaml`, each with its place."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from problem.settings import Settings
-from problem.yaml_input import read_yaml, validate
+from armlab.common.settings import Settings, read_yaml, validate
 
 Fraction = tuple[int, int]
 Number = int | float
@@ -121,7 +120,7 @@ class Printed(Settings):
 
 
 @lru_cache(maxsize=1)
-def printed() -> Printed:
+def read_printed() -> Printed:
     """The paper's numbers."""
     path = Path(__file__).with_suffix(".yaml")
     content: Any = read_yaml(path)
@@ -135,4 +134,4 @@ def times_pi(fraction: Fraction) -> float:
 
 def display_name(label: str) -> str:
     """An algorithm's name as the paper writes it; any other label as it is."""
-    return {"mupso": "MuPSO"}.get(label, label.upper() if label in printed().table2 else label)
+    return {"mupso": "MuPSO"}.get(label, label.upper() if label in read_printed().table2 else label)

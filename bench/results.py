@@ -1,16 +1,12 @@
-"""From the run store to the files of an experiment: tables, figures, and the settings that made them."""
+"""The result files of an experiment, from the run store: tables, figures, and the settings that made them."""
 
 from pathlib import Path
 
 from bench.config import Experiment
-from bench.convergence import convergence_table
 from bench.files import settings_path, write_whole
-from bench.frame import tidy_frame
-from bench.markdown import summary_page
-from bench.plan import Plan
-from bench.rival_pairs import rival_pairs
+from bench.plan import Plan, rival_pairs
 from bench.store import RunStore
-from bench.table import as_csv, summary_table, times_table
+from bench.tables import as_csv, convergence_table, summary_page, summary_table, tidy_frame, times_table
 
 Files = dict[str, str | bytes]
 
@@ -20,16 +16,19 @@ def write_results(experiment: Experiment, entries: Plan, settings: str, store: R
 
     The settings come last, so that results cut off half-way are not taken for whole ones.
     """
-    make = {"table": _table, "swarm_sizes": _swarm_sizes, "convergence": _convergence, "rivals": _rivals}[
-        experiment.output
-    ]
+    make = {
+        "table": _table_files,
+        "swarm_sizes": _swarm_size_files,
+        "convergence": _convergence_files,
+        "rivals": _rivals_files,
+    }[experiment.output]
     files = make(experiment, entries, store) | {settings_path(folder, experiment.name).name: settings}
     for name, content in files.items():
         write_whole(folder / name, content)
     return [folder / name for name in files]
 
 
-def _table(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
+def _table_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     frame = tidy_frame(entries, store)
     table = summary_table(frame)
     return {
@@ -39,29 +38,29 @@ def _table(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     }
 
 
-def _rivals(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
+def _rivals_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
     from bench.rivals import rivals_page, rivals_table  # scipy's statistics take longer to import than a small run
 
-    table = rivals_table(tidy_frame(entries, store), rival_pairs(entries.firsts()))
+    table = rivals_table(tidy_frame(entries, store), rival_pairs(entries.first_entries()))
     pages = {f"{experiment.name}_rivals.csv": as_csv(table), f"{experiment.name}_rivals.md": rivals_page(table)}
-    return _table(experiment, entries, store) | pages
+    return _table_files(experiment, entries, store) | pages
 
 
-def _swarm_sizes(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
-    from bench.figure2 import draw_cost, draw_times  # matplotlib takes longer to import than a small run
+def _swarm_size_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
+    from bench.figures import draw_cost, draw_times  # matplotlib takes longer to import than a small run
 
     frame = tidy_frame(entries, store)
     cost, times = draw_cost(summary_table(frame)), draw_times(times_table(frame))
-    figures = _named(experiment.name, cost) | _named(f"{experiment.name}_times", times)
-    return _table(experiment, entries, store) | figures
+    figures = _image_files(experiment.name, cost) | _image_files(f"{experiment.name}_times", times)
+    return _table_files(experiment, entries, store) | figures
 
 
-def _convergence(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
-    from bench.figure3 import draw_convergence  # matplotlib takes longer to import than a small run
+def _convergence_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:
+    from bench.figures import draw_convergence  # matplotlib takes longer to import than a small run
 
     table = convergence_table(entries, store)
-    return {f"{experiment.name}.csv": as_csv(table)} | _named(experiment.name, draw_convergence(table))
+    return {f"{experiment.name}.csv": as_csv(table)} | _image_files(experiment.name, draw_convergence(table))
 
 
-def _named(name: str, images: dict[str, bytes]) -> Files:
+def _image_files(name: str, images: dict[str, bytes]) -> Files:
     return {f"{name}.{suffix}": image for suffix, image in images.items()}

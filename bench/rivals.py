@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bench.frame import GROUP
-from bench.page import markdown_table, page
+from armlab.common.markdown import markdown_page, markdown_table
 from bench.statistics import is_feasible, quantile
-from bench.statistics.paired import duels
+from bench.statistics.pairwise import duels
+from bench.tables import GROUP_COLUMNS
 
-_CELL = [name for name in GROUP if name != "algorithm"]
-_NOTES = """\
+_CELL_COLUMNS = [name for name in GROUP_COLUMNS if name != "algorithm"]
+_READING = """\
 Median: of the ends, for an arm the condition number; an infeasible end counts as infinite. Ours better: chance
 that an end of ours is better than one of theirs (A12), ties counting half. p: Wilcoxon's signed-rank test, paired by
 repetition (equal first populations), after Holm over the pairs of one problem. us: microseconds of processor time an
@@ -23,7 +23,9 @@ answer: the figure is what a comparison here takes, not the peer's own overhead.
 
 def rivals_table(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
     """One row a problem and pair, ours and theirs by their labels; frame: tidy, as `tidy_frame` gives it."""
-    return pd.DataFrame([row for _, cell in frame.groupby(_CELL, sort=False) for row in _rows(cell, pairs)])
+    return pd.DataFrame(
+        [row for _, cell in frame.groupby(_CELL_COLUMNS, sort=False) for row in _pair_rows(cell, pairs)]
+    )
 
 
 def rivals_page(table: pd.DataFrame) -> str:
@@ -38,22 +40,22 @@ def rivals_page(table: pd.DataFrame) -> str:
         )
         for row in table.to_dict("records")
     ]
-    return page("Ours against theirs", markdown_table(headings, rows), _NOTES)
+    return markdown_page("Ours against theirs", markdown_table(headings, rows), _READING)
 
 
-def _rows(cell: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> Iterator[dict[str, Any]]:
+def _pair_rows(cell: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> Iterator[dict[str, Any]]:
     by_label = {str(label): rows for label, rows in cell.groupby("algorithm", sort=False)}
-    place = {name: cell[name].iloc[0] for name in _CELL}
+    place = {name: cell[name].iloc[0] for name in _CELL_COLUMNS}
     for duel in duels(cell, pairs):
         ours, theirs = by_label[duel.subject], by_label[duel.rival]
         yield {
             **place,
             "ours": duel.subject,
-            "our_median": _median(ours),
-            "our_microseconds": _microseconds(ours),
+            "our_median": _median_value(ours),
+            "our_microseconds": _median_microseconds(ours),
             "theirs": duel.rival,
-            "their_median": _median(theirs),
-            "their_microseconds": _microseconds(theirs),
+            "their_median": _median_value(theirs),
+            "their_microseconds": _median_microseconds(theirs),
             "ours_better": duel.superiority,
             "low": duel.low,
             "high": duel.high,
@@ -61,10 +63,10 @@ def _rows(cell: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> Iterator[dict
         }
 
 
-def _median(rows: pd.DataFrame) -> float:
+def _median_value(rows: pd.DataFrame) -> float:
     values = rows["value"].to_numpy()
     return quantile(np.where(is_feasible(values, rows["violation"].to_numpy()), values, np.inf), 0.5)
 
 
-def _microseconds(rows: pd.DataFrame) -> float:
+def _median_microseconds(rows: pd.DataFrame) -> float:
     return float((1e6 * rows["seconds"] / rows["evaluations"]).median())

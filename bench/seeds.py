@@ -1,4 +1,4 @@
-"""Random streams spawned from names, never from the order of work or the number of workers."""
+"""Random streams that are derived from names, never from the order of work or the number of workers."""
 
 import hashlib
 import json

@@ -1,16 +1,19 @@
-"""The run store: finished trials in one SQLite file that survives crashes and two runners at once."""
+"""The run store: finished trials in one SQLite file that survives crashes and two runners at once; and how to salvage
+a damaged one.
+"""
 
 import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import fields
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from bench.outcome import Curves, Outcome
-from problem.errors import InputError
+from armlab.common.errors import InputError
+from bench.execute import Curves, Outcome
 
 APPLICATION_ID = 0x41524D4C  # "ARML", in the header of the file: SQLite's own place for it
 SCHEMA_VERSION = 1
@@ -26,11 +29,11 @@ CREATE TABLE arrays (
 CREATE TABLE provenance (id INTEGER PRIMARY KEY, facts TEXT NOT NULL UNIQUE);
 """
 _BEST_X = "best_x"
-_BYTES_A_NUMBER = 8
-_LOCK_SECONDS = 60.0
+_BYTES_PER_NUMBER = 8
+_LOCK_TIMEOUT_S = 60.0
 
 
-class Figures(NamedTuple):
+class OutcomeFigures(NamedTuple):
     """The figures of an `Outcome`; dimension: how many numbers were searched."""
 
     value: float
@@ -50,57 +53,57 @@ class RunStore:
 
     def has(self, key: str) -> bool:
         """Whether the outcome of a key is there."""
-        with _plainly(self.path):
+        with _errors_in_one_line(self.path):
             find = "SELECT 1 FROM trials WHERE key = ?"
             return self._connection.execute(find, (key,)).fetchone() is not None
 
     def add(self, outcomes: Sequence[tuple[str, Outcome]], provenance: str) -> None:
         """Write outcomes by key in one durable transaction; keys that another runner has written stay."""
-        with _plainly(self.path), _transaction(self._connection) as sql:
+        with _errors_in_one_line(self.path), _transaction(self._connection) as sql:
             sql.execute("INSERT INTO provenance (facts) VALUES (?) ON CONFLICT DO NOTHING", (provenance,))
             (source,) = sql.execute("SELECT id FROM provenance WHERE facts = ?", (provenance,)).fetchone()
             for key, outcome in outcomes:
-                _insert(sql, key, outcome, source)
+                _insert_outcome(sql, key, outcome, source)
 
     def get(self, key: str) -> Outcome:
         """The outcome of a key; raises KeyError if it is not there."""
         figures = self.figures(key)
-        with _plainly(self.path):
+        with _errors_in_one_line(self.path):
             find = "SELECT name, dtype, data FROM arrays WHERE key = ?"
             blobs = self._connection.execute(find, (key,)).fetchall()
         arrays = {name: np.frombuffer(data, dtype) for name, dtype, data in blobs}
         best_x = arrays.pop(_BEST_X)
         return Outcome(*figures[:-1], best_x, Curves(**arrays))
 
-    def figures(self, key: str) -> Figures:
+    def figures(self, key: str) -> OutcomeFigures:
         """The figures of an outcome without its arrays; raises KeyError if it is not there."""
         find = (
             "SELECT value, violation, fitness, evaluations, seconds, length(data) FROM trials "
             f"JOIN arrays ON arrays.key = trials.key AND name = '{_BEST_X}' WHERE trials.key = ?"
         )
-        with _plainly(self.path):
+        with _errors_in_one_line(self.path):
             row = self._connection.execute(find, (key,)).fetchone()
         if row is None:
             raise KeyError(key)
         value, violation, fitness = (np.nan if number is None else number for number in row[:3])
-        return Figures(value, violation, fitness, row[3], row[4], row[5] // _BYTES_A_NUMBER)
+        return OutcomeFigures(value, violation, fitness, row[3], row[4], row[5] // _BYTES_PER_NUMBER)
 
     def origins(self, keys: Iterable[str]) -> list[str]:
         """The provenance of the outcomes of these keys, each text once, in the order of their first use."""
         find = "SELECT facts FROM trials JOIN provenance ON provenance.id = trials.provenance WHERE key = ?"
-        with _plainly(self.path):
+        with _errors_in_one_line(self.path):
             found = (self._connection.execute(find, (key,)).fetchone() for key in keys)
             return list(dict.fromkeys(row[0] for row in found if row))
 
     def keys(self, prefix: str) -> list[str]:
         """The keys that begin with these hexadecimal digits."""
         find = "SELECT key FROM trials WHERE key >= ? AND key < ?"
-        with _plainly(self.path):
+        with _errors_in_one_line(self.path):
             return [key for (key,) in self._connection.execute(find, (prefix, f"{prefix}g")).fetchall()]
 
     def forget(self, keys: Iterable[str]) -> None:
         """Drop outcomes, so that they are computed again."""
-        with _plainly(self.path), _transaction(self._connection) as sql:
+        with _errors_in_one_line(self.path), _transaction(self._connection) as sql:
             for key in keys:
                 sql.execute("DELETE FROM arrays WHERE key = ?", (key,))
                 sql.execute("DELETE FROM trials WHERE key = ?", (key,))
@@ -113,11 +116,11 @@ def open_store(path: Path) -> Iterator[RunStore]:
     Raises InputError, in one line, for a folder or file that cannot be written, a corrupt file, another
     program's file, and a store of another version of the schema.
     """
-    with _plainly(path):
+    with _errors_in_one_line(path):
         connection = _connect(path)
     try:
-        with _plainly(path):
-            _prepare(connection, path)
+        with _errors_in_one_line(path):
+            _prepare_schema(connection, path)
         yield RunStore(connection, path)
     finally:
         connection.close()
@@ -125,10 +128,10 @@ def open_store(path: Path) -> Iterator[RunStore]:
 
 def _connect(path: Path) -> sqlite3.Connection:
     path.parent.mkdir(parents=True, exist_ok=True)
-    return sqlite3.connect(path, timeout=_LOCK_SECONDS, isolation_level=None)
+    return sqlite3.connect(path, timeout=_LOCK_TIMEOUT_S, isolation_level=None)
 
 
-def _prepare(connection: sqlite3.Connection, path: Path) -> None:
+def _prepare_schema(connection: sqlite3.Connection, path: Path) -> None:
     with _transaction(connection) as sql:
         (is_empty,) = sql.execute("SELECT count(*) = 0 FROM sqlite_master").fetchone()
         if is_empty:
@@ -153,7 +156,7 @@ def _check_header(sql: sqlite3.Connection, path: Path) -> None:
         )
 
 
-def _insert(sql: sqlite3.Connection, key: str, outcome: Outcome, source: int) -> None:
+def _insert_outcome(sql: sqlite3.Connection, key: str, outcome: Outcome, source: int) -> None:
     figures = (outcome.value, outcome.violation, outcome.fitness, outcome.evaluations, outcome.seconds)
     insert = "INSERT INTO trials VALUES (?, ?, ?, ?, ?, ?, ?) ON CONFLICT (key) DO NOTHING"
     cursor = sql.execute(insert, (key, *figures, source))
@@ -173,7 +176,7 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]
 
 
 @contextmanager
-def _plainly(path: Path) -> Iterator[None]:
+def _errors_in_one_line(path: Path) -> Iterator[None]:
     """What a file system or SQLite complains of, in one line; our own mistakes in SQL pass through."""
     try:
         yield
@@ -182,10 +185,10 @@ def _plainly(path: Path) -> Iterator[None]:
     except (sqlite3.ProgrammingError, sqlite3.IntegrityError):
         raise
     except sqlite3.DatabaseError as error:
-        raise InputError(f"cannot use the run store {path}: {error}{_advice(error, path)}") from None
+        raise InputError(f"cannot use the run store {path}: {error}{_advice_on_error(error, path)}") from None
 
 
-def _advice(error: sqlite3.DatabaseError, path: Path) -> str:
+def _advice_on_error(error: sqlite3.DatabaseError, path: Path) -> str:
     """What to do about it, and that nothing is lost."""
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the rest says more than anyone wants to know
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
@@ -193,3 +196,53 @@ def _advice(error: sqlite3.DatabaseError, path: Path) -> str:
     if code == sqlite3.SQLITE_CORRUPT:
         return f"; `armlab salvage {path} --out NEW` takes what is readable into a new store"
     return ""
+
+
+_KEY_PREFIXES = [f"{number:03x}" for number in range(16**3)]  # a damaged page costs those that lead over it
+_OUTCOMES_PER_TRANSACTION = 1000  # outcomes a transaction
+StoredOutcome = tuple[str, Outcome, str]
+
+
+def salvage(damaged: Path, out: Path) -> int:
+    """Take every outcome that can be read into a new store; returns how many those are. The damaged one stays as it is.
+
+    Raises InputError if there is no such file, nothing of it can be read, or the new store exists.
+    """
+    if not damaged.is_file():
+        raise InputError(f"there is no run store {damaged}")
+    if out.exists():
+        raise InputError(f"{out} is there already: name a new file with --out")
+    with closing(sqlite3.connect(f"{damaged.resolve().as_uri()}?mode=ro", uri=True)) as connection:
+        connection.execute("PRAGMA writable_schema = ON")  # else SQLite reads nothing of a file that is too short
+        found = _read_outcomes(RunStore(connection, damaged))
+        first = next(found, None)
+        if first is None:
+            raise InputError(f"nothing of {damaged} can be read: it, or its beginning, is no store's")
+        return _write_outcomes([first], found, out)
+
+
+def _write_outcomes(piece: list[StoredOutcome], found: Iterator[StoredOutcome], out: Path) -> int:
+    count = 0
+    with open_store(out) as store:
+        while piece:
+            for origin in dict.fromkeys(origin for _, _, origin in piece):
+                store.add([(key, outcome) for key, outcome, its in piece if its == origin], origin)
+            count += len(piece)
+            piece = list(islice(found, _OUTCOMES_PER_TRANSACTION))
+    return count
+
+
+def _read_outcomes(store: RunStore) -> Iterator[StoredOutcome]:
+    for prefix in _KEY_PREFIXES:
+        for key in _read_keys(store, prefix):
+            with suppress(InputError, LookupError, TypeError, ValueError):  # whatever damage makes of a row
+                yield key, store.get(key), store.origins([key])[0]
+
+
+def _read_keys(store: RunStore, prefix: str) -> list[str]:
+    """Of a prefix, or, where it leads over a damaged page, of those longer ones that do not."""
+    try:
+        return store.keys(prefix)
+    except InputError:
+        longer = [f"{prefix}{digit:x}" for digit in range(16)] if len(prefix) == len(_KEY_PREFIXES[0]) else []
+        return [key for one in longer for key in _read_keys(store, one)]

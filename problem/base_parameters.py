@@ -18,8 +18,8 @@ from problem.regressor import observation_matrix
 from problem.transforms import Array
 
 Preference = Literal["later_columns", "earlier_columns"] | Sequence[str]
-STATES = 200  # random states that probe the columns
-TOLERANCE = 1e-9  # of a column's length: above rounding (1e-13), below any real dependence of an arm
+RANDOM_STATES = 200  # random states that probe the columns
+DEPENDENCE_TOLERANCE = 1e-9  # of a column's length: above rounding (1e-13), below any real dependence of an arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,29 +81,29 @@ def base_parameters(arm: Arm, preference: Preference = "later_columns") -> BaseP
     the last link backwards), the earlier ones, or names of parameters to keep first, then the later ones.
     Raises ValueError for an unknown name.
     """
-    matrix = _probe(arm)
+    matrix = _random_observation_matrix(arm)
     lengths = np.linalg.norm(matrix, axis=0)
-    effective = lengths > TOLERANCE * lengths.max()
+    effective = lengths > DEPENDENCE_TOLERANCE * lengths.max()
     unit = matrix / np.where(effective, lengths, 1.0)
-    kept = _independent(unit, [column for column in _order(arm, preference) if effective[column]])
+    kept = _independent_columns(unit, [column for column in _column_order(arm, preference) if effective[column]])
     dependent = np.flatnonzero(effective & ~np.isin(np.arange(matrix.shape[1]), kept))
     combination = np.linalg.lstsq(unit[:, kept], unit[:, dependent], rcond=None)[0]
     combination *= lengths[dependent] / lengths[kept, None]
-    combination[np.abs(combination) < TOLERANCE] = 0.0
+    combination[np.abs(combination) < DEPENDENCE_TOLERANCE] = 0.0
     grouping = np.zeros((len(kept), matrix.shape[1]))
     grouping[:, kept] = np.eye(len(kept))
     grouping[:, dependent] = combination
     return BaseParameters(arm.parameter_names, kept, grouping)
 
 
-def _probe(arm: Arm) -> Array:
+def _random_observation_matrix(arm: Arm) -> Array:
     """Observation matrix at random states, the same for each call."""
     rng = np.random.default_rng(0)
-    states = (rng.uniform(-2, 2, (STATES, len(arm))) for _ in range(3))
+    states = (rng.uniform(-2, 2, (RANDOM_STATES, len(arm))) for _ in range(3))
     return observation_matrix(arm, Motion(*states))
 
 
-def _order(arm: Arm, preference: Preference) -> list[int]:
+def _column_order(arm: Arm, preference: Preference) -> list[int]:
     columns = list(range(10 * len(arm)))
     if preference == "later_columns":
         return columns[::-1]
@@ -116,7 +116,7 @@ def _order(arm: Arm, preference: Preference) -> list[int]:
     return wanted + [column for column in columns[::-1] if column not in wanted]
 
 
-def _independent(unit: Array, order: list[int]) -> NDArray[np.intp]:
+def _independent_columns(unit: Array, order: list[int]) -> NDArray[np.intp]:
     """Columns kept by Gram-Schmidt with reorthogonalisation, in the given order; returned ascending."""
     basis = np.empty((unit.shape[0], 0))
     kept = []
@@ -124,7 +124,7 @@ def _independent(unit: Array, order: list[int]) -> NDArray[np.intp]:
         rest = unit[:, column]
         for _ in range(2):
             rest = rest - basis @ (basis.T @ rest)
-        if np.linalg.norm(rest) > TOLERANCE:
+        if np.linalg.norm(rest) > DEPENDENCE_TOLERANCE:
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             kept.append(column)
     return np.sort(np.array(kept, dtype=np.intp))

@@ -11,8 +11,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from armlab.common.settings import validate
 from problem.contract import Evaluation, Problem
-from problem.settings import validate
 from problem.transforms import Array
 
 
@@ -37,7 +37,7 @@ class ProblemContract:
         problem, points = self._problem(), self._points()
         for k, point in enumerate(points):
             alone = problem.evaluate(point[None])
-            assert _figures(alone, 0) == _figures(problem.evaluate(points), k)
+            assert _figures_of_point(alone, 0) == _figures_of_point(problem.evaluate(points), k)
 
     def test_it_leaves_the_points_as_they_are(self) -> None:
         points = self._points()
@@ -61,5 +61,5 @@ class ProblemContract:
         return np.random.default_rng(0).uniform(problem.lower, problem.upper, (7, len(problem.lower)))
 
 
-def _figures(evaluation: Evaluation, k: int) -> list[bytes]:
+def _figures_of_point(evaluation: Evaluation, k: int) -> list[bytes]:
     return [np.asarray(figures, dtype=float)[k].tobytes() for figures in evaluation]

@@ -11,7 +11,7 @@ from problem.motion import Motion
 from problem.regressor import gram_matrix, observation_matrix
 from problem.transforms import Array
 
-GRAM_LIMIT = 1e4
+MAX_GRAM_CONDITION = 1e4
 """Largest condition number taken from the Gram matrix: its square loses 2e-16 * cond^2 of relative accuracy,
 here at most 1e-7; beyond it the singular values come from the observation matrix itself."""
 
@@ -62,12 +62,12 @@ def singular_values(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_co
     finite = np.asarray(np.isfinite(gram.sum(axis=(1, 2))))
     squares = np.linalg.eigvalsh(np.where(finite[:, None, None], gram, 0.0))[:, ::-1]
     values = np.sqrt(np.maximum(squares, 0.0))
-    for point in np.flatnonzero(finite & (values[:, 0] > GRAM_LIMIT * values[:, -1])):
-        values[point] = _exactly(arm, motion.select(point), columns, unit_columns)
+    for point in np.flatnonzero(finite & (values[:, 0] > MAX_GRAM_CONDITION * values[:, -1])):
+        values[point] = _singular_values_of_matrix(arm, motion.select(point), columns, unit_columns)
     return values
 
 
-def _exactly(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool) -> Array:
+def _singular_values_of_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool) -> Array:
     matrix = observation_matrix(arm, motion)[:, columns]
     if unit_columns:
         lengths = np.linalg.norm(matrix, axis=0)

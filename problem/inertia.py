@@ -10,7 +10,7 @@ from problem.arm import Link
 from problem.transforms import Array
 
 
-def about_origin(link: Link) -> Array:
+def pseudo_inertia_of(link: Link) -> Array:
     """Pseudo-inertia (4, 4) of a link about the origin of its frame."""
     xx, yy, zz, xy, xz, yz = link.inertia
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -21,12 +21,12 @@ def about_origin(link: Link) -> Array:
     return pseudo
 
 
-def moved(pseudo: Array, pose: Array) -> Array:
+def transform_pseudo_inertia(pseudo: Array, pose: Array) -> Array:
     """The same body seen from a frame in which its own frame has the given pose (4, 4); eq. 17 and a turn."""
     return pose @ pseudo @ pose.T
 
 
-def pseudo_link(pseudo: Array) -> Link:
+def link_from_pseudo_inertia(pseudo: Array) -> Link:
     """The link whose pseudo-inertia is given."""
     inertia = np.trace(pseudo[:3, :3]) * np.eye(3) - pseudo[:3, :3]
     entries = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
@@ -38,4 +38,6 @@ def link_from_centre_of_mass(mass: float, centre: Array, inertia: Array) -> Link
     entries = tuple(np.asarray(inertia)[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].tolist())
     pose = np.eye(4)
     pose[:3, 3] = centre
-    return pseudo_link(moved(about_origin(Link(mass, (0.0, 0.0, 0.0), entries)), pose))
+    return link_from_pseudo_inertia(
+        transform_pseudo_inertia(pseudo_inertia_of(Link(mass, (0.0, 0.0, 0.0), entries)), pose)
+    )

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.errors import InputError
 from problem.arm import Arm, link_poses
-from problem.errors import InputError
 from problem.motion import Motion
 from problem.transforms import Array
 
-SMALLEST_SINE = 1e-6  # of the elbow's angle and of the distance (m) to the first axis: keeps the rates finite
-TOLERANCE = 1e-9
+MIN_SINE = 1e-6  # of the elbow's angle and of the distance (m) to the first axis: keeps the rates finite
+GEOMETRY_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +47,13 @@ class PlanarArm:
 
         The first joint is continuous along the path and starts within half a turn of its zero.
         """
-        turn, radial = _cylindrical(path)
+        turn, radial = _cylindrical_motion(path)
         height = (path.position[2] - self.height, path.velocity[2], path.acceleration[2])
         radial = (radial[0] - self.offset, radial[1], radial[2])
         upper, elbow, overreach = self._planar(radial, height, -1.0 if elbow_up else 1.0)
-        first = (_continuous(turn[0] - self.azimuth), turn[1], turn[2])
-        second = (_wrapped(self.upper_angle - upper[0]), -upper[1], -upper[2])
-        third = (_wrapped(self.fore_angle - self.upper_angle - elbow[0]), -elbow[1], -elbow[2])
+        first = (_unwrap_angles(turn[0] - self.azimuth), turn[1], turn[2])
+        second = (_wrap_angles(self.upper_angle - upper[0]), -upper[1], -upper[2])
+        third = (_wrap_angles(self.fore_angle - self.upper_angle - elbow[0]), -elbow[1], -elbow[2])
         joints = (np.stack(derivative, axis=-1) for derivative in zip(first, second, third, strict=True))
         return Motion(*joints), overreach
 
@@ -68,11 +68,11 @@ class PlanarArm:
         half_bend = dx * dx + dz * dz + x * ddx + z * ddz
         scale = 1.0 / (upper * fore)
         cosine = np.clip((square - upper**2 - fore**2) * (0.5 * scale), -1.0, 1.0)
-        sine = side * np.maximum(np.sqrt(1.0 - cosine * cosine), SMALLEST_SINE)
+        sine = side * np.maximum(np.sqrt(1.0 - cosine * cosine), MIN_SINE)
         elbow = side * np.arccos(cosine)
         elbow_rate = -half_rate * scale / sine
         elbow_bend = -(half_bend * scale + cosine * elbow_rate**2) / sine
-        inverse = 1.0 / np.maximum(square, SMALLEST_SINE**2)
+        inverse = 1.0 / np.maximum(square, MIN_SINE**2)
         lever = fore * (upper * cosine + fore) * inverse
         growth = 2.0 * half_rate * inverse
         aim_rate = (x * dz - z * dx) * inverse
@@ -93,12 +93,14 @@ def planar_arm(arm: Arm, tool: Array) -> PlanarArm:
     """
     if len(arm) != 3 or any(joint.kind != "revolute" for joint in arm.joints):
         raise InputError(f"a Cartesian path needs an arm of three revolute joints; '{arm.name}' is another")
-    axes, origins = _axes(arm)
+    axes, origins = _joint_axes(arm)
     tip = (link_poses(arm, np.zeros(3))[-1] @ [*tool, 1.0])[:3]
     forward = np.cross(axes[1], axes[0])
-    upright = np.allclose(axes[0], [0, 0, 1], atol=TOLERANCE) and np.allclose(origins[0][:2], 0, atol=TOLERANCE)
-    parallel = np.allclose(axes[1], axes[2], atol=TOLERANCE) and abs(axes[1][2]) < TOLERANCE
-    in_plane = abs(float(axes[1] @ tip)) < TOLERANCE
+    upright = np.allclose(axes[0], [0, 0, 1], atol=GEOMETRY_TOLERANCE) and np.allclose(
+        origins[0][:2], 0, atol=GEOMETRY_TOLERANCE
+    )
+    parallel = np.allclose(axes[1], axes[2], atol=GEOMETRY_TOLERANCE) and abs(axes[1][2]) < GEOMETRY_TOLERANCE
+    in_plane = abs(float(axes[1] @ tip)) < GEOMETRY_TOLERANCE
     if not (upright and parallel and in_plane):
         raise InputError(
             f"a Cartesian path needs axis 1 along z of the base, axes 2 and 3 parallel and level, "
@@ -112,7 +114,7 @@ def planar_arm(arm: Arm, tool: Array) -> PlanarArm:
     return PlanarArm(azimuth, float(forward @ origins[1]), float(origins[1][2]), upper, upper_angle, fore, fore_angle)
 
 
-def _axes(arm: Arm) -> tuple[list[Array], list[Array]]:
+def _joint_axes(arm: Arm) -> tuple[list[Array], list[Array]]:
     """Directions and points of the joints' axes at joint zeros, in the base frame."""
     frames, pose = [], np.eye(4)
     for joint in arm.joints:
@@ -121,10 +123,10 @@ def _axes(arm: Arm) -> tuple[list[Array], list[Array]]:
     return [frame[:3, 2] for frame in frames], [frame[:3, 3] for frame in frames]
 
 
-def _cylindrical(path: Path) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
+def _cylindrical_motion(path: Path) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     """Angle and distance about z with two derivatives."""
     (x, y, _), (dx, dy, _), (ddx, ddy, _) = path.position, path.velocity, path.acceleration
-    distance = np.maximum(np.sqrt(x * x + y * y), SMALLEST_SINE)
+    distance = np.maximum(np.sqrt(x * x + y * y), MIN_SINE)
     inverse = 1.0 / distance
     rate = (x * dx + y * dy) * inverse
     bend = (dx * dx + dy * dy + x * ddx + y * ddy - rate * rate) * inverse
@@ -134,12 +136,12 @@ def _cylindrical(path: Path) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     return (np.arctan2(y, x), turn_rate, turn_bend), (distance, rate, bend)
 
 
-def _wrapped(angle: Array) -> Array:
+def _wrap_angles(angle: Array) -> Array:
     """Angles in [-pi, pi)."""
     return angle - 2 * np.pi * np.floor(angle / (2 * np.pi) + 0.5)
 
 
-def _continuous(angle: Array) -> Array:
+def _unwrap_angles(angle: Array) -> Array:
     """Angles without jumps of a turn along the samples, the first in [-pi, pi)."""
-    jumps = np.diff(angle, axis=-1, prepend=_wrapped(angle[..., :1]))
+    jumps = np.diff(angle, axis=-1, prepend=_wrap_angles(angle[..., :1]))
     return angle - 2 * np.pi * np.cumsum(np.floor(jumps / (2 * np.pi) + 0.5), axis=-1)

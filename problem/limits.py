@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from problem.arm import Arm, Limits
-from problem.kinematics import body_points
+from problem.arm import Arm, Limits, body_points
+from problem.kernel import lib, pointer
 from problem.motion import Motion
-from problem.native import lib, pointer
 from problem.regressor import rigid_body_torque
-from problem.trajectory import Excitation
+from problem.trajectories import Excitation
 from problem.transforms import Array
 
 

@@ -1,27 +1,96 @@
-"""Typed settings of the problems, one class a preset; each choice that the paper leaves open has its key here."""
+"""Typed settings of the problems, one class a preset; each choice that the paper leaves open has its key here.
 
-from typing import Annotated, ClassVar, Literal
+Limits are those of the robot file, or others in their place.
+"""
+
+from collections.abc import Sized
+from typing import Annotated, ClassVar, Literal, TypeVar
 
 import numpy as np
 from annotated_types import Ge, Gt
 
-from problem.arm import Arm
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings
+from problem.arm import Arm, Limits
 from problem.base_parameters import BaseParameters, base_parameters
-from problem.cartesian_fourier import CartesianFourier
 from problem.contract import Problem
-from problem.errors import InputError
-from problem.excitation_problem import ExcitationProblem, FeasibilityRules, Penalty
+from problem.excitation import ExcitationProblem, FeasibilityRules, Penalty, ShiftedProblem, shift_randomly
 from problem.fitness import Criterion
-from problem.frame import ShiftedProblem, in_random_frame
 from problem.functions import FUNCTIONS, TestFunction
 from problem.inverse_kinematics import planar_arm
-from problem.joint_fourier import JointFourier
-from problem.limit_settings import LimitSettings, PerJoint, Positive, Range, Vector, WorkspaceSettings, one_a_joint
-from problem.limits import Constraints
+from problem.limits import Constraints, Workspace
 from problem.robot_file import load_arm
-from problem.settings import Settings
-from problem.trajectory import Trajectory
+from problem.trajectories import CartesianFourier, JointFourier, Trajectory
 from problem.transforms import Array
+
+Positive = Annotated[float, Gt(0)]
+Vector = tuple[float, float, float]
+Range = tuple[float, float]
+PerJoint = Positive | tuple[Positive, ...]
+T = TypeVar("T")
+
+
+class LimitSettings(Settings):
+    """Limits in place of the robot file's: one number for all joints, or one a joint; rad (m), s, N m (N).
+
+    position: `robot` keeps the file's; a list has one [lower, upper] a joint, or null where there is none.
+    torque: `none` drops the file's.
+    """
+
+    position: Literal["robot"] | tuple[Range | None, ...] = "robot"
+    velocity: PerJoint | None = None
+    acceleration: PerJoint | None = None
+    torque: PerJoint | Literal["none"] | None = None
+
+    def of(self, arm: Arm) -> tuple[Limits, ...]:
+        """The limits in force, one a joint. Raises InputError for a wrong number of entries or order."""
+        rates = [self._rates(arm, name) for name in ("velocity", "acceleration", "torque")]
+        return tuple(Limits(*entries) for entries in zip(self._positions(arm), *rates, strict=True))
+
+    def _positions(self, arm: Arm) -> list[Range]:
+        if self.position == "robot":
+            return [joint.limits.position for joint in arm.joints]
+        given: list[Range] = [(-np.inf, np.inf) if limits is None else limits for limits in self.position]
+        for low, high in given:
+            if low >= high:
+                raise InputError(f"limits.position should be [lower, upper], so [{high}, {low}]")
+        _check_count("limits.position", given, arm)
+        return given
+
+    def _rates(self, arm: Arm, name: str) -> list[float]:
+        given = getattr(self, name)
+        if given is None:
+            return [getattr(joint.limits, name) for joint in arm.joints]
+        if given == "none":
+            return [np.inf] * len(arm)
+        return list(per_joint_values(f"limits.{name}", given, arm))
+
+
+class WorkspaceSettings(Settings):
+    """Largest distance from the base, floor, and two opposite corners of a keep-out box; base frame, m."""
+
+    reach: Positive | None = None
+    floor: float | None = None
+    keep_out: tuple[Vector, Vector] | None = None
+
+    def build(self, tool: Vector) -> Workspace:
+        """The workspace for the links' frames and a tool point in the last link's frame, m."""
+        given = {name: value for name, value in self.model_dump().items() if value is not None}
+        return Workspace(**given, tool=tool)
+
+
+def per_joint_values(name: str, given: T | tuple[T, ...], arm: Arm) -> tuple[T, ...]:
+    """The given value for each joint. Raises InputError if a list has not one entry a joint."""
+    if not isinstance(given, tuple):
+        return (given,) * len(arm)
+    _check_count(name, given, arm)
+    return given
+
+
+def _check_count(name: str, given: Sized, arm: Arm) -> None:
+    if len(given) != len(arm):
+        raise InputError(f"{name} should have {len(arm)} entries, one a joint of '{arm.name}', has {len(given)}")
+
 
 NotNegative = Annotated[float, Ge(0)]
 Count = Annotated[int, Ge(1)]
@@ -100,7 +169,7 @@ class ExcitationSettings(Settings):
             penalty=FeasibilityRules() if self.penalty == "feasibility_rules" else self.penalty.build(),
             unit_columns=self.unit_columns,
         )
-        return problem if self.frame_seed is None else in_random_frame(problem, self.frame_seed)
+        return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
 
     def trajectory(self, arm: Arm) -> Trajectory:
         """The family of trajectories that is searched."""
@@ -213,7 +282,7 @@ class JointFourierSettings(ExcitationSettings):
 
     def _coefficient_limit(self, arm: Arm) -> Array:
         if self.coefficient_limit is not None:
-            return np.array(one_a_joint("coefficient_limit", self.coefficient_limit, arm))
+            return np.array(per_joint_values("coefficient_limit", self.coefficient_limit, arm))
         speeds = np.array([limit.velocity for limit in self.limits.of(arm)])
         if not np.all(np.isfinite(speeds)):
             raise InputError(f"'{arm.name}' has joints without a speed limit: give `coefficient_limit` in rad/s")

@@ -8,7 +8,8 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
-from problem.errors import InputError
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings, suggest_name, validate
 from problem.functions import FUNCTIONS
 from problem.presets import (
     FunctionSettings,
@@ -16,11 +17,9 @@ from problem.presets import (
     PaperSettings,
     RandomFrameSettings,
 )
-from problem.settings import Settings, nearest
 from problem.suite import InstanceSettings, instances, suites
-from problem.yaml_input import validate
 
-GROUP = "armlab.problems"
+ENTRY_POINT_GROUP = "armlab.problems"
 
 ProblemSettings = PaperSettings | JointFourierSettings | FunctionSettings | InstanceSettings
 PRESETS: Mapping[str, type[ProblemSettings]] = MappingProxyType(
@@ -42,7 +41,7 @@ def names() -> list[str]:
 
 def plug_ins() -> list[EntryPoint]:
     """The problems that other packages registered, each a class of settings with `build`."""
-    return list(entry_points(group=GROUP))
+    return list(entry_points(group=ENTRY_POINT_GROUP))
 
 
 def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
@@ -65,23 +64,23 @@ def settings_type(preset: str, where: str) -> type[ProblemSettings]:
         ours = "; it is built in" if preset in PRESETS else ""
         raise InputError(f"{where}: preset '{preset}' is registered more than once: {places}{ours}")
     if entries:
-        return _import(entries[0], where)
+        return _load_settings(entries[0], where)
     if preset not in PRESETS:
-        raise InputError(f"{where}: unknown preset '{preset}': {_advice(preset)}")
+        raise InputError(f"{where}: unknown preset '{preset}': {_name_hint(preset)}")
     return PRESETS[preset]
 
 
-def _import(entry: EntryPoint, where: str) -> type[ProblemSettings]:
+def _load_settings(entry: EntryPoint, where: str) -> type[ProblemSettings]:
     place = f"{where}: problem '{entry.name}' ({entry.value})"
     try:
         settings: type[ProblemSettings] = entry.load()
     except (ImportError, AttributeError, SyntaxError) as error:
         raise InputError(f"{place} cannot be imported: {error}") from error
     if not (isinstance(settings, type) and issubclass(settings, Settings) and hasattr(settings, "build")):
-        raise InputError(f"{place} should be a class of problem.settings.Settings with a method `build`")
+        raise InputError(f"{place} should be a class of armlab.common.settings.Settings with a method `build`")
     return settings
 
 
-def _advice(preset: str) -> str:
+def _name_hint(preset: str) -> str:
     """The name that was probably meant: of a suite's problems if it looks like one of them."""
-    return nearest(preset, list(PRESETS) if "/" in preset else names())
+    return suggest_name(preset, list(PRESETS) if "/" in preset else names())

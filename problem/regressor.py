@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from problem.arm import Arm, Joint
+from problem.kernel import ffi, lib, pointer
 from problem.motion import Motion
-from problem.native import ffi, lib, pointer
 from problem.transforms import Array
 
 MAX_JOINTS = 16  # as in kernel.c
@@ -26,10 +26,10 @@ def observation_matrix(arm: Arm, motion: Motion) -> Array:
     consecutive rows, N m per parameter unit; parameters in the order of eq. 31, link by link.
     Raises ValueError if the joint counts differ.
     """
-    joints = _checked(arm, motion)
+    joints = _check_joint_count(arm, motion)
     out = np.zeros((*motion.batch, motion.samples * joints, 10 * joints))
     samples = motion.position.size // joints
-    lib.observation_matrices(joints, *_compiled(arm), samples, *_arrays(motion), pointer(out))
+    lib.observation_matrices(joints, *_kernel_data(arm), samples, *_motion_pointers(motion), pointer(out))
     return out
 
 
@@ -40,15 +40,23 @@ def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
     Each trajectory's result is the same to the bit in any batch. Raises ValueError if joint counts differ or
     a column does not exist.
     """
-    joints = _checked(arm, motion)
+    joints = _check_joint_count(arm, motion)
     out = np.empty((*motion.batch, len(columns), len(columns)))
     scratch = np.empty(LANES * (len(columns) ** 2 + 1))
-    chosen, first = _chosen(np.asarray(columns, dtype=np.int32).tobytes(), joints)
+    chosen, first = _check_columns(np.asarray(columns, dtype=np.int32).tobytes(), joints)
     trajectories = int(np.prod(motion.batch, dtype=int))
     lib.gram_matrices(
-        joints, *_compiled(arm), trajectories, motion.samples, *_arrays(motion), len(chosen),
-        pointer(chosen, "int *"), pointer(first, "int *"), pointer(scratch), pointer(out),
-    )  # fmt: skip
+        joints,
+        *_kernel_data(arm),
+        trajectories,
+        motion.samples,
+        *_motion_pointers(motion),
+        len(chosen),
+        pointer(chosen, "int *"),
+        pointer(first, "int *"),
+        pointer(scratch),
+        pointer(out),
+    )
     return out
 
 
@@ -58,13 +66,13 @@ def rigid_body_torque(arm: Arm, motion: Motion, parameters: Array | None = None)
     motion: (..., samples, joints); parameters: (10 * joints,), the arm's own if left out.
     Returns (..., samples, joints), N m (N). Raises ValueError without parameters or if joint counts differ.
     """
-    joints = _checked(arm, motion)
+    joints = _check_joint_count(arm, motion)
     phi = np.ascontiguousarray(arm.parameters if parameters is None else parameters, dtype=np.float64)
     if phi.shape != (10 * joints,):
         raise ValueError(f"{arm.name!r} takes {10 * joints} parameters, not an array of shape {phi.shape}")
     out = np.empty(motion.position.shape)
     samples = motion.position.size // joints
-    lib.torques(joints, *_compiled(arm), samples, *_arrays(motion), pointer(phi), pointer(out))
+    lib.torques(joints, *_kernel_data(arm), samples, *_motion_pointers(motion), pointer(phi), pointer(out))
     return out
 
 
@@ -80,7 +88,7 @@ def inertia_column(arm: Arm, position: Array, joint: int, parameters: Array | No
 
 
 @lru_cache(maxsize=64)
-def _chosen(columns: bytes, joints: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _check_columns(columns: bytes, joints: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """The columns, checked, and for each joint the first of them that can be non-zero in its rows."""
     chosen = np.frombuffer(columns, dtype=np.int32)
     if np.any(chosen < 0) or np.any(chosen >= 10 * joints) or np.any(np.diff(chosen) <= 0):
@@ -88,7 +96,7 @@ def _chosen(columns: bytes, joints: int) -> tuple[NDArray[np.int32], NDArray[np.
     return chosen, np.searchsorted(chosen, 10 * np.arange(joints)).astype(np.int32)
 
 
-def _checked(arm: Arm, motion: Motion) -> int:
+def _check_joint_count(arm: Arm, motion: Motion) -> int:
     if motion.joints != len(arm):
         raise ValueError(f"the motion has {motion.joints} joints, the arm {arm.name!r} has {len(arm)}")
     if len(arm) > MAX_JOINTS:
@@ -96,20 +104,20 @@ def _checked(arm: Arm, motion: Motion) -> int:
     return len(arm)
 
 
-def _arrays(motion: Motion) -> tuple[object, object, object]:
+def _motion_pointers(motion: Motion) -> tuple[object, object, object]:
     return pointer(motion.position), pointer(motion.velocity), pointer(motion.acceleration)
 
 
 @lru_cache(maxsize=64)
-def _compiled(arm: Arm) -> tuple[object, object]:
+def _kernel_data(arm: Arm) -> tuple[object, object]:
     """The arm and its gravity as the C kernel reads them."""
     data = ffi.new("JointData[]", len(arm))
     for entry, joint in zip(data, arm.joints, strict=True):
-        _fill(entry, joint)
+        _fill_joint_data(entry, joint)
     return data, ffi.new("double[3]", [float(value) for value in arm.gravity])
 
 
-def _fill(entry: object, joint: Joint) -> None:
+def _fill_joint_data(entry: object, joint: Joint) -> None:
     rotation = joint.after[:3, :3]
     shift = rotation.T @ joint.after[:3, 3]
     values = {

@@ -6,14 +6,13 @@ from typing import Annotated, Literal
 from annotated_types import Gt, Len
 from pydantic import Field, model_validator
 
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from problem.arm import Arm, Joint, Limits, Link
-from problem.errors import InputError
-from problem.settings import Settings, nearest
 from problem.transforms import rotation_x, rotation_z, translation
 from problem.urdf import read_urdf
-from problem.yaml_input import read_yaml, validate
 
-BUILT_IN = Path(__file__).parent / "robots"
+BUILT_IN_FOLDER = Path(__file__).parent / "robots"
 Positive = Annotated[float, Gt(0)]
 Vector = tuple[float, float, float]
 
@@ -95,7 +94,7 @@ class RobotFile(Settings):
 
 def built_in_arms() -> list[str]:
     """Names of the arms that come with armlab."""
-    return sorted(path.stem for path in BUILT_IN.glob("*.yaml"))
+    return sorted(path.stem for path in BUILT_IN_FOLDER.glob("*.yaml"))
 
 
 def load_arm(robot: str, beside: Path | None = None) -> Arm:
@@ -105,16 +104,17 @@ def load_arm(robot: str, beside: Path | None = None) -> Arm:
     Raises InputError, in one line, for a missing or faulty file and for a chain that is not serial.
     """
     if robot in built_in_arms():
-        return _from_yaml(BUILT_IN / f"{robot}.yaml", robot)
+        return _read_yaml_arm(BUILT_IN_FOLDER / f"{robot}.yaml", robot)
     path = (beside or Path()) / robot
     if path.suffix == ".urdf":
         return read_urdf(path)
     if path.suffix in (".yaml", ".yml"):
-        return _from_yaml(path, str(path))
+        return _read_yaml_arm(path, str(path))
     raise InputError(
-        f"unknown robot '{robot}', neither a .yaml or .urdf file nor a built-in arm: {nearest(robot, built_in_arms())}"
+        f"unknown robot '{robot}', neither a .yaml or .urdf file nor a built-in arm: "
+        f"{suggest_name(robot, built_in_arms())}"
     )
 
 
-def _from_yaml(path: Path, where: str) -> Arm:
+def _read_yaml_arm(path: Path, where: str) -> Arm:
     return validate(RobotFile, read_yaml(path), where).build()

@@ -8,14 +8,12 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from problem.errors import InputError
-from problem.excitation_problem import ExcitationProblem
-from problem.frame import ShiftedProblem
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings, read_yaml, suggest_name, validate
+from problem.excitation import ExcitationProblem, ShiftedProblem
 from problem.presets import JointFourierSettings, PaperSettings, PenaltyOrRules
-from problem.settings import Settings, nearest, validate
-from problem.yaml_input import read_yaml
 
-FOLDER = Path(__file__).parent / "suites"
+SUITE_FOLDER = Path(__file__).parent / "suites"
 Definition = Annotated[PaperSettings | JointFourierSettings, Field(discriminator="preset")]
 
 
@@ -48,7 +46,7 @@ class InstanceSettings(Settings):
 
 def suites() -> list[str]:
     """Names of all suites."""
-    return sorted(path.stem for path in FOLDER.glob("*.yaml"))
+    return sorted(path.stem for path in SUITE_FOLDER.glob("*.yaml"))
 
 
 def instances(suite: str) -> list[str]:
@@ -61,13 +59,13 @@ def definition_of(name: str) -> PaperSettings | JointFourierSettings:
     suite, _, own_name = name.partition("/")
     definitions = _definitions(suite)
     if own_name not in definitions:
-        raise InputError(f"suite '{suite}' has no problem '{own_name}': {nearest(own_name, list(definitions))}")
+        raise InputError(f"suite '{suite}' has no problem '{own_name}': {suggest_name(own_name, list(definitions))}")
     return definitions[own_name]
 
 
 @lru_cache
 def _definitions(suite: str) -> Mapping[str, PaperSettings | JointFourierSettings]:
     if suite not in suites():
-        raise InputError(f"unknown suite '{suite}': {nearest(suite, suites())}")
-    path = FOLDER / f"{suite}.yaml"
+        raise InputError(f"unknown suite '{suite}': {suggest_name(suite, suites())}")
+    path = SUITE_FOLDER / f"{suite}.yaml"
     return validate(SuiteFile, read_yaml(path), str(path)).instances

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.common.errors import InputError
 from problem.arm import Arm, Joint, Limits, Link
-from problem.errors import InputError
-from problem.inertia import about_origin, moved, pseudo_link
+from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import Array, inverse, roll_pitch_yaw, turn_z_to
 
-MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
-MAX_BYTES = 10_000_000
+MOVING_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
+MAX_URDF_BYTES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -51,21 +51,21 @@ def read_urdf(path: Path) -> Arm:
     Raises InputError for a file that is not URDF, for mimic, floating and planar joints, and for a tree with
     more than one branch of moving joints or a closed chain.
     """
-    root = _root(path)
+    root = _read_root(path)
     joints = [_Element(node, f"{path}, joint '{node.get('name')}'") for node in root.findall("joint")]
     links = {
         str(node.get("name")): _Element(node, f"{path}, link '{node.get('name')}'") for node in root.findall("link")
     }
-    chain = _ordered(joints, links, path)
+    chain = _order_joints(joints, links, path)
     return _assemble(str(root.get("name") or path.stem), chain, links)
 
 
-def _root(path: Path) -> ElementTree.Element:
+def _read_root(path: Path) -> ElementTree.Element:
     try:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
-    if len(content) > MAX_BYTES or b"<!ENTITY" in content.replace(b"\0", b""):  # also in UTF-16
+    if len(content) > MAX_URDF_BYTES or b"<!ENTITY" in content.replace(b"\0", b""):  # also in UTF-16
         raise InputError(f"{path}: too large, or with XML entities, for a URDF file")
     try:
         root = ElementTree.fromstring(content)
@@ -76,7 +76,7 @@ def _root(path: Path) -> ElementTree.Element:
     return root
 
 
-def _ordered(joints: list[_Element], links: dict[str, _Element], path: Path) -> list[_Element]:
+def _order_joints(joints: list[_Element], links: dict[str, _Element], path: Path) -> list[_Element]:
     """All joints, each after the one that carries it; checks that they form one tree with one moving chain."""
     children: dict[str, _Element] = {}
     by_parent: dict[str, list[_Element]] = {}
@@ -93,15 +93,15 @@ def _ordered(joints: list[_Element], links: dict[str, _Element], path: Path) -> 
     roots = [name for name in links if name not in children]
     if len(roots) != 1:
         raise InputError(f"{path}: the links should form one tree with one root; roots found: {sorted(roots)}")
-    return _walk(roots[0], by_parent, path)
+    return _walk_tree(roots[0], by_parent, path)
 
 
-def _walk(root: str, by_parent: dict[str, list[_Element]], path: Path) -> list[_Element]:
+def _walk_tree(root: str, by_parent: dict[str, list[_Element]], path: Path) -> list[_Element]:
     order, waiting, last_moving = [], [(joint, "") for joint in by_parent.get(root, [])], ""
     while waiting:
         joint, carrier = waiting.pop(0)
         name = carrier
-        if joint.node.get("type") in MOVING:
+        if joint.node.get("type") in MOVING_KINDS:
             if carrier != last_moving:
                 raise InputError(f"{joint.where}: a second branch of moving joints; cut the file down to one arm")
             name = last_moving = str(joint.node.get("name"))
@@ -118,7 +118,7 @@ def _walk(root: str, by_parent: dict[str, list[_Element]], path: Path) -> list[_
 def _refuse_unsupported(joint: _Element) -> None:
     if joint.node.find("mimic") is not None:
         raise InputError(f"{joint.where}: mimic joints are not supported; lock it (type='fixed') or leave it out")
-    if joint.node.get("type") not in {*MOVING, "fixed"}:
+    if joint.node.get("type") not in {*MOVING_KINDS, "fixed"}:
         raise InputError(
             f"{joint.where}: type '{joint.node.get('type')}' is not supported: revolute, continuous, prismatic or fixed"
         )
@@ -134,15 +134,15 @@ def _assemble(name: str, chain: list[_Element], links: dict[str, _Element]) -> A
         carrier, pose = carried[joint.end("parent")]
         origin = pose @ joint.origin()
         child = joint.end("child")
-        if joint.node.get("type") in MOVING:
+        if joint.node.get("type") in MOVING_KINDS:
             moving.append(_joint(joint, origin))
             inertias.append(np.zeros((4, 4)))
             carrier, origin = len(moving), np.eye(4)
         carried[child] = carrier, origin
         if carrier:
-            inertias[carrier - 1] = inertias[carrier - 1] + moved(_inertia(links[child]), origin)
+            inertias[carrier - 1] = inertias[carrier - 1] + transform_pseudo_inertia(_inertia(links[child]), origin)
     known = any(np.any(inertia) for inertia in inertias)
-    return Arm(name, tuple(moving), tuple(pseudo_link(inertia) for inertia in inertias) if known else None)
+    return Arm(name, tuple(moving), tuple(link_from_pseudo_inertia(inertia) for inertia in inertias) if known else None)
 
 
 def _joint(joint: _Element, origin: Array) -> Joint:
@@ -150,7 +150,7 @@ def _joint(joint: _Element, origin: Array) -> Joint:
     if not np.any(axis):
         raise InputError(f"{joint.where}: axis xyz should not be zero")
     turn = turn_z_to(axis)
-    kind = MOVING[str(joint.node.get("type"))]
+    kind = MOVING_KINDS[str(joint.node.get("type"))]
     name = str(joint.node.get("name"))
     return Joint(name, kind, origin @ turn, inverse(turn), _limits(joint))  # type: ignore[arg-type]
 
@@ -179,4 +179,5 @@ def _inertia(link: _Element) -> Array:
         float(link.numbers("inertial/inertia", f"i{pair}", "", 1)[0]) for pair in ("xx", "yy", "zz", "xy", "xz", "yz")
     ]
     mass = float(link.numbers("inertial/mass", "value", "", 1)[0])
-    return moved(about_origin(Link(mass, (0.0, 0.0, 0.0), tuple(entries))), link.origin("inertial/origin"))  # type: ignore[arg-type]
+    body = Link(mass, (0.0, 0.0, 0.0), tuple(entries))  # type: ignore[arg-type]
+    return transform_pseudo_inertia(pseudo_inertia_of(body), link.origin("inertial/origin"))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from problem.arm import Arm, Joint, Link
-from problem.inertia import about_origin, moved, pseudo_link
+from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.motion import Motion
 from problem.transforms import Array
 
@@ -65,7 +65,7 @@ def inverse_dynamics(model: Any, motion: Motion) -> Array:
 
 
 def _in_joint_frame(link: Link, joint: Joint) -> Link:
-    return pseudo_link(moved(about_origin(link), joint.after))
+    return link_from_pseudo_inertia(transform_pseudo_inertia(pseudo_inertia_of(link), joint.after))
 
 
 def _parameter_map(arm: Arm) -> Array:
@@ -99,7 +99,7 @@ def _add_inertial(body: ElementTree.Element, link: Link) -> None:
     centre = np.array(link.first_moment) / link.mass
     back = np.eye(4)
     back[:3, 3] = -centre
-    xx, yy, zz, xy, xz, yz = pseudo_link(moved(about_origin(link), back)).inertia
+    xx, yy, zz, xy, xz, yz = link_from_pseudo_inertia(transform_pseudo_inertia(pseudo_inertia_of(link), back)).inertia
     moments, axes = np.linalg.eigh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     axes[:, 2] *= np.linalg.det(axes)
     values = {"mass": repr(link.mass), "diaginertia": _text(moments), "pos": _text(centre), **_turn(axes)}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from problem.arm import Arm, Joint, Link
-from problem.inertia import pseudo_link
+from problem.inertia import link_from_pseudo_inertia
 from problem.motion import Motion
 from problem.transforms import Array, roll_pitch_yaw
 
@@ -19,7 +19,7 @@ def random_link(rng: np.random.Generator) -> Link:
     """A body made of ten point masses: it always exists."""
     masses, places = rng.uniform(0.1, 1.0, 10), rng.uniform(-0.3, 0.3, (10, 3))
     homogeneous = np.column_stack([places, np.ones(10)])
-    return pseudo_link((masses[:, None] * homogeneous).T @ homogeneous)
+    return link_from_pseudo_inertia((masses[:, None] * homogeneous).T @ homogeneous)
 
 
 def random_arm(kinds: str, seed: int = 0) -> Arm:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from problem.errors import InputError
+from armlab.common.errors import InputError
 
 
 def refusal(act: Callable[..., object], *given: object, **settings: object) -> str:

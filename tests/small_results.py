@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from bench.experiment import Options, Progress, run_experiment
+from bench.run import Progress, RunOptions, run_experiment
 
 CONFIG = """\
 name: small
@@ -40,5 +40,5 @@ def ran(folder: Path, text: str = CONFIG) -> Ran:
     config = folder / f"{text.splitlines()[0].removeprefix('name: ')}.yaml"
     config.write_text(text)
     store = folder / "runs.sqlite"
-    run_experiment(config, Options(store, folder / "results", workers=1), _no_bar)
+    run_experiment(config, RunOptions(store, folder / "results", workers=1), _no_bar)
     return Ran(config, store)

@@ -1,1 +1,1 @@
-"""TODO."""
+"""Diagnosis: from a mismatch between simulation and recording to named physics, with numbers and intervals."""

@@ -11,8 +11,8 @@ from armlab.diagnosis.fitted_model import FittedModel, search_effects
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import GUARDS, Settings, guards_without
 from armlab.diagnosis.verdict_files import verdict_content
-from recordings.load import load_recording
-from recordings.recording import Recording
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Recording
 
 ALL_ON = "all guards on"
 GUARDS_AFTER_SEARCH = ("robust_variance", "correction", "heldout_gain", "unknown")

@@ -12,7 +12,7 @@ from armlab.diagnosis.columns import Columns
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.solver import Fit
-from recordings.run import ROLES, Array
+from armlab.recordings.recording import ROLES, Array
 
 MAX_VARIANCE_RATIO = 1e5  # times the least variance: directions that other columns hold as well are not tested
 ROUNDING = 1e-14  # of the largest variance: rounding

@@ -17,10 +17,10 @@ from armlab.effects.naming import IDENTICAL_EFFECTS
 from armlab.effects.next_experiment import next_experiment
 from armlab.effects.springs import SpringCompensator
 from armlab.effects.term import SIGN_SIGMAS
-from identification.pseudo_inertia import basis
+from armlab.recordings.recording import Array
 from problem.motion import Motion
+from problem.pseudo_inertia import pseudo_inertia_basis
 from problem.regressor import rigid_body_torque
-from recordings.run import Array
 
 MAX_DEFICIT = 2.0  # units of log likelihood: a difference that may be chance
 HELD_OUT_TOLERANCE = 0.01  # of the held-out error
@@ -105,10 +105,19 @@ def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evi
     own[columns] = coefficients
     rivals = tuple(Rival(*each) for each in find_rivals(found, group, candidate))
     return Claim(
-        candidate.effect, candidate.joint, candidate.joints, parameters,
-        candidate.equation(coefficients), evidence, found.columns.torque_of(own), rivals,
-        next_experiment(candidate.effect, tuple(each.effect for each in rivals)), candidate, coefficients, covariance,
-    )  # fmt: skip
+        candidate.effect,
+        candidate.joint,
+        candidate.joints,
+        parameters,
+        candidate.equation(coefficients),
+        evidence,
+        found.columns.torque_of(own),
+        rivals,
+        next_experiment(candidate.effect, tuple(each.effect for each in rivals)),
+        candidate,
+        coefficients,
+        covariance,
+    )
 
 
 def _prefer_compensator(found: FittedModel, candidate: Candidate, group: int) -> Candidate:
@@ -171,11 +180,20 @@ def _link_claim(
     other = Rival("inertial_parameter_error" if carried else "payload", link + 1, (), True)
     rivals = (other,) if body else ()
     return Claim(
-        candidate.effect, link + 1, (), named_parameters(candidate, coefficients, covariance, factor),
-        candidate.equation(coefficients), evidence, found.columns.torque_of(torque), rivals,
-        next_experiment(candidate.effect, tuple(each.effect for each in rivals)), candidate, coefficients, covariance,
+        candidate.effect,
+        link + 1,
+        (),
+        named_parameters(candidate, coefficients, covariance, factor),
+        candidate.equation(coefficients),
+        evidence,
+        found.columns.torque_of(torque),
+        rivals,
+        next_experiment(candidate.effect, tuple(each.effect for each in rivals)),
+        candidate,
+        coefficients,
+        covariance,
         in_links=True,
-    )  # fmt: skip
+    )
 
 
 def is_outlying(widths: Widths, link: int) -> bool:
@@ -189,7 +207,7 @@ def _may_be_body(ten: Array, covariance: Array) -> bool:
     scale = np.array(
         [1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1.0]
     )  # so that all of the pseudo-inertia is in kilograms
-    parts = basis() * np.outer(scale, scale)
+    parts = pseudo_inertia_basis() * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", ten, parts))
     slopes = np.einsum("a,pab,b->p", vectors[:, 0], parts, vectors[:, 0])
     doubt = 1.5 * SIGN_SIGMAS * np.sqrt(max(float(slopes @ covariance @ slopes), 0.0)) + EIGENVALUE_TOLERANCE * float(

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.noise import Noise
 from armlab.effects.contract import Candidate, Scene
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
-from recordings.differentiate import Signals
-from recordings.run import Array
 
 Place = tuple[str, int | None, tuple[int, ...], str]
 

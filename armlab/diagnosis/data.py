@@ -9,14 +9,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_opening, median_filter
 
 from armlab.diagnosis.settings import Settings
+from armlab.recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
+from armlab.recordings.differentiate import Signals, differentiate, resample_at, resample_evenly
+from armlab.recordings.filters import Butterworth, LowPass
+from armlab.recordings.recording import Array, Role, Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import inertia_column
-from recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
-from recordings.differentiate import Signals, differentiate
-from recordings.filters import Butterworth, LowPass
-from recordings.resample import evened, sampled_at
-from recordings.run import Array, Role, Run
 
 STANDSTILL_SIGMAS = 5.0  # standard deviations of the velocity's noise: slower is standing still
 CREEP_RATIO = 0.01  # of a joint's high speed: below it friction takes any value up to its level
@@ -217,7 +216,7 @@ class Observed:
 
 def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Settings) -> Observed:
     """Smooths, differentiates, filters and thins the runs. inertial: (10 * joints,) of the simulated links, if any."""
-    even = _to_common_rate([evened(run) for run in runs])
+    even = _to_common_rate([resample_evenly(run) for run in runs])
     rate = even[0].rate_hz
     cutoff = usable_cutoff(even, arm, inertial, min(settings.cutoff_hz, MAX_CUTOFF_RATIO * rate))
     step = max(round(rate / (settings.rows_per_cutoff * cutoff)), 1)
@@ -237,7 +236,7 @@ def _to_common_rate(runs: list[Run]) -> list[Run]:
 
 def _resample(run: Run, rate: float) -> Run:
     count = int((run.time[-1] - run.time[0]) * rate)
-    return sampled_at(run, run.time[0] + np.arange(count + 1) / rate)
+    return resample_at(run, run.time[0] + np.arange(count + 1) / rate)
 
 
 def _smooth_motion(run: Run, highest_hz: float) -> Motion:

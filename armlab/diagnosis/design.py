@@ -26,11 +26,11 @@ from armlab.diagnosis.surrogate import Features
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.naming import is_first_name
 from armlab.effects.plausible import prior_scale
-from identification.scene import scene_of
+from armlab.effects.scene import scene_of
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.recording import Array
 from problem.base_parameters import BaseParameters
 from problem.motion import Motion
-from recordings.differentiate import Signals
-from recordings.run import Array
 
 
 @dataclass(frozen=True, eq=False)

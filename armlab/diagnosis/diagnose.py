@@ -34,9 +34,8 @@ from armlab.diagnosis.unknown import (
     predict_residual_structure,
 )
 from armlab.effects.library import library
+from armlab.recordings.recording import Array, Recording
 from problem.base_parameters import base_parameters
-from recordings.recording import Recording
-from recordings.run import Array
 
 
 def diagnose(
@@ -144,10 +143,26 @@ def _assemble(
     )
     base, covariance = model.base_parameters()
     return Diagnosis(
-        recording, bench.simulation, status, summarise(status, claims, fits), observed, bench.target, refit, final,
-        inertial_parameters(model), base, covariance, claims, where if claims else (), unexplained, fits, model.steps,
-        count_looks(model), seconds, {**asdict(bench.settings.guards), "cutoff_hz": bench.settings.cutoff_hz},
-    )  # fmt: skip
+        recording,
+        bench.simulation,
+        status,
+        summarise(status, claims, fits),
+        observed,
+        bench.target,
+        refit,
+        final,
+        inertial_parameters(model),
+        base,
+        covariance,
+        claims,
+        where if claims else (),
+        unexplained,
+        fits,
+        model.steps,
+        count_looks(model),
+        seconds,
+        {**asdict(bench.settings.guards), "cutoff_hz": bench.settings.cutoff_hz},
+    )
 
 
 def _joint_fits(refit: Array, final: Array, floor: Array, observed: Observed) -> tuple[JointFit, ...]:

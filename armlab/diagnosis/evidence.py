@@ -23,7 +23,7 @@ from armlab.diagnosis.refine import prior_precision
 from armlab.diagnosis.search import contained_groups
 from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, State
 from armlab.effects.plausible import reason_implausible
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 HELD_OUT_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
 
@@ -334,9 +334,18 @@ class Judge:
         corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
         before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
         return Evidence(
-            joint, p_value, corrected, best.share, held_p, validated.share, before, after, score, None,
+            joint,
+            p_value,
+            corrected,
+            best.share,
+            held_p,
+            validated.share,
+            before,
+            after,
+            score,
+            None,
             _validation_refutes(validated, inside, after / before - 1 if before > 0 else 0.0),
-        )  # fmt: skip
+        )
 
 
 def _validation_refutes(validated: Gain, inside: Gain, growth: float) -> bool:

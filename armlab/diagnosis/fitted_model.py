@@ -14,8 +14,8 @@ from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, Solver, State
 from armlab.diagnosis.surrogate import flexible_features, predict_structure
 from armlab.effects.contract import Family, Scene
+from armlab.recordings.recording import Array
 from problem.regressor import rigid_body_torque
-from recordings.run import Array
 
 INITIAL_LINK_WIDTH = 0.08  # of the links' errors, for the first look
 SEARCH_ROUNDS = 2

@@ -10,7 +10,7 @@ from armlab.diagnosis.blocks import BlockCovariance, block_covariance, whitened_
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.refine import prior_precision
 from armlab.effects.contract import Candidate, Value
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 CONFIDENCE = 0.95
 INTERVAL_FACTOR = (

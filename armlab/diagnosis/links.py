@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.pseudo_inertia import information, pseudo_inertias, regular_nominal
+from armlab.recordings.recording import Array
 from problem.arm import Arm, Link
 from problem.base_parameters import BaseParameters
-from recordings.run import Array
+from problem.pseudo_inertia import entropic_information, pseudo_inertias, regular_nominal
 
 Widths = tuple[float, ...]
 LINK_UNCERTAINTY_GRID = (0.01, 0.02, 0.04, 0.08, 0.16)  # of all links alike
@@ -71,6 +71,6 @@ def link_prior(arm: Arm, base: BaseParameters, inertial: Array) -> LinkPrior:
     """The prior about nominal links with parameters (10 * joints,), all of them bodies."""
     links = tuple(Link(float(ten[0]), tuple(ten[1:4]), tuple(ten[4:])) for ten in inertial.reshape(-1, 10))
     nominal = Arm(arm.name, arm.joints, links, arm.gravity)
-    metric = information(regular_nominal(nominal))
+    metric = entropic_information(regular_nominal(nominal))
     blocks = [metric[at : at + 10, at : at + 10] for at in range(0, len(metric), 10)]
     return LinkPrior(np.stack([np.linalg.inv(block) for block in blocks]), base.grouping)

@@ -8,9 +8,9 @@ from scipy.interpolate import make_interp_spline
 from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.result import Located
 from armlab.diagnosis.surrogate import Features, predict_structure
-from recordings.differentiate import Signals
-from recordings.periods import find_period
-from recordings.run import Array
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.periods import find_period
+from armlab.recordings.recording import Array
 
 
 def noise_floor(final: Array, made: Sequence[Features], observed: Observed) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.diagnosis.data import Observed, Segment
-from recordings.run import Array, Role
+from armlab.recordings.recording import Array, Role
 
 FILTER_CORRELATION_ROWS = 1.5  # rows that the filter ties together
 MAX_ORDER = 12  # order at most

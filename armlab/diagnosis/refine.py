@@ -16,7 +16,7 @@ from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.solver import Fit, Solver, State
 from armlab.effects.contract import Candidate
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 EVALUATIONS_PER_SHAPE = 18  # a shape parameter
 LOGARITHMIC_RATIO = 30.0  # bounds so far apart are searched by their logarithm

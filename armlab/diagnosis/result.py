@@ -8,8 +8,7 @@ from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import Candidate, Value
-from recordings.recording import Recording
-from recordings.run import Array
+from armlab.recordings.recording import Array, Recording
 
 Status = Literal["mismatch", "none", "inconclusive"]
 Interval = tuple[float, float] | tuple[tuple[float, float], ...]

@@ -11,10 +11,16 @@ from armlab.diagnosis.links import LINK_UNCERTAINTY_GRID, SINGLE_LINK_GRID, Widt
 from armlab.diagnosis.settings import Guards
 from armlab.diagnosis.solver import CROWD_PENALTY, USUAL_EFFECTS, Solver, State
 from armlab.effects.plausible import reason_implausible
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
-SPECIAL_FRICTION = ("nonlinear_viscous_friction", "stribeck_friction", "asymmetric_friction", "presliding_hysteresis",
-           "friction_drift", "load_dependent_friction")  # fmt: skip
+SPECIAL_FRICTION = (
+    "nonlinear_viscous_friction",
+    "stribeck_friction",
+    "asymmetric_friction",
+    "presliding_hysteresis",
+    "friction_drift",
+    "load_dependent_friction",
+)
 USUAL_FRICTION = ("coulomb_friction", "viscous_friction")  # what every joint has
 SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
 

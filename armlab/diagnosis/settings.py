@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from typing import Literal
 
-from problem.errors import InputError
-from problem.settings import nearest
+from armlab.common.errors import InputError
+from armlab.common.settings import suggest_name
 
 Baseline = Literal["nominal", "refit", "simulated"]
 
@@ -40,7 +40,7 @@ def guards_without(names: Iterable[str]) -> Guards:
     off = dict.fromkeys(names, False)
     for name in off:
         if name not in GUARDS:
-            raise InputError(f"--without {name}: no such guard, {nearest(name, GUARDS)}")
+            raise InputError(f"--without {name}: no such guard, {suggest_name(name, GUARDS)}")
     return replace(Guards(), **off)
 
 

@@ -4,18 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.settings import Baseline
-from identification.model_file import read_model
-from identification.scene import Scene, scene_of
-from identification.torque_model import TorqueModel
+from armlab.effects.scene import Scene, scene_of
+from armlab.identification.model_file import read_model
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.geometry_check import check_torque_fit
+from armlab.recordings.recording import Array, Recording
 from problem.arm import Arm
-from problem.errors import InputError
 from problem.regressor import rigid_body_torque
-from recordings.checks.fit import fit_findings
-from recordings.differentiate import Signals
-from recordings.recording import Recording
-from recordings.run import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +89,7 @@ def reason_unusable(recording: Recording) -> str | None:
     silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
     if silent:
         return f"The torque of joint {', '.join(map(str, silent))} never changes: is the right column named?"
-    swapped = next((each for each in fit_findings(runs, recording.arm) if each.kind == "swapped_channels"), None)
+    swapped = next((each for each in check_torque_fit(runs, recording.arm) if each.kind == "swapped_channels"), None)
     return None if swapped is None else f"The {swapped.text}. Put the columns right before looking for physics."
 
 

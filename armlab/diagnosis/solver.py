@@ -15,7 +15,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from armlab.diagnosis.columns import Group, Moments
 from armlab.diagnosis.links import LinkPrior, Widths
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
 MIN_UNABSORBED_SHARE = 1e-6  # of a column's squared length: what less of it is left is not seen

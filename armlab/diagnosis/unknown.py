@@ -13,7 +13,7 @@ from armlab.diagnosis.result import Claim
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import MIN_STRUCTURE_GAIN, Structure, feature_banks, find_structure
 from armlab.effects.next_experiment import next_experiment
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
 UNKNOWN_LEVEL = 0.03  # of the test between stretches of time, after all surrogates that were tried
@@ -49,17 +49,30 @@ def make_unknown_claim(found: FittedModel, each: Structure, residual: Array) -> 
     after = float(np.sqrt(np.mean((residual[rows, each.joint] - each.prediction[rows]) ** 2)))
     tried = observed.joints
     evidence = Evidence(
-        each.joint, each.p_value, min(1.0, each.p_value * tried), each.gain, each.p_value, each.validation_gain,
-        before, after,
+        each.joint,
+        each.p_value,
+        min(1.0, each.p_value * tried),
+        each.gain,
+        each.p_value,
+        each.validation_gain,
+        before,
+        after,
         -0.5 * len(residual) * float(np.log(max(1 - each.gain, 1e-6))),
-    )  # fmt: skip
+    )
     prediction = np.zeros(residual.shape)
     prediction[:, each.joint] = each.prediction
     joint = each.joint + 1
     return Claim(
-        "unknown", joint, (joint,), (), f"tau_{joint} += f({', '.join(each.depends_on)})", evidence, prediction,
-        next_experiment=next_experiment("unknown", ()), depends_on=each.depends_on,
-    )  # fmt: skip
+        "unknown",
+        joint,
+        (joint,),
+        (),
+        f"tau_{joint} += f({', '.join(each.depends_on)})",
+        evidence,
+        prediction,
+        next_experiment=next_experiment("unknown", ()),
+        depends_on=each.depends_on,
+    )
 
 
 MAX_RESIDUAL_RATIO = 1.0  # of the held-out error power that a law explains

@@ -13,16 +13,15 @@ import numpy as np
 import yaml
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Parameter, Unexplained
-from identification.model_file import SCHEMA
+from armlab.identification.model_file import SCHEMA
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.recording import Array, Recording
+from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
-from problem.errors import InputError
 from problem.robot_file import built_in_arms
-from recordings.differentiate import Signals
-from recordings.recording import Recording
-from recordings.run import Array
-from recordings.vocabulary import effect_named
 
 MODEL = "model.yaml"
 

@@ -1,1 +1,1 @@
-"""TODO."""
+"""The library of effects: laws of missing physics, and everything that is known of each."""

@@ -7,8 +7,8 @@ import numpy as np
 
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.term import Term, form_from_parameters, format_number
+from armlab.recordings.recording import Array
 from problem.arm import Arm
-from recordings.run import Array
 
 GRID_DURATIONS_S = (0.3, 1.0, 3.0)  # s, of a plain grid
 SCANNED_DURATIONS_S = tuple(0.1 * 2 ** (number / 2) for number in range(11))  # s

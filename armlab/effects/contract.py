@@ -3,10 +3,10 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
-from identification.extras import Value
-from identification.scene import Scene
+from armlab.effects.extras import Value
+from armlab.effects.scene import Scene
+from armlab.recordings.recording import Array
 from problem.arm import Arm
-from recordings.run import Array
 
 __all__ = ["Candidate", "Family", "Scene", "Value"]
 

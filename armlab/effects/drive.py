@@ -8,8 +8,8 @@ import numpy as np
 
 from armlab.effects.contract import Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number
+from armlab.recordings.recording import Array
 from problem.arm import Arm
-from recordings.run import Array
 
 KNEE_SHARES = (0.4, 0.6, 0.8)  # of the model's highest torque
 LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.97, 0.985)  # of the model's highest torque

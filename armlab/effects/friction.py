@@ -8,9 +8,9 @@ import numpy as np
 
 from armlab.effects.contract import Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number, format_sum, top_speed
+from armlab.recordings.recording import Array
+from armlab.recordings.vocabulary import VISCOUS
 from problem.arm import Arm
-from recordings.run import Array
-from recordings.vocabulary import VISCOUS
 
 PARTS_PER_SAMPLE = 4  # of a sample's interval, for friction with memory
 

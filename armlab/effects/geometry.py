@@ -10,10 +10,10 @@ import numpy as np
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.sensitivity import GEOMETRY_STEP, directional_derivative, geometry_derivative, gravity_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
+from armlab.recordings.recording import Array
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.transforms import rotation_x, translation
-from recordings.run import Array
 
 STEEPEST = 20.0  # degrees: more is no tilt but another way to mount the arm
 

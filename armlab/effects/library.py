@@ -4,6 +4,7 @@ from armlab.effects.contact import EXTERNAL_CONTACT
 from armlab.effects.contract import Family
 from armlab.effects.coupling import JOINT_COUPLING
 from armlab.effects.drive import ROTOR_INERTIA, TORQUE_GAIN, TORQUE_OFFSET, TORQUE_SATURATION
+from armlab.effects.extras import BrokenEffectError, registered_effects
 from armlab.effects.friction import (
     ASYMMETRIC,
     COULOMB_FRICTION,
@@ -18,7 +19,6 @@ from armlab.effects.memory import FRICTION_DRIFT, PRESLIDING
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR, TORQUE_RIPPLE
 from armlab.effects.timing import CHANNEL_SKEW, TIME_DELAY
 from armlab.effects.transmission import BACKLASH, JOINT_ELASTICITY
-from identification.extras import BrokenEffectError, registered
 
 BUILT_IN: tuple[Family, ...] = (
     COULOMB_FRICTION,
@@ -57,7 +57,7 @@ def library() -> tuple[Family, ...]:
     BrokenEffectError, in one line, where one cannot be imported, is something else, or has the id of another.
     """
     families, origins = list(BUILT_IN), {family.effect: "armlab" for family in BUILT_IN}
-    for origin, family in registered():
+    for origin, family in registered_effects():
         if any(family is own for own in BUILT_IN):  # armlab's own entry point, by which `predict` finds them
             continue
         if not isinstance(family, Family):

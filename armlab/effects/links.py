@@ -11,11 +11,11 @@ import numpy as np
 
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, Term, format_number
-from identification.pseudo_inertia import basis
+from armlab.recordings.recording import Array
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
 from problem.motion import Motion
+from problem.pseudo_inertia import pseudo_inertia_basis
 from problem.regressor import observation_matrix, rigid_body_torque
-from recordings.run import Array
 
 LINK_PROBES = 100  # random states that show which parameters an arm feels
 MIN_INDEPENDENT_SHARE = 1e-8  # of a column's length: below is rounding; its root for a smallest singular value
@@ -190,8 +190,8 @@ class Payload(Body):
         """A payload that no body can be: of negative mass, or with an impossible spread of it."""
         if len(self.felt) < 10:
             return _negative_mass(coefficients[self.felt.index(0)], covariance, self.felt.index(0))
-        values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", self.ten(coefficients), basis()))
-        slopes = np.einsum("a,pab,b->p", vectors[:, 0], basis(), vectors[:, 0])
+        values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", self.ten(coefficients), pseudo_inertia_basis()))
+        slopes = np.einsum("a,pab,b->p", vectors[:, 0], pseudo_inertia_basis(), vectors[:, 0])
         spread = (
             0.0 if covariance is None else SIGN_SIGMAS * float(np.sqrt(max(float(slopes @ covariance @ slopes), 0.0)))
         )

@@ -18,9 +18,9 @@ from armlab.effects.friction import (
     positions_within_samples,
 )
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number, joint_moves, top_speed
+from armlab.recordings.recording import Array
+from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
-from recordings.run import Array
-from recordings.vocabulary import effect_named
 
 PRESLIDING_WAYS = (
     1e-3,

@@ -7,7 +7,7 @@ of a hundred kilograms. A normal prior of a generous width costs a real effect n
 import numpy as np
 
 from armlab.effects.contract import Candidate
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 PRIOR_SCALES = {  # of coefficients, SI units
     "geometry_error": 0.02,  # m or rad

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.signal import savgol_filter
 
 from armlab.effects.contract import Scene
+from armlab.recordings.recording import Array
 from problem.arm import Joint
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
-from recordings.run import Array
 
 MOTION_STEP = 1e-4  # rad (m) of the largest change of position
 GEOMETRY_STEP = 1e-4  # m, rad

@@ -7,10 +7,10 @@ from itertools import combinations
 import numpy as np
 
 from armlab.effects.contract import Candidate, Scene
+from armlab.recordings.filters import Filter
+from armlab.recordings.recording import Array
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
-from recordings.filters import Filter
-from recordings.run import Array
 
 MIN_VISIBLE_SHARE = 1e-6  # of a column's length: what is left below this is rounding, not a direction
 

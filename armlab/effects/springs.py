@@ -16,10 +16,10 @@ from armlab.effects.term import (
     format_sum,
     joint_moves,
 )
+from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
-from recordings.run import Array
 
 MIN_ORDER = 4.0  # cycles a turn: slower waves are gravity and springs
 MAX_ORDER = 400.0

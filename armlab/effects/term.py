@@ -8,9 +8,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.recordings.recording import Array
+from armlab.recordings.vocabulary import Kind, effect_named
 from problem.arm import Arm
-from recordings.run import Array
-from recordings.vocabulary import Kind, effect_named
 
 SIGN_SIGMAS = 2.0  # standard errors beyond which a sign counts as wrong
 DERIVATIVE_STEP = 1e-6  # of a coefficient, for derivatives of named parameters

@@ -12,9 +12,9 @@ import numpy as np
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.sensitivity import delay_signal, directional_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
+from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
-from recordings.run import Array
 
 SHIFTS = (1e-3, 4e-3, -4e-3)  # s, of a first look
 LONGEST = 0.03  # s

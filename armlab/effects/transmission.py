@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from armlab.effects._drive_train import ffi, lib
 
+from armlab.effects._drive_train import ffi, lib
 from armlab.effects.contract import Candidate, Scene, Value
 from armlab.effects.sensitivity import directional_derivative, joint_displacement
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
+from armlab.recordings.recording import Array
 from problem.arm import Arm
+from problem.kernel import pointer
 from problem.motion import Motion
-from problem.native import pointer
-from recordings.run import Array
 
 PHASE_STEP = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
@@ -54,9 +54,14 @@ def integrate_twist(scene: Scene, joint: int, law: Twist) -> Array:
     train = ffi.new("DriveTrain *", [stiffness, damping, law.gap])
     out = np.empty((3, len(load)))
     lib.twist_of_drive_train(
-        train, len(load), scene.step, _half_steps(scene, law, inertia), pointer(load),
-        pointer(np.ascontiguousarray(inertia)), pointer(out),
-    )  # fmt: skip
+        train,
+        len(load),
+        scene.step,
+        _half_steps(scene, law, inertia),
+        pointer(load),
+        pointer(np.ascontiguousarray(inertia)),
+        pointer(out),
+    )
     return out
 
 

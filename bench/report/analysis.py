@@ -1,4 +1,4 @@
-"""Everything that the page says of one problem, computed once."""
+"""All that the report says of one problem, computed once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -8,28 +8,27 @@ import numpy as np
 import pandas as pd
 
 from algorithms.contract import Array
-from bench.sharing.result_set import ResultSet, runs_of
+from bench.result_sets.result_set import ResultSet, runs_by_algorithm
 from bench.statistics import Summary, is_feasible, quantile, summarise
-from bench.statistics.anytime import area_under_curve
-from bench.statistics.bootstrap import quantile_interval
-from bench.statistics.ends import row_quantiles
-from bench.statistics.paired import Duel, duels, log_losses
-from bench.statistics.targets import (
-    Hits,
+from bench.statistics.ends import quantile_interval, row_quantiles
+from bench.statistics.pairwise import Duel, duels, log_losses
+from bench.statistics.performance import (
+    CondensedTimes,
     Run,
+    area_under_curve,
+    condense_times,
     expected_running_time,
-    hits,
     running_times,
     share_reached,
     targets_between,
 )
 
-MOMENTS = 60  # at which convergence is drawn
+CURVE_POINTS = 60  # at which convergence is drawn
 QUARTILES = (0.25, 0.5, 0.75)
 
 
 @dataclass(frozen=True, eq=False)
-class Progress:
+class RunProgress:
     """The runs of one algorithm, condensed: what is left of them takes no more memory for more repetitions.
 
     quartiles: of the best so far at the moments (3, moments). hits: running times to the targets. expected: running
@@ -37,7 +36,7 @@ class Progress:
     """
 
     quartiles: Array
-    hits: Hits
+    hits: CondensedTimes
     expected: Array
     area: float
 
@@ -54,7 +53,7 @@ class Cell:
     trials: pd.DataFrame
     moments: Array
     targets: Array
-    progress: Mapping[str, Progress]
+    progress: Mapping[str, RunProgress]
 
     @property
     def algorithms(self) -> list[str]:
@@ -93,45 +92,47 @@ class Cell:
         return duels(self.trials, [(a, b) for k, a in enumerate(names) for b in names[k + 1 :]])
 
 
-def cells_of(results: ResultSet) -> list[Cell]:
+def analyse_cells(results: ResultSet) -> list[Cell]:
     """All cells in the order of the configuration; the runs of one at a time are in memory."""
-    return [cell_of(label, trials, _ordered(runs_of(curves))) for label, trials, curves in results.cells()]
+    return [
+        analyse_cell(label, trials, _sort_runs(runs_by_algorithm(curves))) for label, trials, curves in results.cells()
+    ]
 
 
-def cell_of(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[Run]]) -> Cell:
+def analyse_cell(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[Run]]) -> Cell:
     """The cell of runs by algorithm; trials: tidy, of one budget."""
     budget = int(trials["budget"].iloc[0])
     first = min(run.evaluations[0] for some in runs.values() for run in some)
-    moments = np.unique(np.geomspace(first, max(budget, first), MOMENTS).round())
-    targets = _targets([run for some in runs.values() for run in some])
-    progress = {name: _progress(some, moments, targets, budget) for name, some in runs.items()}
+    moments = np.unique(np.geomspace(first, max(budget, first), CURVE_POINTS).round())
+    targets = _choose_targets([run for some in runs.values() for run in some])
+    progress = {name: _summarise_progress(some, moments, targets, budget) for name, some in runs.items()}
     return Cell(label, trials, moments, targets, progress)
 
 
-def reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
+def share_of_targets_reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
     """Share of targets reached at moments (moments,), over all runs and cells that have any."""
     found = [cell.progress[algorithm].hits for cell in cells if len(cell.targets)]
     return share_reached(found, moments) if found else np.zeros(len(moments))
 
 
-def _ordered(runs: Mapping[str, Mapping[int, Run]]) -> dict[str, list[Run]]:
+def _sort_runs(runs: Mapping[str, Mapping[int, Run]]) -> dict[str, list[Run]]:
     return {name: [by_number[k] for k in sorted(by_number)] for name, by_number in runs.items()}
 
 
-def _targets(runs: Sequence[Run]) -> Array:
+def _choose_targets(runs: Sequence[Run]) -> Array:
     found = np.concatenate([run.best[np.isfinite(run.best)][:1] for run in runs])
     hard = min(run.best.min() for run in runs)
     return targets_between(found.max(), hard) if len(found) and hard > 0 else np.zeros(0)
 
 
-def _progress(runs: Sequence[Run], moments: Array, targets: Array, budget: int) -> Progress:
-    best = np.stack([_at(run, moments) for run in runs], axis=1)
+def _summarise_progress(runs: Sequence[Run], moments: Array, targets: Array, budget: int) -> RunProgress:
+    best = np.stack([_best_at(run, moments) for run in runs], axis=1)
     times = np.stack([running_times(run, targets) for run in runs])
     spent = np.array([run.evaluations[-1] for run in runs])
     areas = [area_under_curve(run, targets[-1], targets[0], budget) for run in runs] if len(targets) else [np.nan]
-    return Progress(
+    return RunProgress(
         quartiles=np.stack([row_quantiles(best, share) for share in QUARTILES]),
-        hits=hits(times),
+        hits=condense_times(times),
         expected=expected_running_time(times, spent),
         area=quantile(np.array(areas), 0.5),
     )
@@ -144,7 +145,7 @@ def block_losses(cells: list[Cell]) -> pd.DataFrame:
     return pd.DataFrame([{name: float(np.median(ends)) for name, ends in cell.losses.items()} for cell in cells])
 
 
-def _at(run: Run, moments: Array) -> Array:
+def _best_at(run: Run, moments: Array) -> Array:
     """The best so far at moments (moments,)."""
     place = np.searchsorted(run.evaluations, moments, side="right") - 1
     return np.where(place < 0, np.inf, run.best[np.maximum(place, 0)])

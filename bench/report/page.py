@@ -1,36 +1,99 @@
-"""The page itself: sections, style, scripts and data in one file that asks nothing of the network."""
+"""The report about a result set as one HTML file that asks nothing of the network: sections, style, scripts and the
+data of the charts.
+"""
 
+import json
 from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
+from pathlib import Path
+from typing import Any
 
-from bench.properties.facts import Facts
+import numpy as np
+import pandas as pd
+import yaml
+
+from algorithms.contract import Array
+from algorithms.registry import names as registered
+from bench.files import write_whole
 from bench.report import sections
-from bench.report.analysis import Cell, block_losses
-from bench.report.data import page_data
-from bench.report.looks import look
-from bench.sharing.result_set import ResultSet
-from bench.statistics.critical import critical_difference
+from bench.report.analysis import Cell, analyse_cells, block_losses, share_of_targets_reached
+from bench.report.ranking_chart import chart_style
+from bench.result_sets.formats import make_folder, read_results
+from bench.result_sets.result_set import ResultSet
+from bench.statistics.critical_difference import critical_difference
+from bench.statistics.performance import performance_profile
+from bench.studies.properties import AlgorithmProperties, properties_of_algorithms
+
+_PROFILE_FACTORS = np.geomspace(1.0, 10.0, 60)
+_CURVE_POINTS = 60
+
+
+def page_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> str:
+    """JSON text; numbers have four digits, a null is an infinite one."""
+    content = {
+        "algorithms": list(algorithms),
+        "problems": [_problem_data(cell) for cell in cells],
+        "overall": _overall_data(cells, algorithms),
+    }
+    return json.dumps(content, separators=(",", ":"), allow_nan=False)
+
+
+def _problem_data(cell: Cell) -> dict[str, Any]:
+    curves = {name: cell.progress[name].quartiles for name in cell.algorithms}
+    return {
+        "name": cell.label,
+        "evaluations": _to_json_numbers(cell.moments),
+        "convergence": {name: [_to_json_numbers(part) for part in parts] for name, parts in curves.items()},
+        "reached": {
+            name: _to_json_numbers(share_of_targets_reached([cell], name, cell.moments)) for name in cell.algorithms
+        },
+        "ends": {name: _to_json_numbers(cell.ends(name)) for name in cell.algorithms},
+        "boxes": {name: _to_json_numbers(_quartiles(cell, name)) for name in cell.algorithms},
+    }
+
+
+def _overall_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> dict[str, Any]:
+    first = min(cell.moments[0] for cell in cells)
+    moments = np.unique(np.geomspace(first, max(cell.moments[-1] for cell in cells), _CURVE_POINTS).round())
+    medians = [{name: cell.summary(name).median for name in cell.algorithms} for cell in cells]
+    profile = performance_profile(pd.DataFrame(medians)[list(algorithms)], _PROFILE_FACTORS)
+    return {
+        "evaluations": _to_json_numbers(moments),
+        "reached": {name: _to_json_numbers(share_of_targets_reached(cells, name, moments)) for name in algorithms},
+        "factors": _to_json_numbers(_PROFILE_FACTORS),
+        "profile": {name: _to_json_numbers(profile[name].to_numpy()) for name in algorithms},
+    }
+
+
+def _quartiles(cell: Cell, algorithm: str) -> Array:
+    summary = cell.summary(algorithm)
+    return np.array([summary.lower_quartile, summary.median, summary.upper_quartile])
+
+
+def _to_json_numbers(values: Array) -> list[float | None]:
+    return [float(f"{value:.4g}") if np.isfinite(value) else None for value in values.tolist()]
+
 
 _SCRIPTS = ("scales.js", "lines.js", "boxes.js", "page.js")
 
 
-def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[Facts]) -> str:
+def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[AlgorithmProperties]) -> str:
     """HTML text; facts: of the algorithms that took part, as far as they are known here."""
-    looks = {name: look(index) for index, name in enumerate(results.algorithms)}
+    looks = {name: chart_style(index) for index, name in enumerate(results.algorithms)}
     found = critical_difference(block_losses(list(cells)))
     parts = [
-        sections.head(results, cells, found),
-        sections.buttons(looks),
-        sections.ranking(found, cells, results.algorithms, looks),
-        sections.overall(),
-        sections.problem(cells),
-        sections.power(cells),
-        sections.properties(facts),
-        sections.origin(results),
+        sections.header_section(results, cells, found),
+        sections.algorithm_buttons(looks),
+        sections.ranking_section(found, cells, results.algorithms, looks),
+        sections.overall_section(),
+        sections.problem_section(cells),
+        sections.power_section(cells),
+        sections.properties_section(facts),
+        sections.origin_section(results),
     ]
-    style = _asset("page.css")
-    scripts = "\n".join(_asset(name) for name in _SCRIPTS)
+    style = _read_asset("page.css")
+    scripts = "\n".join(_read_asset(name) for name in _SCRIPTS)
     data = page_data(cells, results.algorithms).replace("<", "\\u003c")  # a label must not end the script
     title = escape(results.name)
     return (
@@ -43,5 +106,20 @@ def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[Facts
     )
 
 
-def _asset(name: str) -> str:
+def _read_asset(name: str) -> str:
     return (files("bench.report") / "assets" / name).read_text(encoding="utf-8")
+
+
+def write_report(where: Path, store: Path, out: Path | None) -> Path:
+    """Write the page about results; returns the file. Raises InputError, in one line, if there are no results."""
+    results = read_results(where, store)
+    path = out or Path("results") / f"{results.name}_report.html"
+    make_folder(path.parent)
+    write_whole(path, report_page(results, analyse_cells(results), _measure_participants(results)))
+    return path
+
+
+def _measure_participants(results: ResultSet) -> list[AlgorithmProperties]:
+    """Of the algorithms that took part and are registered here: results may come from elsewhere."""
+    took_part = dict.fromkeys(entry["name"] for entry in yaml.safe_load(results.settings)["algorithms"].values())
+    return properties_of_algorithms([name for name in took_part if name in registered()])

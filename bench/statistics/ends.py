@@ -1,4 +1,6 @@
-"""Figures of a set of ends, some of them infeasible: what Table 3 says of an algorithm."""
+"""Summaries of the ends of runs, some of them infeasible, and percentile bootstrap intervals of their quantiles, also
+where ends are infinite.
+"""
 
 import math
 from dataclasses import dataclass
@@ -7,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algorithms.contract import Array
+from bench.seeds import named_generator
 
 
 @dataclass(frozen=True)
@@ -60,3 +63,23 @@ def row_quantiles(rows: Array, share: float) -> Array:
     if weight == 0:
         return ordered[:, below]
     return np.asarray((1 - weight) * ordered[:, below] + weight * ordered[:, below + 1])
+
+
+BOOTSTRAP_RESAMPLES = 2000
+INTERVAL_LEVEL = 0.95
+
+
+def resamples(n: int, *names: str) -> NDArray[np.int64]:
+    """Rows of indices drawn with replacement, (RESAMPLES, n); always the same ones for an n and names."""
+    return named_generator("bootstrap", *names, n).integers(n, size=(BOOTSTRAP_RESAMPLES, n))
+
+
+def quantile_interval(values: Array, share: float = 0.5) -> tuple[float, float]:
+    """95 % interval of a quantile of values (n,)."""
+    return percentile_interval(row_quantiles(values[resamples(len(values))], share))
+
+
+def percentile_interval(resampled: Array) -> tuple[float, float]:
+    """The middle 95 % of resampled figures (m,)."""
+    tail = (1.0 - INTERVAL_LEVEL) / 2
+    return quantile(resampled, tail), quantile(resampled, 1.0 - tail)

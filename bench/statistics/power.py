@@ -1,6 +1,6 @@
-"""What the paired test can see at all: its power after Holm's correction, by simulation.
+"""The power of the paired test after Holm's correction, by simulation.
 
-The model: ends of both algorithms are normal (in log10 or any other scale, since ranks do not care) with equal
+Model: the ends of both algorithms are normal (in log10 or any other scale, since ranks do not depend on it) with equal
 spread, so that a chance of superiority A (A12) means paired differences of mean ndtri(A) at a spread of one. That
 pairs are not correlated is the pessimistic case. Holm's correction tests the smallest of m p-values at level / m and
 the largest at level: the power for one of them lies between the two.
@@ -16,9 +16,9 @@ from scipy.stats import wilcoxon
 from algorithms.contract import Array
 from bench.seeds import named_generator
 
-SIMULATIONS = 4000
-_NUMBERS = 1_000_000  # drawn at most, so that thousands of repetitions are simulated less often
-EFFECTS = (0.56, 0.64, 0.71)  # small, medium, large (Vargha and Delaney 2000)
+POWER_SIMULATIONS = 4000
+_MAX_RANDOM_NUMBERS = 1_000_000  # drawn at most, so that thousands of repetitions are simulated less often
+EFFECT_SIZES = (0.56, 0.64, 0.71)  # small, medium, large (Vargha and Delaney 2000)
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,16 @@ def powers(repetitions: int, comparisons: int, level: float = 0.05) -> list[Powe
             signed_rank_power(repetitions, effect, level),
             signed_rank_power(repetitions, effect, level / comparisons),
         )
-        for effect in EFFECTS
+        for effect in EFFECT_SIZES
     ]
 
 
 def signed_rank_power(repetitions: int, superiority: float, level: float) -> float:
     """Chance that Wilcoxon's two-sided signed-rank test rejects at that level."""
-    return float((_p_values(repetitions, superiority) <= level).mean())
+    return float((_simulated_p_values(repetitions, superiority) <= level).mean())
 
 
-def smallest_seen(repetitions: int, level: float, power: float = 0.8) -> float | None:
+def smallest_detectable_effect(repetitions: int, level: float, power: float = 0.8) -> float | None:
     """The superiority that is seen with that power; None if not even a certain win is, with so few repetitions."""
     most = 0.9999
     if signed_rank_power(repetitions, most, level) < power:
@@ -56,9 +56,20 @@ def smallest_seen(repetitions: int, level: float, power: float = 0.8) -> float |
 
 
 @lru_cache(maxsize=128)
-def _p_values(repetitions: int, superiority: float) -> Array:
+def _simulated_p_values(repetitions: int, superiority: float) -> Array:
     """P-values for one true effect, one a simulation; the same chance for every effect, so that power grows with it."""
-    simulations = max(min(SIMULATIONS, _NUMBERS // repetitions), 100)
+    simulations = max(min(POWER_SIMULATIONS, _MAX_RANDOM_NUMBERS // repetitions), 100)
     noise = named_generator("power", repetitions).standard_normal((simulations, repetitions))
     p: Array = wilcoxon(noise + ndtri(superiority), axis=1).pvalue
     return p
+
+
+def power_text(repetitions: int, comparisons: int) -> str:
+    """The chance of seeing true effects with that many paired repetitions, Holm over so many comparisons."""
+    return f"Power with {repetitions} repetitions and Holm over {comparisons}: " + ", ".join(
+        _effect_text(power) for power in powers(repetitions, comparisons)
+    )
+
+
+def _effect_text(power: Power) -> str:
+    return f"a true A12 of {power.superiority:g} is seen with a chance of {power.first_step:.2f} to {power.alone:.2f}"

@@ -7,9 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from algorithms.bounds import POLICIES, clip, reflect, wrap
 from algorithms.contract import Box, uniform_points
-from algorithms.driver import iterate, minimise, planned_iterations, summary
+from algorithms.driver import (
+    BOUND_POLICIES,
+    clip,
+    iterate,
+    minimise,
+    planned_iterations,
+    reflect,
+    summarise_batches,
+    wrap,
+)
 from algorithms.registry import load, names
 
 BOX = Box(np.array([-1.0, -2.0, 0.0]), np.array([2.0, 1.5, 4.0]))
@@ -68,7 +76,7 @@ def test_the_first_population_is_evaluated_as_it_is():
 @settings(max_examples=60, deadline=None)
 @given(
     name=st.sampled_from(names()),
-    bounds=st.sampled_from(sorted(POLICIES)),
+    bounds=st.sampled_from(sorted(BOUND_POLICIES)),
     evaluations=st.integers(1, 80),
     swarm_size=st.integers(4, 12),
     seed=st.integers(0, 2**32),
@@ -108,7 +116,7 @@ def test_a_run_pickled_midway_takes_the_same_path(name, value):
     first = list(iterate(algorithm, start(), Recorder(values), BOX, used))
     state = pickle.loads(pickle.dumps(first[-1].state))
     second = list(iterate(algorithm, state, Recorder(values), BOX, 180 - used))
-    resumed, through = summary(first + second), summary(whole)
+    resumed, through = summarise_batches(first + second), summarise_batches(whole)
     np.testing.assert_array_equal(
         np.concatenate([batch.X for batch in first + second]), np.concatenate([batch.X for batch in whole])
     )
@@ -141,13 +149,13 @@ def test_bound_policies_move_only_what_is_outside_as_computed_by_hand():
     x=st.floats(-1e9, 1e9),
     lower=st.floats(-1e3, 1e3),
     width=st.floats(1e-3, 1e3),
-    name=st.sampled_from(sorted(POLICIES)),
+    name=st.sampled_from(sorted(BOUND_POLICIES)),
 )
 def test_every_bound_policy_ends_inside_and_leaves_inside_points_alone(x, lower, width, name):
     box = Box(np.array([lower]), np.array([lower + width]))
-    moved = POLICIES[name](np.array([[x]]), box)
+    moved = BOUND_POLICIES[name](np.array([[x]]), box)
     assert box.lower <= moved <= box.upper
-    np.testing.assert_array_equal(POLICIES[name](moved, box), moved)
+    np.testing.assert_array_equal(BOUND_POLICIES[name](moved, box), moved)
 
 
 @pytest.mark.parametrize(

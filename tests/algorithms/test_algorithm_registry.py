@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from algorithms import registry
-from algorithms.registry import GROUP, BrokenAlgorithmError, UnknownAlgorithmError, load, names
+from algorithms.registry import ENTRY_POINT_GROUP, BrokenAlgorithmError, UnknownAlgorithmError, load, names
 
 
 @pytest.fixture
@@ -13,8 +13,8 @@ def plug_ins(monkeypatch):
     """Pretend that other packages registered these algorithms."""
 
     def register(**values):
-        entries = [EntryPoint(name, value, GROUP) for name, value in values.items()]
-        monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == GROUP else [])
+        entries = [EntryPoint(name, value, ENTRY_POINT_GROUP) for name, value in values.items()]
+        monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == ENTRY_POINT_GROUP else [])
 
     return register
 

@@ -3,9 +3,9 @@
 import numpy as np
 from cmaes import CMA
 
+from algorithms.cmaes import IPOPCMAES, IPOPParams
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
-from algorithms.ipop_cmaes import IPOPCMAES, IPOPParams
 
 BOX = Box(np.array([-4.0, 0.0]), np.array([4.0, 0.5]))
 START = uniform_points(9, BOX, np.random.default_rng(1))

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from algorithms.contract import Box
-from algorithms.lshade import LSHADE, LSHADEParams, _donors
-from algorithms.success_history import SuccessHistory
+from algorithms.lshade import LSHADE, LSHADEParams, SuccessHistory, _draw_donors
 
 BOX = Box(np.array([-4.0, -2.0]), np.array([4.0, 6.0]))
 START = [[1.0, 2.0], [-1.0, 0.5], [2.5, -1.5], [-3.0, 4.0], [0.5, 0.0], [3.0, 3.0], [-2.0, -1.0], [0.0, 5.0]]
@@ -170,7 +169,7 @@ def test_donors_are_distinct_from_each_other_and_the_target_and_all_choices_are_
     rng = np.random.default_rng(3)
     counts = np.zeros((4, 4, 6), dtype=int)
     for _ in range(5000):
-        first, second = _donors(4, 6, rng)
+        first, second = _draw_donors(4, 6, rng)
         counts[np.arange(4), first, second] += 1
     target, first, second = np.nonzero(counts)
     assert len(target) == 4 * 3 * 4

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from algorithms import registry
-from algorithms.adapters.conversation import Conversation
 from algorithms.check import check_algorithm
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
+from algorithms.peers.peer import Conversation
 from algorithms.registry import BrokenAlgorithmError, load, names, peer_names
 
 BOX = Box(np.full(4, -4.0), np.full(4, 6.0))
@@ -62,9 +62,14 @@ def test_scipy_takes_the_path_of_scipy_called_directly():
 
     recorder = Recorder()
     differential_evolution(
-        recorder.one, list(zip(*BOX, strict=True)), init=START, maxiter=HORIZON, tol=0.0, polish=False,
+        recorder.one,
+        list(zip(*BOX, strict=True)),
+        init=START,
+        maxiter=HORIZON,
+        tol=0.0,
+        polish=False,
         rng=np.random.default_rng(SEED),
-    )  # fmt: skip
+    )
     np.testing.assert_array_equal(path("scipy-de"), np.array(recorder.points)[10:])
 
 
@@ -157,7 +162,7 @@ def test_too_few_points_are_refused_in_one_line():
 
 def test_a_missing_package_is_answered_with_the_extra_that_brings_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygmo", None)
-    monkeypatch.delitem(sys.modules, "algorithms.adapters.pygmo_peers", raising=False)
+    monkeypatch.delitem(sys.modules, "algorithms.peers.pygmo_adapter", raising=False)
     with pytest.raises(BrokenAlgorithmError) as raised:
         load("pygmo-pso")
     assert str(raised.value) == "algorithm 'pygmo-pso' needs the package 'pygmo': pip install 'armlab[peers]'"
@@ -165,4 +170,4 @@ def test_a_missing_package_is_answered_with_the_extra_that_brings_it(monkeypatch
 
 def test_peers_stand_apart_from_the_names_that_need_no_other_package():
     assert not set(names()) & set(peer_names())
-    assert "did you mean 'pygmo-gwo'?" in registry._advice("pigmo-gwo")
+    assert "did you mean 'pygmo-gwo'?" in registry._name_hint("pigmo-gwo")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.execute import loaded
+from bench.execute import load_algorithm
 
 SMALL = """\
 name: small
@@ -55,7 +55,7 @@ def armlab(tmp_path: Path) -> Armlab:
     """Runs `armlab` with arguments in an empty folder, in a process of its own."""
 
     def run(*arguments: object) -> "subprocess.CompletedProcess[str]":
-        command = [sys.executable, "-m", "bench.cli", *map(str, arguments)]
+        command = [sys.executable, "-m", "armlab.cli.main", *map(str, arguments)]
         return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
 
     return run
@@ -78,7 +78,7 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
         notes.touch()
         monkeypatch.syspath_prepend(str(site))
         monkeypatch.delitem(sys.modules, "plug_in", raising=False)  # that of another test
-        loaded.cache_clear()
+        load_algorithm.cache_clear()
         monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{site}")
         return notes
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from bench.cli import main
+from armlab.cli.main import main
 
 
 @pytest.fixture(autouse=True)
@@ -96,8 +96,8 @@ def _as_ordinary_user() -> Iterator[None]:
 
 
 def test_a_results_folder_that_is_read_only(tmp_path: Path) -> None:
+    from armlab.common.errors import InputError
     from bench.files import check_folder
-    from problem.errors import InputError
 
     folder = tmp_path / "results"
     folder.mkdir()

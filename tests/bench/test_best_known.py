@@ -8,18 +8,30 @@ import numpy as np
 import pytest
 from refusals import refusal
 
-from bench.best_known.command import improve_best_known, point_of
-from bench.best_known.config import build_excitation, read_plan
-from bench.best_known.descent import MARGIN, descend, judge, motion_of
-from bench.best_known.gap import best_known, gap_to_best_known
-from bench.best_known.record import FILE, Record, read_records, write_records
-from bench.best_known.rows import Rows
-from bench.best_known.smooth import smooth_log_condition
-from problem.excitation_problem import ExcitationProblem
+from bench.studies.best_known.descent import (
+    LIMIT_MARGIN,
+    LimitRows,
+    descend,
+    evaluate_point,
+    motion_of,
+    smooth_log_condition,
+)
+from bench.studies.best_known.records import (
+    RECORDS_FILE,
+    Record,
+    build_excitation,
+    gap_to_best_known,
+    read_records,
+    read_search_plan,
+    records_by_problem,
+    write_records,
+)
+from bench.studies.best_known.search import improve_best_known, record_point
+from problem.excitation import ExcitationProblem
 from problem.registry import ProblemSettings, parse_problem
 
 ROOT = Path(__file__).parents[2]
-RECORDS = read_records(ROOT / "results" / FILE)
+RECORDS = read_records(ROOT / "results" / RECORDS_FILE)
 TINY = {"preset": "joint-fourier", "joints": 2, "harmonics": 2, "samples": 30}
 PLAN = f"name: tiny\nseed: 3\nproblems:\n  tiny: {json.dumps(TINY)}\n"
 
@@ -46,7 +58,7 @@ def plan(tmp_path: Path) -> Callable[[str], Path]:
 def test_a_record_is_reproduced_and_breaks_no_limit(name: str) -> None:
     record = RECORDS[name]
     problem = build_excitation(parse_problem(record.settings, name), name)
-    end = judge(problem, point_of(record))
+    end = evaluate_point(problem, record_point(record))
     assert end.value == pytest.approx(record.value, rel=1e-9 if problem.spectral else 1e-6)
     assert end.violation == 0.0
     assert tuple(record.coefficients) == problem.trajectory.names
@@ -54,8 +66,8 @@ def test_a_record_is_reproduced_and_breaks_no_limit(name: str) -> None:
 
 
 def test_every_problem_of_the_plan_has_a_record_of_its_present_settings() -> None:
-    plan = read_plan(ROOT / "configs" / "best_known.yaml")
-    known = best_known(ROOT / "results" / FILE)
+    plan = read_search_plan(ROOT / "configs" / "best_known.yaml")
+    known = records_by_problem(ROOT / "results" / RECORDS_FILE)
     assert set(RECORDS) == set(plan.problems)
     for name in plan.problems:
         assert gap_to_best_known(plan.settings(name), RECORDS[name].value, known) == 0.0
@@ -70,12 +82,12 @@ def test_no_start_ended_below_the_record() -> None:
 def test_a_problem_without_derivatives_is_searched_in_the_box_and_about_the_best(
     tmp_path: Path, plan: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bench.best_known.search.EVALUATIONS", 75)
+    monkeypatch.setattr("bench.studies.best_known.search.EVALUATIONS_WITHOUT_DERIVATIVES", 75)
     text = "name: tiny\nseed: 3\nproblems:\n  tiny: {preset: tell-apart, joints: 2, harmonics: 2, duration: 2.0}\n"
     config = plan(text)
     for _ in range(2):
         list(improve_best_known(tmp_path, 0.0, config=config))
-    record = read_records(tmp_path / FILE)["tiny"]
+    record = read_records(tmp_path / RECORDS_FILE)["tiny"]
     assert set(record.ends) == {"cma-es", "kick"}
     assert (record.evaluations, record.gradients) == (150, 0)
 
@@ -85,7 +97,7 @@ def test_a_search_goes_on_where_it_stopped_and_never_gets_worse(tmp_path: Path, 
     values = []
     for starts in (1, 2, 3):
         assert len(list(improve_best_known(tmp_path, 0.0, config=config))) == 1
-        record = read_records(tmp_path / FILE)["tiny"]
+        record = read_records(tmp_path / RECORDS_FILE)["tiny"]
         assert record.starts == starts
         values.append(record.value)
     assert values == sorted(values, reverse=True)
@@ -98,7 +110,7 @@ def test_a_problem_that_starts_from_another_record_goes_back_to_it_every_other_t
     config = plan(PLAN + f"  fine: {fine}\nstart_from: {{fine: tiny}}\n")
     for _ in range(3):
         list(improve_best_known(tmp_path, 0.0, config=config))
-    records = read_records(tmp_path / FILE)
+    records = read_records(tmp_path / RECORDS_FILE)
     assert {method: len(ends) for method, ends in records["fine"].ends.items()} == {"from tiny": 2, "kick": 1}
     assert records["fine"].value == pytest.approx(records["tiny"].value, rel=0.3)
 
@@ -106,21 +118,21 @@ def test_a_problem_that_starts_from_another_record_goes_back_to_it_every_other_t
 def test_a_better_record_is_left_alone(tmp_path: Path, plan: Callable[[str], Path]) -> None:
     config = plan(PLAN)
     list(improve_best_known(tmp_path, 0.0, config=config))
-    found = read_records(tmp_path / FILE)["tiny"]
-    write_records(tmp_path / FILE, {"tiny": found.model_copy(update={"value": 1.0})})
+    found = read_records(tmp_path / RECORDS_FILE)["tiny"]
+    write_records(tmp_path / RECORDS_FILE, {"tiny": found.model_copy(update={"value": 1.0})})
     list(improve_best_known(tmp_path, 0.0, config=config))
-    after = read_records(tmp_path / FILE)["tiny"]
+    after = read_records(tmp_path / RECORDS_FILE)["tiny"]
     assert (after.value, after.coefficients, after.start) == (1.0, found.coefficients, found.start)
-    assert (after.starts, after.agreeing(0.01)) == (2, (0, 2))
+    assert (after.starts, after.count_agreeing(0.01)) == (2, (0, 2))
 
 
 def test_a_descent_ends_within_all_limits_and_below_its_start() -> None:
     problem = tiny()
     start = (problem.lower + problem.upper) / 2 + 0.1 * (problem.upper - problem.lower)
-    before, after = judge(problem, start), descend(problem, start)
+    before, after = evaluate_point(problem, start), descend(problem, start)
     assert after.feasible
     assert after.value < 0.5 * before.value
-    assert judge(problem, after.point).value == after.value
+    assert evaluate_point(problem, after.point).value == after.value
 
 
 def test_a_random_step_from_the_end_of_a_descent_is_no_better() -> None:
@@ -134,7 +146,7 @@ def test_a_random_step_from_the_end_of_a_descent_is_no_better() -> None:
 def test_distances_are_negative_exactly_where_a_limit_is_broken() -> None:
     problem = tiny()
     points = np.random.default_rng(2).uniform(problem.lower, problem.upper, (60, len(problem.lower)))
-    nearest = [Rows(problem, MARGIN).distances(motion_of(problem, point)).min() for point in points]
+    nearest = [LimitRows(problem, LIMIT_MARGIN).distances(motion_of(problem, point)).min() for point in points]
     assert np.array_equal(np.array(nearest) < 0, problem.evaluate(points).violation > 0)
 
 
@@ -149,10 +161,17 @@ def test_the_smoothed_condition_number_of_4_2_1_by_hand_and_its_limit() -> None:
 def test_the_gap_does_not_depend_on_what_leaves_a_trajectory_as_good_as_it_is(tmp_path: Path) -> None:
     record = Record(
         settings=settings_of(preset="joint-fourier").model_dump(mode="json"),
-        value=8.0, coefficients={}, method="", seed=0, start=0, evaluations=0, gradients=0, versions={},
-    )  # fmt: skip
-    write_records(tmp_path / FILE, {"one": record})
-    known = best_known(tmp_path / FILE)
+        value=8.0,
+        coefficients={},
+        method="",
+        seed=0,
+        start=0,
+        evaluations=0,
+        gradients=0,
+        versions={},
+    )
+    write_records(tmp_path / RECORDS_FILE, {"one": record})
+    known = records_by_problem(tmp_path / RECORDS_FILE)
     same = [
         settings_of(preset="joint-fourier"),
         settings_of(preset="joint-fourier", penalty={"step": 7.0}, criterion={"kind": "d_optimality"}),
@@ -183,11 +202,11 @@ def test_a_record_of_other_settings_is_not_overwritten(tmp_path: Path, plan: Cal
     list(improve_best_known(tmp_path, 0.0, config=plan(PLAN)))
     other = plan(PLAN.replace('"samples": 30', '"samples": 31'))
     told = refusal(lambda: list(improve_best_known(tmp_path, 0.0, config=other)))
-    assert told == f"{tmp_path / FILE}: 'tiny' has other settings there: rename the problem or remove it"
+    assert told == f"{tmp_path / RECORDS_FILE}: 'tiny' has other settings there: rename the problem or remove it"
 
 
 def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
-    path = tmp_path / FILE
+    path = tmp_path / RECORDS_FILE
     path.write_text('{"schema": "other/1", "problems": {}}')
     assert f"'schema' in {path}: should be 'best-known/1', not 'other/1'" == refusal(read_records, path)
     path.write_text("{")

@@ -12,7 +12,7 @@ COLUMNS = "algorithm,minimum,average,standard_deviation,median,lower_quartile,up
 
 
 def test_help_imports_nothing_heavy() -> None:
-    command = [sys.executable, "-X", "importtime", "-m", "bench.cli", "--help"]
+    command = [sys.executable, "-X", "importtime", "-m", "armlab.cli.main", "--help"]
     imported = subprocess.run(command, capture_output=True, text=True, check=True).stderr
     names = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in imported.splitlines()}
     assert "click" in names
@@ -25,8 +25,11 @@ def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, t
     written = sorted(path.name for path in (tmp_path / "results").iterdir())
     assert written == ["small.csv", "small.md", "small.settings.yaml", "small_times.csv"]
     assert [Path(line).name for line in done.stdout.splitlines()] == [
-        "small.csv", "small.md", "small_times.csv", "small.settings.yaml",
-    ]  # fmt: skip
+        "small.csv",
+        "small.md",
+        "small_times.csv",
+        "small.settings.yaml",
+    ]
     lines = (tmp_path / "results" / "small.csv").read_text().splitlines()
     assert lines[0] == COLUMNS
     assert [line.split(",")[0] for line in lines[1:]] == ["spso", "de"]

@@ -136,7 +136,7 @@ def expected(start: Callable[..., Any], tmp_path_factory: pytest.TempPathFactory
 
 def _run(start: Callable[..., Any], folder: Path, options: list[str]) -> "subprocess.Popen[str]":
     (folder / "sweep.yaml").write_text(CONFIG)
-    command = [sys.executable, "-m", "bench.cli", "run", "sweep.yaml", *options]
+    command = [sys.executable, "-m", "armlab.cli.main", "run", "sweep.yaml", *options]
     with (folder / "said.txt").open("w") as said:
         return start(*command, cwd=folder, stdout=said, stderr=said)
 

@@ -7,13 +7,12 @@ import pytest
 from click.testing import CliRunner
 from refusals import refusal
 
-from bench.cli import main
+from armlab.cli.main import main
 from bench.config import read_experiment
-from bench.engines.choice import engine
-from bench.engines.contract import Executor
-from bench.engines.work import do_elsewhere
+from bench.dispatch import open_executor
 from bench.execute import Failure
-from bench.experiment import load_experiment
+from bench.executors.contract import ExecutorSettings, run_in_worker
+from bench.run import load_experiment
 
 
 @pytest.mark.parametrize(
@@ -41,13 +40,13 @@ def test_the_settings_of_results_are_the_same_wherever_trials_were_run(small: Pa
 @pytest.mark.parametrize("backend", ["dask", "ray"])
 def test_a_missing_package_is_told_with_its_extra(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
     package = {"dask": "distributed", "ray": "ray"}[backend]
-    ours = f"bench.engines.{backend}_cluster"
+    ours = f"bench.executors.{backend}_cluster"
     for name in [name for name in sys.modules if name.split(".")[0] == package or name == ours]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
 
     def use() -> None:
-        with engine(Executor(backend=backend), 1, None):  # type: ignore[arg-type]
+        with open_executor(ExecutorSettings(backend=backend), 1, None):  # type: ignore[arg-type]
             pass
 
     with pytest.raises(Exception, match=rf"executor '{backend}' needs the package .*armlab\[cluster\]"):
@@ -62,9 +61,9 @@ def test_an_address_without_an_executor_is_refused(small: Path) -> None:
 
 def test_a_worker_with_other_code_refuses_to_compute(small: Path) -> None:
     entry = load_experiment(small).entries[0]
-    ((key, result),) = do_elsewhere([("another key", entry.trial)]).results
+    ((key, result),) = run_in_worker([("another key", entry.trial)]).results
     assert key == "another key"
     assert isinstance(result, Failure)
     assert "has other code or files" in result.traceback
-    ((_, result),) = do_elsewhere([(entry.key, entry.trial)]).results
+    ((_, result),) = run_in_worker([(entry.key, entry.trial)]).results
     assert not isinstance(result, Failure)

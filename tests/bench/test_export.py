@@ -9,10 +9,9 @@ import pytest
 import yaml
 from refusals import refusal
 
-from bench.best_known.record import FILE, Record, write_records
-from bench.export.command import export
-from bench.export.formats import FORMATS, as_csv, as_rapid, as_ros2
-from bench.export.sampled import Sampled, sampled
+from bench.studies.best_known.export import export_record
+from bench.studies.best_known.records import RECORDS_FILE, Record, write_records
+from bench.trajectory_files import TRAJECTORY_FORMATS, SampledTrajectory, sample_trajectory, to_csv, to_rapid, to_ros2
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.transforms import Array
@@ -28,22 +27,28 @@ def write(tmp_path: Path, name: str = "gentle", share: float = 0.3, **settings: 
     point = np.random.default_rng(1).uniform(-share, share, len(problem.lower)) * (problem.upper - problem.lower) / 2
     record = Record(
         settings=full.model_dump(mode="json"),
-        value=1.0, coefficients={str(n): x for n, x in enumerate(point + (problem.lower + problem.upper) / 2)},
-        method="", seed=0, start=0, evaluations=0, gradients=0, versions={},
-    )  # fmt: skip
-    write_records(tmp_path / FILE, {name: record})
+        value=1.0,
+        coefficients={str(n): x for n, x in enumerate(point + (problem.lower + problem.upper) / 2)},
+        method="",
+        seed=0,
+        start=0,
+        evaluations=0,
+        gradients=0,
+        versions={},
+    )
+    write_records(tmp_path / RECORDS_FILE, {name: record})
     path = tmp_path / "problem.yaml"
     path.write_text(yaml.safe_dump({**REST, **settings}))
     return path
 
 
-def exported(tmp_path: Path, form: str, rate_hz: float = 50.0) -> tuple[Sampled, str]:
+def exported(tmp_path: Path, form: str, rate_hz: float = 50.0) -> tuple[SampledTrajectory, str]:
     out = tmp_path / "out"
-    trajectory = export(write(tmp_path), "gentle", form, out, tmp_path / FILE, rate_hz)
+    trajectory = export_record(write(tmp_path), "gentle", form, out, tmp_path / RECORDS_FILE, rate_hz)
     return trajectory, out.read_text()
 
 
-def parts(trajectory: Sampled) -> list[Array]:
+def parts(trajectory: SampledTrajectory) -> list[Array]:
     motion = trajectory.motion
     return [motion.position, motion.velocity, motion.acceleration]
 
@@ -108,9 +113,18 @@ def test_rapid_is_a_module_of_timed_moves_through_all_targets_in_degrees(tmp_pat
     trajectory, text = exported(tmp_path, "rapid")
     statements = rapid_statements(text)
     assert [kind for kind, _ in statements] == [
-        "module", "number", "array", "procedure", "move", "loop", "move", "end loop", "move",
-        "end procedure", "end module",
-    ]  # fmt: skip
+        "module",
+        "number",
+        "array",
+        "procedure",
+        "move",
+        "loop",
+        "move",
+        "end loop",
+        "move",
+        "end procedure",
+        "end module",
+    ]
     of = dict(statements)
     assert float(of["number"][2]) == pytest.approx(0.02)
     degrees = np.array([row.split(",") for row in re.findall(r"\[\[(.*?)\]", of["array"][3])], dtype=float)
@@ -124,11 +138,11 @@ def test_rapid_is_a_module_of_timed_moves_through_all_targets_in_degrees(tmp_pat
     assert [("\\T:=" in move[0], "fine" in move[0]) for move in moves] == [(False, True), (True, False), (True, True)]
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", TRAJECTORY_FORMATS)
 def test_the_best_known_trajectory_from_rest_to_rest_is_exported_at_250_hz(tmp_path: Path, form: str) -> None:
     out = tmp_path / f"best.{form}"
-    problem, records = ROOT / "configs" / "export.yaml", ROOT / "results" / FILE
-    trajectory = export(problem, "joint-fourier-rest-250hz", form, out, records)
+    problem, records = ROOT / "configs" / "export.yaml", ROOT / "results" / RECORDS_FILE
+    trajectory = export_record(problem, "joint-fourier-rest-250hz", form, out, records)
     motion = trajectory.motion
     assert trajectory.rate_hz == 250.0
     assert out.exists()
@@ -152,18 +166,20 @@ def test_derivatives_fit_the_positions(tmp_path: Path) -> None:
 def test_a_limit_that_is_kept_at_the_samples_but_broken_at_the_rate_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, share=0.6, samples=13)
     problem = parse_problem(yaml.safe_load(path.read_text()), "test").build()
-    point = np.array(list(yaml.safe_load((tmp_path / FILE).read_text())["problems"]["gentle"]["coefficients"].values()))
+    point = np.array(
+        list(yaml.safe_load((tmp_path / RECORDS_FILE).read_text())["problems"]["gentle"]["coefficients"].values())
+    )
     motion = problem.trajectory.motions(point[None], np.linspace(0, 4, 13)).motion  # type: ignore[attr-defined]
     seen = float(np.abs(motion.velocity[..., 1]).max())
     path.write_text(yaml.safe_dump({**REST, "limits": {"velocity": [99.0, seen * (1 + 1e-9), 99.0]}}))
-    told = refusal(export, path, "gentle", "csv", tmp_path / "out", tmp_path / FILE)
+    told = refusal(export_record, path, "gentle", "csv", tmp_path / "out", tmp_path / RECORDS_FILE)
     assert re.fullmatch(
         r"gentle breaks a limit at 250 Hz: speed of joint2 reaches [\d.]+, limit [\d.]+ \(SI\); "
         r"take a record with more samples",
         told,
     )
     assert not (tmp_path / "out").exists()
-    assert export(path, "gentle", "csv", tmp_path / "out", tmp_path / FILE, 3.0)
+    assert export_record(path, "gentle", "csv", tmp_path / "out", tmp_path / RECORDS_FILE, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -184,26 +200,26 @@ def test_each_mistake_is_told_in_one_line(
 ) -> None:
     path = write(tmp_path)
     path.write_text(yaml.safe_dump({**REST, **other}))
-    told = refusal(export, path, record, "csv", tmp_path / "out", tmp_path / FILE, rate_hz)
-    assert told == message.format(file=tmp_path / FILE, path=path)
+    told = refusal(export_record, path, record, "csv", tmp_path / "out", tmp_path / RECORDS_FILE, rate_hz)
+    assert told == message.format(file=tmp_path / RECORDS_FILE, path=path)
 
 
 def test_a_trajectory_that_starts_in_motion_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, rest=False)
-    told = refusal(export, path, "gentle", "csv", tmp_path / "out", tmp_path / FILE)
+    told = refusal(export_record, path, "gentle", "csv", tmp_path / "out", tmp_path / RECORDS_FILE)
     assert told == "gentle is not at rest at both ends: take a record of a problem with `rest: true`"
 
 
 def test_a_seventh_axis_is_nothing_that_rapid_can_take() -> None:
     still = Motion(*(np.zeros((2, 7)) for _ in range(3)))
-    trajectory = Sampled("seven", tuple("abcdefg"), ("revolute",) * 7, 10.0, still)
-    assert "RAPID has six turning robot axes" in refusal(as_rapid, trajectory)
-    assert as_csv(trajectory).count("\n") == 3
-    assert len(yaml.safe_load(as_ros2(trajectory))["points"]) == 2
+    trajectory = SampledTrajectory("seven", tuple("abcdefg"), ("revolute",) * 7, 10.0, still)
+    assert "RAPID has six turning robot axes" in refusal(to_rapid, trajectory)
+    assert to_csv(trajectory).count("\n") == 3
+    assert len(yaml.safe_load(to_ros2(trajectory))["points"]) == 2
 
 
 def test_sampling_includes_both_ends(tmp_path: Path) -> None:
     problem = parse_problem(REST, "test").build()
     middle = (problem.lower + problem.upper) / 2
-    trajectory = sampled(problem, middle, 10.0, "still")  # type: ignore[arg-type]
+    trajectory = sample_trajectory(problem, middle, 10.0, "still")  # type: ignore[arg-type]
     assert trajectory.times[[0, -1]].tolist() == [0.0, 4.0]

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 from refusals import refusal
 
+from armlab.common.errors import InputError
+from bench.dispatch import run_missing
 from bench.execute import run_trial
-from bench.experiment import load_experiment
-from bench.runner import run_missing
-from bench.salvage import salvage
+from bench.run import load_experiment
 from bench.statistics import summarise
-from bench.store import open_store
+from bench.store import open_store, salvage
 from problem.contract import Evaluation
-from problem.errors import InputError
 
 Armlab = Callable[..., "subprocess.CompletedProcess[str]"]
 PlugIn = Callable[[str], Path]
@@ -60,7 +59,7 @@ def test_a_file_that_may_not_grow_is_a_line_and_exit_code_2(many: Path) -> None:
     def no_large_files() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
-    command = [sys.executable, "-m", "bench.cli", "run", many.name]
+    command = [sys.executable, "-m", "armlab.cli.main", "run", many.name]
     done = subprocess.run(
         command, cwd=many.parent, capture_output=True, text=True, preexec_fn=no_large_files, check=False
     )
@@ -125,8 +124,10 @@ def test_two_runners_on_one_store_share_the_work(small: Path, plug_in: PlugIn) -
     notes = plug_in("time.sleep(0.05)")
     text = small.read_text().replace("[spso, de]", "[plug-in]").replace("repetitions: 3", "repetitions: 200")
     small.write_text(text.replace("iterations: 4", "iterations: 999"))  # four trials a batch
-    commands = [[sys.executable, "-m", "bench.cli", "run", small.name, "--workers", "1", "--results", f"r{k}"]
-                for k in range(2)]  # fmt: skip
+    commands = [
+        [sys.executable, "-m", "armlab.cli.main", "run", small.name, "--workers", "1", "--results", f"r{k}"]
+        for k in range(2)
+    ]
     running = [subprocess.Popen(command, cwd=small.parent, stdout=subprocess.DEVNULL) for command in commands]
     assert [one.wait(300) for one in running] == [0, 0]
     assert _count(small.parent / ".armlab" / "runs.sqlite") == 200
@@ -162,10 +163,10 @@ def test_a_trial_that_hangs_is_ended_and_told_and_the_others_are_kept(
 
 def _first_coordinate(trial: object) -> float:
     from algorithms.contract import Box
-    from bench.execute import built
+    from bench.execute import build_problem
     from bench.seeds import first_population
 
-    problem = built(trial.problem)
+    problem = build_problem(trial.problem)
     box = Box(problem.lower, problem.upper)
     return float(first_population(trial.seed, problem.name, trial.repetition, trial.swarm_size, box)[0, 0])
 
@@ -226,7 +227,7 @@ def test_an_objective_that_is_not_a_number_is_a_loss_and_no_end_is_feasible(smal
             return Evaluation(*(np.full(len(points), number) for number in (np.nan, np.nan, 0.0)))
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("bench.execute.built", lambda settings: Nowhere())
+        patch.setattr("bench.execute.build_problem", lambda settings: Nowhere())
         outcome = run_trial(trial)
     assert outcome.fitness == np.inf
     assert np.isnan(outcome.value)

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from algorithms.registry import load
-from bench.fingerprint import fingerprint
+from bench.provenance import fingerprint
 
 SCRIPT = """
 from algorithms.registry import load
-from bench.fingerprint import fingerprint
+from bench.provenance import fingerprint
 print(fingerprint(load("de"), {"preset": "sphere"}))
 """
 
@@ -31,7 +31,7 @@ def test_a_problem_of_a_third_party_is_all_of_its_package(tmp_path: Path, monkey
     (package / "law.py").write_text("FACTOR = 1\n")
     monkeypatch.syspath_prepend(str(tmp_path))
     entry = EntryPoint("theirs", "their_problems.inner.preset:TheirSettings", "armlab.problems")
-    monkeypatch.setattr("bench.fingerprint.plug_ins", lambda: [entry])
+    monkeypatch.setattr("bench.provenance.plug_ins", lambda: [entry])
     before = fingerprint(load("de"), {"preset": "theirs"})
     assert fingerprint(load("de"), {"preset": "theirs"}) == before
     (package / "law.py").write_text("FACTOR = 2.0\n")

@@ -5,7 +5,7 @@ import sys
 
 SWEEP = """\
 import os, signal, struct, threading, time
-from bench.engines.local import local_engine
+from bench.executors.local import local_engine
 
 def half_a_report(engine):
     while engine.present is None or not engine.present._processes:

@@ -55,7 +55,7 @@ def _stopped_after_three(
     folder: Path, config: Path, workers: str, how: signal.Signals = signal.SIGINT
 ) -> tuple[str, int]:
     """What the command says, and its exit code, after a signal when three trials are in the store."""
-    command = [sys.executable, "-m", "bench.cli", "run", str(config), "--workers", workers]
+    command = [sys.executable, "-m", "armlab.cli.main", "run", str(config), "--workers", workers]
     running = subprocess.Popen(
         command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear_ctrl_c
     )

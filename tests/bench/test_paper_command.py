@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from bench.experiment import Options
-from bench.paper.claims import VERDICTS
-from bench.paper.command import EXPERIMENTS, make_paper
+from bench.run import RunOptions
+from bench.studies.paper.claims import VERDICTS
+from bench.studies.paper.replication import EXPERIMENTS, make_paper
 
 ROOT = Path(__file__).parents[2]
 SMALLER = {
@@ -25,8 +25,10 @@ SMALLER = {
 EXPECTED = {
     *(f"table{n}.{suffix}" for n in (1, 2, 3, 4) for suffix in ("csv", "md", "settings.yaml")),
     *(f"figure{n}.{suffix}" for n in (2, 3, 4, 5) for suffix in ("png", "svg", "settings.yaml")),
-    "ranking_duels.csv", "replication.md", "replication.html",
-}  # fmt: skip
+    "ranking_duels.csv",
+    "replication.md",
+    "replication.html",
+}
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 p for p in content["problem"] if p["label"] in ("default 5 s SI free", "default 2 s SI free")
             ]
         (configs / f"{name}.yaml").write_text(yaml.safe_dump(content))
-    options = Options(home / "runs.sqlite", home / "results", workers=1)
+    options = RunOptions(home / "runs.sqlite", home / "results", workers=1)
     list(
         make_paper(
             configs,

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bench.statistics.paired import against, duels, log_losses, signed_rank_p, superiority
+from bench.statistics.pairwise import duels, duels_against_all, log_losses, signed_rank_p, superiority
 
 
 def _frame(**ends: list[float]) -> pd.DataFrame:
@@ -37,7 +37,7 @@ def test_a_clear_winner_is_named_and_a_draw_is_not() -> None:
     rng = np.random.default_rng(0)
     base = rng.uniform(10, 20, 30)
     frame = _frame(mupso=list(base), better=list(base * 0.8), same=list(base[::-1]))
-    winners = {duel.rival: duel.winner() for duel in against(frame, "mupso")}
+    winners = {duel.rival: duel.winner() for duel in duels_against_all(frame, "mupso")}
     assert winners == {"better": "better", "same": None}
 
 

@@ -3,8 +3,16 @@
 import numpy as np
 import pytest
 
-from bench.paper.literal import GRAVITY, STATES, Identifiability, Reading, dot, identifiability, literal_matrix
-from bench.printed import printed, times_pi
+from bench.printed import read_printed, times_pi
+from bench.studies.paper.literal import (
+    PRINTED_GRAVITY,
+    RANDOM_STATES,
+    Identifiability,
+    Reading,
+    identifiability,
+    inertia_matrix,
+    literal_matrix,
+)
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.regressor import observation_matrix
@@ -14,7 +22,7 @@ OWN = Reading(False, False, "third moment", True)
 
 
 def _found(reading: Reading) -> Identifiability:
-    return identifiability(literal_matrix(printed(), reading))
+    return identifiability(literal_matrix(read_printed(), reading))
 
 
 def _paper_arm() -> Arm:
@@ -25,16 +33,16 @@ def _paper_arm() -> Arm:
             translation(0, 0, row.d_mm / 1e3),
             translation(row.a_mm / 1e3, 0, 0) @ rotation_x(times_pi(row.alpha)),
         )
-        for number, row in enumerate(printed().table1[:3], start=1)
+        for number, row in enumerate(read_printed().table1[:3], start=1)
     ]
-    return Arm("paper", tuple(joints), gravity=(0.0, 0.0, -GRAVITY))
+    return Arm("paper", tuple(joints), gravity=(0.0, 0.0, -PRINTED_GRAVITY))
 
 
 def test_moments_about_the_joints_axes_are_the_torques_of_the_projects_own_dynamics() -> None:
-    states = np.random.default_rng(0).uniform(-2, 2, (STATES, 3, 3))
+    states = np.random.default_rng(0).uniform(-2, 2, (RANDOM_STATES, 3, 3))
     arm = _paper_arm()
-    expected = observation_matrix(arm, Motion(*np.moveaxis(states, 1, 0))).reshape(STATES, 3, 30)
-    moments = literal_matrix(printed(), Reading(False, False, "moments", True)).reshape(STATES, 3, 3, 30)
+    expected = observation_matrix(arm, Motion(*np.moveaxis(states, 1, 0))).reshape(RANDOM_STATES, 3, 30)
+    moments = literal_matrix(read_printed(), Reading(False, False, "moments", True)).reshape(RANDOM_STATES, 3, 3, 30)
     axes = np.array([joint.after[:3, :3].T @ [0, 0, 1] for joint in arm.joints])  # z of the frame before
     np.testing.assert_allclose(np.einsum("jk,sjkp->sjp", axes, moments), expected, atol=1e-12)
 
@@ -43,8 +51,8 @@ def test_eq_28_is_the_product_of_an_inertia_tensor_with_a_vector() -> None:
     xx, yy, zz, xy, xz, yz = inertia = np.array([2.0, 3.0, 5.0, 0.1, 0.2, 0.3])
     omega = np.array([0.7, -1.1, 1.3])
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    np.testing.assert_allclose(dot(omega, "eq. 28") @ inertia, tensor @ omega)
-    np.testing.assert_allclose(dot(omega, "eq. 26") @ [xx, xy, xz, yy, yz, zz], tensor @ omega)
+    np.testing.assert_allclose(inertia_matrix(omega, "eq. 28") @ inertia, tensor @ omega)
+    np.testing.assert_allclose(inertia_matrix(omega, "eq. 26") @ [xx, xy, xz, yy, yz, zz], tensor @ omega)
 
 
 @pytest.mark.parametrize(
@@ -68,7 +76,7 @@ def test_eq_11_as_printed_gives_the_papers_counts_without_gravity(gravity: bool,
 
 def test_one_reading_holds_all_parameters_of_table_4_and_one_more() -> None:
     found = _found(Reading(False, True, "third moment", False, "eq. 26"))
-    assert set(found.alone) | set(found.combined) == set(printed().table4) | {"Ixy2"}
+    assert set(found.alone) | set(found.combined) == set(read_printed().table4) | {"Ixy2"}
     assert set(found.combined) == {"mcy1", "Ixz1", "Ixx2", "Ixy2"}
 
 

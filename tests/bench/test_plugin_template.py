@@ -38,13 +38,13 @@ def run(plugin: Path) -> Run:
 
 
 def test_its_names_are_listed(run: Run) -> None:
-    listed = run("bench.cli", "list").stdout
+    listed = run("armlab.cli.main", "list").stdout
     assert "evolution-strategy" in listed
     assert "reaching" in listed
 
 
 def test_its_algorithm_keeps_its_promises(run: Run) -> None:
-    checked = run("bench.cli", "check", "evolution-strategy")
+    checked = run("armlab.cli.main", "check", "evolution-strategy")
     assert checked.stdout == "evolution-strategy keeps its promises\n", checked.stderr
 
 
@@ -54,7 +54,7 @@ def test_its_inherited_tests_pass(run: Run) -> None:
 
 
 def test_its_comparison_runs_and_its_algorithm_beats_random_search_on_its_problem(run: Run, plugin: Path) -> None:
-    done = run("bench.cli", "run", "comparison.yaml", "--workers", "1")
+    done = run("armlab.cli.main", "run", "comparison.yaml", "--workers", "1")
     assert done.returncode == 0, done.stderr
     table = pd.read_csv(plugin / "results" / "comparison.csv").set_index(["problem", "algorithm"])
     medians = table["median"]
@@ -65,14 +65,14 @@ def test_its_comparison_runs_and_its_algorithm_beats_random_search_on_its_proble
 def test_a_wrong_key_of_its_problem_is_refused_in_one_line(run: Run, plugin: Path) -> None:
     text = (plugin / "comparison.yaml").read_text(encoding="utf-8")
     (plugin / "wrong.yaml").write_text(text.replace("joints: 12", "joint: 12"), encoding="utf-8")
-    refused = run("bench.cli", "run", "wrong.yaml")
+    refused = run("armlab.cli.main", "run", "wrong.yaml")
     assert refused.returncode == 2
     assert refused.stderr.strip() == ("armlab: unknown key 'joint' in problem of wrong.yaml: did you mean 'joints'?")
 
 
 def test_a_change_of_its_problem_is_another_trial(run: Run, plugin: Path) -> None:
-    run("bench.cli", "run", "comparison.yaml", "--workers", "1")
-    assert "240 trials, 240 done" in run("bench.cli", "run", "comparison.yaml", "--dry-run").stdout
+    run("armlab.cli.main", "run", "comparison.yaml", "--workers", "1")
+    assert "240 trials, 240 done" in run("armlab.cli.main", "run", "comparison.yaml", "--dry-run").stdout
     source = plugin.parent / "installed" / "armlab_example" / "reaching.py"
     source.write_text(source.read_text(encoding="utf-8").replace("10.0 *", "20.0 *"), encoding="utf-8")
-    assert "240 trials, 80 done" in run("bench.cli", "run", "comparison.yaml", "--dry-run").stdout
+    assert "240 trials, 80 done" in run("armlab.cli.main", "run", "comparison.yaml", "--dry-run").stdout

@@ -6,8 +6,7 @@ import pandas as pd
 import pytest
 from refusals import refusal
 
-from bench.properties.command import write_properties
-from bench.properties.facts import Facts
+from bench.studies.properties import AlgorithmProperties, write_properties
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +47,9 @@ def test_an_algorithm_that_is_drawn_to_the_origin_is_called_so_on_the_page(writt
 )
 def test_each_bias_has_its_words(changed: dict[str, float], said: str) -> None:
     fair = {"translation": 1e-13, "scale": 0.0, "noise_p_value_clip": 0.4, "noise_p_value_reflect": 0.6}
-    facts = Facts(algorithm="mine", **{**fair, **changed}, on_bounds_clip=0.0, on_bounds_reflect=0.0, overhead=1.0)
+    facts = AlgorithmProperties(
+        algorithm="mine", **{**fair, **changed}, on_bounds_clip=0.0, on_bounds_reflect=0.0, overhead=1.0
+    )
     assert facts.verdict == said
 
 

@@ -9,13 +9,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from armlab.common.errors import InputError
 from bench.execute import run_trial
-from bench.regression.baseline import Baseline, read_baseline, write_baseline
-from bench.regression.command import BASELINE, Regression
-from bench.regression.defects import DEFECTS
-from bench.regression.guard import judge
-from bench.regression.sweep import Cell, Ends, Sweep, ends_of, entries_of, read_sweep
-from problem.errors import InputError
+from bench.studies.regression.check import judge_run
+from bench.studies.regression.defects import DEFECTS
+from bench.studies.regression.sweep import (
+    Baseline,
+    Cell,
+    Ends,
+    Sweep,
+    group_ends,
+    plan_entries,
+    read_baseline,
+    read_sweep,
+    write_baseline,
+)
+from bench.studies.regression.tasks import BASELINE_FILE, RegressionTasks
 
 SWEEP = """\
 name: small
@@ -43,9 +52,9 @@ def sweep(config: Path) -> Sweep:
     return read_sweep(config)
 
 
-def regression(config: Path) -> Regression:
+def regression(config: Path) -> RegressionTasks:
     bar = SimpleNamespace(update=lambda trials: None)
-    return Regression(config, config.parent / "results", 1, lambda total, done: nullcontext(bar))
+    return RegressionTasks(config, config.parent / "results", 1, lambda total, done: nullcontext(bar))
 
 
 def ends(*values: float) -> Ends:
@@ -59,7 +68,7 @@ def both(*values: float) -> Ends:
 def test_unchanged_code_passes_and_is_identical_to_the_baselines_own_run(config: Path) -> None:
     check = regression(config)
     assert check.update_baseline().exit_code == 0
-    written = (config.parent / "results" / BASELINE).read_bytes()
+    written = (config.parent / "results" / BASELINE_FILE).read_bytes()
     report = check.check()
     assert report.exit_code == 0
     assert report.lines[-1] == (
@@ -68,7 +77,7 @@ def test_unchanged_code_passes_and_is_identical_to_the_baselines_own_run(config:
     )
     assert check.check().lines == report.lines
     check.update_baseline()
-    assert (config.parent / "results" / BASELINE).read_bytes() == written
+    assert (config.parent / "results" / BASELINE_FILE).read_bytes() == written
 
 
 def test_a_defect_fails_the_check_with_its_algorithm_named(config: Path) -> None:
@@ -100,7 +109,7 @@ def test_calibration_writes_rates_power_and_what_each_defect_printed(config: Pat
 
 def test_a_worse_cell_is_told_in_a_sentence_with_its_factor() -> None:
     baseline = Baseline(ends(*np.linspace(10, 20, 41)), ends(*np.linspace(10, 20, 21)))
-    verdict = judge(baseline, ends(*np.linspace(20, 40, 21)), 0.01)
+    verdict = judge_run(baseline, ends(*np.linspace(20, 40, 21)), 0.01)
     assert not verdict.passed
     assert verdict.sentences()[0].startswith(
         "de on paper is WORSE: median 15.00 -> 30.00 (x 2.00), best 10.00 -> 20.00 (x 2.00), p = "
@@ -110,13 +119,16 @@ def test_a_worse_cell_is_told_in_a_sentence_with_its_factor() -> None:
 
 def test_a_cell_that_is_too_good_fails_too() -> None:
     baseline = Baseline(ends(*np.linspace(10, 20, 41)), ends(*np.linspace(10, 20, 21)))
-    assert "de on paper is BETTER than chance allows" in judge(baseline, ends(*np.linspace(5, 10, 21)), 0.01).lines()[2]
+    assert (
+        "de on paper is BETTER than chance allows"
+        in judge_run(baseline, ends(*np.linspace(5, 10, 21)), 0.01).lines()[2]
+    )
 
 
 def test_an_end_that_violates_a_limit_counts_as_infinite_and_others_with_nine_digits(sweep: Sweep) -> None:
-    spso = entries_of(sweep)[:3]
+    spso = plan_entries(sweep)[:3]
     outcomes = [replace(run_trial(spso[0].trial), value=1 / 3, violation=broken) for broken in (0.0, 0.2, 0.0)]
-    (values,) = ends_of(zip(spso, outcomes, strict=True)).values()
+    (values,) = group_ends(zip(spso, outcomes, strict=True)).values()
     np.testing.assert_array_equal(values, [0.333333333, np.inf, 0.333333333])
 
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.regression.comparison import best_p_value, compare, location_p_value, p_values
-from bench.regression.sweep import Cell
-from bench.statistics.holm import holm
+from bench.statistics.pairwise import holm
+from bench.studies.regression.check import best_p_value, compare_ends, location_p_value, p_values
+from bench.studies.regression.sweep import Cell
 
 INF = np.inf
 finite_ends = st.lists(st.floats(1.0, 1e6), min_size=3, max_size=30).map(np.array)
@@ -49,7 +49,7 @@ def test_both_statistics_are_two_sided(baseline: np.ndarray, now: np.ndarray) ->
 
 def test_infeasible_ends_are_the_worst() -> None:
     baseline, now = np.linspace(10, 20, 60), np.append(np.linspace(10, 20, 20), np.full(20, INF))
-    (comparison,) = compare({Cell("p", "a"): baseline}, {Cell("p", "a"): now})
+    (comparison,) = compare_ends({Cell("p", "a"): baseline}, {Cell("p", "a"): now})
     assert comparison.differs(0.01)
     assert comparison.worse
     assert comparison.superiority == pytest.approx(0.75, abs=0.02)
@@ -62,7 +62,7 @@ def test_cells_without_any_feasible_end_before_and_now_do_not_differ() -> None:
 def test_a_better_best_alone_is_found_and_called_better() -> None:
     baseline = np.linspace(10, 20, 300)
     now = np.append(np.linspace(10, 20, 35), [9.0, 9.1, 9.2, 9.3, 9.4])
-    (comparison,) = compare({Cell("p", "a"): baseline}, {Cell("p", "a"): now})
+    (comparison,) = compare_ends({Cell("p", "a"): baseline}, {Cell("p", "a"): now})
     assert comparison.p_location > 0.1
     assert comparison.p_best < 1e-3
     assert not comparison.worse

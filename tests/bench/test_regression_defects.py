@@ -8,11 +8,9 @@ import pytest
 from random_arms import random_arm, random_motion
 
 from bench.plan import Entry
-from bench.regression.baseline import Baseline, read_baseline
-from bench.regression.defects import DEFECTS, matrix_about_own_z
-from bench.regression.guard import Verdict, judge
-from bench.regression.inject import defective_outcomes
-from bench.regression.sweep import Ends, Sweep, ends_of, entries_of, read_sweep
+from bench.studies.regression.check import CheckVerdict, judge_run
+from bench.studies.regression.defects import DEFECTS, matrix_about_own_z, run_with_defect
+from bench.studies.regression.sweep import Baseline, Ends, Sweep, group_ends, plan_entries, read_baseline, read_sweep
 from problem.arm import Arm, Joint
 from problem.registry import parse_problem
 from problem.regressor import observation_matrix
@@ -24,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 def committed() -> tuple[Sweep, Baseline, list[Entry]]:
     sweep = read_sweep(ROOT / "configs/regression.yaml")
     baseline = read_baseline(ROOT / "results/regression_baseline.json", sweep)
-    return sweep, baseline, entries_of(sweep)
+    return sweep, baseline, plan_entries(sweep)
 
 
 def ends_under(defect: str, repetitions: int) -> Ends:
@@ -34,14 +32,14 @@ def ends_under(defect: str, repetitions: int) -> Ends:
         for entry in committed()[2]
         if entry.trial.algorithm == DEFECTS[defect].algorithms[0] and entry.trial.repetition < repetitions
     ]
-    outcomes = defective_outcomes(defect, [entry.trial for entry in concerned])
-    return ends_of(zip(concerned, outcomes, strict=True))
+    outcomes = run_with_defect(defect, [entry.trial for entry in concerned])
+    return group_ends(zip(concerned, outcomes, strict=True))
 
 
-def verdict_under(defect: str) -> Verdict:
+def verdict_under(defect: str) -> CheckVerdict:
     """All cells, those that the defect does not concern as recorded."""
     sweep, baseline, _ = committed()
-    return judge(baseline, baseline.fixed_run | ends_under(defect, sweep.repetitions), sweep.false_alarm_rate)
+    return judge_run(baseline, baseline.fixed_run | ends_under(defect, sweep.repetitions), sweep.false_alarm_rate)
 
 
 @pytest.mark.parametrize("defect", ["de-without-selection", "spso-frozen-velocity"])

@@ -10,17 +10,14 @@ import pandas as pd
 import pytest
 from small_results import CONFIG, Ran, ran
 
-from bench.report.analysis import Cell, block_losses, cell_of, cells_of
-from bench.report.command import write_report
-from bench.report.critical_picture import critical_picture
-from bench.report.data import page_data
-from bench.report.looks import look
-from bench.report.page import report_page
-from bench.report.tables import ends_table, number, tally_table
-from bench.sharing.command import read_results, share
-from bench.sharing.result_set import ResultSet, TableOfCurves
-from bench.statistics.critical import critical_difference
-from bench.statistics.targets import Run
+from bench.report.analysis import Cell, analyse_cell, analyse_cells, block_losses
+from bench.report.page import page_data, report_page, write_report
+from bench.report.ranking_chart import chart_style, draw_critical_difference
+from bench.report.sections import ends_table, format_number, tally_table
+from bench.result_sets.formats import read_results, share_results
+from bench.result_sets.result_set import ResultSet, TableOfCurves
+from bench.statistics.critical_difference import critical_difference
+from bench.statistics.performance import Run
 
 
 @pytest.fixture(scope="module")
@@ -37,15 +34,20 @@ def results(small_run: Ran) -> ResultSet:
 def cell() -> Cell:
     """Two repetitions of two algorithms, one of which finds nothing feasible once."""
     trials = pd.DataFrame(
-        {"algorithm": ["a", "a", "b", "b"], "repetition": [0, 1, 0, 1], "value": [10.0, 20.0, 5.0, 1.0],
-         "violation": [0.0, 0.0, 0.0, 2.0], "budget": 20}
-    )  # fmt: skip
+        {
+            "algorithm": ["a", "a", "b", "b"],
+            "repetition": [0, 1, 0, 1],
+            "value": [10.0, 20.0, 5.0, 1.0],
+            "violation": [0.0, 0.0, 0.0, 2.0],
+            "budget": 20,
+        }
+    )
     moments = np.array([10.0, 20.0])
     runs = {
         "a": [Run(moments, np.array([100.0, 10.0])), Run(moments, np.array([40.0, 20.0]))],
         "b": [Run(moments, np.array([50.0, 5.0])), Run(moments, np.array([np.inf, np.inf]))],
     }
-    return cell_of("small", trials, runs)
+    return analyse_cell("small", trials, runs)
 
 
 def test_the_page_refers_to_nothing_outside_of_itself(small_run: Ran, tmp_path: Path) -> None:
@@ -58,13 +60,13 @@ def test_the_page_refers_to_nothing_outside_of_itself(small_run: Ran, tmp_path: 
 
 
 def test_a_report_of_shared_tables_is_that_of_the_store(small_run: Ran, results: ResultSet, tmp_path: Path) -> None:
-    share(*small_run, "csv", tmp_path / "tables")
+    share_results(*small_run, "csv", tmp_path / "tables")
     shared = read_results(tmp_path / "tables", Path("none"))
-    assert report_page(shared, cells_of(shared), []) == report_page(results, cells_of(results), [])
+    assert report_page(shared, analyse_cells(shared), []) == report_page(results, analyse_cells(results), [])
 
 
 def test_the_page_tells_settings_origin_and_how_to_repeat_it(results: ResultSet) -> None:
-    text = report_page(results, cells_of(results), [])
+    text = report_page(results, analyse_cells(results), [])
     assert "armlab run small.yaml" in text
     assert results.origins[0]["blas"] in text
     assert "swarm_size:" in text
@@ -75,7 +77,7 @@ def test_labels_of_a_third_party_cannot_break_out_of_the_page(small_run: Ran, tm
     text = CONFIG.replace("[spso, l-shade, random-search]", "[{name: spso, label: '</script><b>x'}, l-shade]")
     other = ran(tmp_path, text)
     results = read_results(*other)
-    page = report_page(results, cells_of(results), [])
+    page = report_page(results, analyse_cells(results), [])
     assert "<b>x" not in page
     assert page.count("</script>") == 2
 
@@ -97,7 +99,7 @@ def test_targets_go_from_the_worst_first_feasible_value_to_the_best_of_all(cell:
 def test_a_problem_on_which_nothing_feasible_was_found_has_no_targets_and_still_a_page(results: ResultSet) -> None:
     curves = pd.concat([curves for _, _, curves in results.cells()]).assign(violation=1.0)
     lost = replace(results, trials=results.trials.assign(violation=1.0), curves=TableOfCurves(curves))
-    cells = cells_of(lost)
+    cells = analyse_cells(lost)
     assert all(len(cell.targets) == 0 for cell in cells)
     text = report_page(lost, cells, [])
     assert "∞" in text
@@ -105,7 +107,7 @@ def test_a_problem_on_which_nothing_feasible_was_found_has_no_targets_and_still_
 
 
 def test_the_data_of_the_charts_are_those_of_the_results(results: ResultSet) -> None:
-    cells = cells_of(results)
+    cells = analyse_cells(results)
     data = json.loads(page_data(cells, results.algorithms))
     assert [problem["name"] for problem in data["problems"]] == ["sphere", "rastrigin"]
     problem, cell = data["problems"][0], cells[0]
@@ -117,11 +119,11 @@ def test_the_data_of_the_charts_are_those_of_the_results(results: ResultSet) -> 
 
 
 def test_a_page_of_two_problems_says_that_they_tell_nothing_apart(results: ResultSet) -> None:
-    assert "2 problems are too few to tell any pair apart." in report_page(results, cells_of(results), [])
+    assert "2 problems are too few to tell any pair apart." in report_page(results, analyse_cells(results), [])
 
 
 def test_one_problem_alone_is_ranked_by_its_repetitions(results: ResultSet) -> None:
-    cells = cells_of(results)
+    cells = analyse_cells(results)
     assert block_losses(cells).shape == (2, 3)
     assert block_losses(cells[:1]).shape == (7, 3)
 
@@ -131,7 +133,7 @@ def test_the_picture_has_a_dot_an_algorithm_and_a_bar_a_group_and_says_so_in_wor
     base = rng.normal(size=20)
     losses = pd.DataFrame({"b": base + 5, "a": base, "c": base + 5 + rng.normal(scale=0.1, size=20)})
     found = critical_difference(losses)
-    picture = critical_picture(found, {name: look(k) for k, name in enumerate("abc")})
+    picture = draw_critical_difference(found, {name: chart_style(k) for k, name in enumerate("abc")})
     assert picture.count("<circle") == 3
     assert picture.count('class="group"') == len(found.groups) == 1
     assert "Average ranks: a 1.00, " in picture
@@ -141,18 +143,18 @@ def test_the_picture_has_a_dot_an_algorithm_and_a_bar_a_group_and_says_so_in_wor
 def test_the_axis_of_many_ranks_numbers_as_many_as_there_is_room_for() -> None:
     names = [f"a{k}" for k in range(22)]
     found = critical_difference(pd.DataFrame(np.random.default_rng(0).normal(size=(3, 22)), columns=names))
-    picture = critical_picture(found, {name: look(k) for k, name in enumerate(names)})
+    picture = draw_critical_difference(found, {name: chart_style(k) for k, name in enumerate(names)})
     numbers = [float(x) for x in re.findall(r'<text x="([\d.]+)" y="20" text-anchor="middle">\d+</text>', picture)]
     assert len(numbers) > 5
     assert min(np.diff(numbers)) >= 20
 
 
 def test_no_two_of_many_algorithms_look_the_same() -> None:
-    assert len({look(index) for index in range(40)}) == 40
+    assert len({chart_style(index) for index in range(40)}) == 40
 
 
 def test_the_tally_counts_problems_won_and_lost_on_both_sides(results: ResultSet) -> None:
-    cells = cells_of(results)
+    cells = analyse_cells(results)
     text = tally_table(cells, results.algorithms)
     scores = re.findall(r"(\d) – (\d)", text)
     assert len(scores) == 6
@@ -170,4 +172,4 @@ def test_the_table_of_ends_has_medians_intervals_and_expected_running_times(cell
     ("value", "text"), [(np.inf, "∞"), (np.nan, "–"), (3.14159, "3.14"), (1550.4, "1550"), (2.5e-9, "2.5e-09")]
 )
 def test_numbers_have_three_digits(value: float, text: str) -> None:
-    assert number(value) == text
+    assert format_number(value) == text

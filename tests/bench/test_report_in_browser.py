@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from small_results import ran
 
-from bench.report.command import write_report
+from bench.report.page import write_report
 
 playwright = pytest.importorskip("playwright.sync_api", reason="the package playwright is not installed")
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -7,11 +7,11 @@ import pytest
 from click.testing import CliRunner
 from small_results import Ran, ran
 
-from bench.commands.results import compare, report, share
+from armlab.cli.harness import compare, report, share
 from bench.config import read_experiment
-from bench.convergence import convergence_table
-from bench.plan import plan
+from bench.plan import plan_trials
 from bench.store import open_store
+from bench.tables import convergence_table
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run
 
 
 def test_convergence_of_populations_that_shrink_or_restart_is_averaged_at_equal_evaluations(small_run: Ran) -> None:
-    entries = [entry for entry in plan(read_experiment(small_run.config), "test") if entry.problem == "sphere"]
+    entries = [entry for entry in plan_trials(read_experiment(small_run.config), "test") if entry.problem == "sphere"]
     with open_store(small_run.store) as store:
         table = convergence_table(entries, store)
         ends = [store.get(entry.key).value for entry in entries if entry.algorithm == "l-shade"]

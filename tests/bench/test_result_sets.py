@@ -10,11 +10,10 @@ from refusals import refusal
 from small_results import CONFIG, Ran, ran
 
 from bench.config import read_experiment
-from bench.plan import plan
-from bench.report.analysis import cells_of
-from bench.sharing.command import read_results, share
-from bench.sharing.iohprofiler import NOTHING
-from bench.sharing.result_set import ResultSet, runs_of
+from bench.plan import plan_trials
+from bench.report.analysis import analyse_cells
+from bench.result_sets.formats import NOTHING_KNOWN, read_results, share_results
+from bench.result_sets.result_set import ResultSet, runs_by_algorithm
 from bench.store import open_store
 
 
@@ -29,17 +28,20 @@ def results(small_run: Ran) -> ResultSet:
 
 
 def test_a_result_set_has_every_trial_and_the_curve_of_each(small_run: Ran, results: ResultSet) -> None:
-    entries = plan(read_experiment(small_run.config), "test")
+    entries = plan_trials(read_experiment(small_run.config), "test")
     assert len(results.trials) == len(entries) == 2 * 3 * 7
     with open_store(small_run.store) as store:
         outcome = store.get(entries[-1].key)
     last = results.trials.iloc[-1]
     assert (last["problem"], last["algorithm"], last["repetition"], last["dimension"]) == (
-        "rastrigin", "random-search", 6, 2,
-    )  # fmt: skip
+        "rastrigin",
+        "random-search",
+        6,
+        2,
+    )
     assert last["value"] == outcome.value
     _, _, curves = list(results.cells())[-1]
-    run = runs_of(curves)["random-search"][6]
+    run = runs_by_algorithm(curves)["random-search"][6]
     np.testing.assert_array_equal(run.evaluations, outcome.curves.evaluations)
     np.testing.assert_array_equal(run.best, outcome.curves.best_value)
 
@@ -55,7 +57,7 @@ def test_tidy_tables_bring_back_the_same_result_set_to_the_bit(
 ) -> None:
     if form == "parquet":
         pytest.importorskip("pyarrow", reason="Parquet needs the package pyarrow")
-    written = share(*small_run, form, tmp_path / "tables")
+    written = share_results(*small_run, form, tmp_path / "tables")
     assert {path.name for path in written} == {
         f"trials.{form}",
         f"curves.{form}",
@@ -74,7 +76,7 @@ def test_infeasible_ends_are_infinite_in_the_curves() -> None:
     curves = pd.DataFrame(
         {"algorithm": "de", "repetition": 0, "evaluations": [5, 10], "value": [3.0, 4.0], "violation": [0.5, 0.0]}
     )
-    assert runs_of(curves)["de"][0].best.tolist() == [np.inf, 4.0]
+    assert runs_by_algorithm(curves)["de"][0].best.tolist() == [np.inf, 4.0]
 
 
 def test_results_that_are_not_there_are_told_in_one_line(small_run: Ran, tmp_path: Path) -> None:
@@ -89,7 +91,7 @@ def test_results_that_are_not_there_are_told_in_one_line(small_run: Ran, tmp_pat
 
 
 def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: Ran, tmp_path: Path) -> None:
-    share(*small_run, "csv", tmp_path)
+    share_results(*small_run, "csv", tmp_path)
     table = pd.read_csv(tmp_path / "trials.csv")
     table.drop(columns="value").to_csv(tmp_path / "trials.csv", index=False)
     assert refusal(read_results, tmp_path, small_run.store) == f"{tmp_path / 'trials.csv'} lacks the columns value"
@@ -100,7 +102,7 @@ def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: 
 
 
 def test_the_iohprofiler_files_hold_every_run_with_its_best(small_run: Ran, results: ResultSet, tmp_path: Path) -> None:
-    written = share(*small_run, "ioh", tmp_path)
+    written = share_results(*small_run, "ioh", tmp_path)
     assert len(written) == 2 * 3
     described = json.loads((tmp_path / "l-shade" / "IOHprofiler_f2_rastrigin.json").read_text())
     (scenario,) = described["scenarios"]
@@ -109,7 +111,7 @@ def test_the_iohprofiler_files_hold_every_run_with_its_best(small_run: Ran, resu
     assert [run["best"]["y"] for run in scenario["runs"]] == ends.tolist()
     rows = (tmp_path / "l-shade" / scenario["path"]).read_text().splitlines()
     assert rows[0] == "evaluations raw_y"
-    assert rows[1] == f"1 {NOTHING!r}"
+    assert rows[1] == f"1 {NOTHING_KNOWN!r}"
     assert sum(row.startswith("1 ") for row in rows) == 7
 
 
@@ -118,13 +120,13 @@ def test_an_independent_reader_finds_the_same_runs_and_expected_running_times(
     small_run: Ran, results: ResultSet, tmp_path: Path
 ) -> None:
     reader = pytest.importorskip("iohinspector", reason="the independent reader iohinspector is not installed")
-    share(*small_run, "ioh", tmp_path)
+    share_results(*small_run, "ioh", tmp_path)
     manager = reader.DataManager()
     manager.add_folder(str(tmp_path))
     overview = manager.overview.to_pandas()
     assert len(overview) == len(results.trials)
     table = manager.load(True, True).to_pandas()
-    for cell in cells_of(results):
+    for cell in analyse_cells(results):
         for name in cell.algorithms:
             theirs = table[(table["function_name"] == cell.label) & (table["algorithm_name"] == name)]
             bests = theirs.groupby("run_id")["raw_y"].min()

@@ -6,10 +6,10 @@ import pandas as pd
 import pytest
 from small_results import ran
 
-from bench.experiment import load_experiment
-from bench.rival_pairs import rival_pairs
+from armlab.common.errors import InputError
+from bench.plan import rival_pairs
 from bench.rivals import rivals_table
-from problem.errors import InputError
+from bench.run import load_experiment
 
 CONFIG = """\
 name: peers

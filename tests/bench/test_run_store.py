@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.outcome import Curves, Outcome
+from armlab.common.errors import InputError
+from bench.execute import Curves, Outcome
 from bench.store import SCHEMA_VERSION, open_store
-from problem.errors import InputError
 
 CURVES = Curves(*(np.arange(5.0) + k for k in range(5)))
 OUTCOME = Outcome(4.5, 0.0, 4.75, 25, 0.125, np.array([1.0, -2.0]), CURVES)

@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench.dispatch import missing_entries, run_missing
 from bench.errors import StoppedError, TrialsFailedError
 from bench.execute import run_trial
-from bench.experiment import load_experiment
-from bench.frame import tidy_frame
 from bench.plan import Entry
-from bench.runner import missing, run_missing
+from bench.run import load_experiment
 from bench.store import open_store
-from bench.table import as_csv, summary_table
+from bench.tables import as_csv, summary_table, tidy_frame
 
 PlugIn = Callable[[str], Path]
 
@@ -27,9 +26,11 @@ def _table(entries: Sequence[Entry], order: Sequence[Entry], store_path: Path, w
 
 def test_the_table_is_the_same_to_the_byte_for_one_two_and_four_workers_in_any_order(small: Path) -> None:
     small.write_text(
-        small.read_text().replace("[spso, de]", "[mupso, spso, woa, gwo, goa, de, random-search, cma-es]")
-        .replace("swarm_size: 5", "swarm_size: [20, 50]").replace("iterations: 4", "iterations: 30")
-    )  # fmt: skip
+        small.read_text()
+        .replace("[spso, de]", "[mupso, spso, woa, gwo, goa, de, random-search, cma-es]")
+        .replace("swarm_size: 5", "swarm_size: [20, 50]")
+        .replace("iterations: 4", "iterations: 30")
+    )
     entries = load_experiment(small).entries
     shuffled = random.Random(1).sample(entries, len(entries))
     tables = [
@@ -62,7 +63,7 @@ def test_a_second_run_does_only_what_is_missing(small: Path, plug_in: PlugIn) ->
     with open_store(small.with_name("runs.sqlite")) as store:
         run_missing(entries[:1], store, 1)
         assert len(notes.read_text()) == 1
-        assert list(missing(entries, store)) == entries[1:]
+        assert list(missing_entries(entries, store)) == entries[1:]
         run_missing(entries, store, 1)
         run_missing(entries, store, 1)
     assert len(notes.read_text()) == 3
@@ -75,7 +76,7 @@ def test_a_trial_that_raises_is_named_and_not_kept_and_the_others_are(small: Pat
     with open_store(small.with_name("runs.sqlite")) as store:
         with pytest.raises(TrialsFailedError) as caught:
             run_missing(entries, store, 1)
-        failed = list(missing(entries, store))
+        failed = list(missing_entries(entries, store))
     assert 0 < len(failed) < len(entries)
     for entry in entries:
         named = f"{entry.trial}: ZeroDivisionError: of a third party" in str(caught.value)

@@ -33,9 +33,14 @@ def test_a_larger_swarm_begins_with_the_points_of_a_smaller_one() -> None:
 
 @pytest.mark.parametrize(
     "names",
-    [(2, "paper", "de", "{}", 0), (1, "other", "de", "{}", 0), (1, "paper", "gwo", "{}", 0),
-     (1, "paper", "de", "{1}", 0), (1, "paper", "de", "{}", 1)],
-)  # fmt: skip
+    [
+        (2, "paper", "de", "{}", 0),
+        (1, "other", "de", "{}", 0),
+        (1, "paper", "gwo", "{}", 0),
+        (1, "paper", "de", "{1}", 0),
+        (1, "paper", "de", "{}", 1),
+    ],
+)
 def test_any_other_name_gives_another_stream(names: tuple[int, str, str, str, int]) -> None:
     assert own_stream(*names).random() != own_stream(1, "paper", "de", "{}", 0).random()
 

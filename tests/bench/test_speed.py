@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bench.speed.clock import median_seconds
-from bench.speed.condition import in_joint_frames, random_motions
-from bench.speed.report import page
+from bench.studies.speed.clock import median_seconds
+from bench.studies.speed.evaluations import random_motions, with_joint_frames
+from bench.studies.speed.report import speed_page
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
 
@@ -18,14 +18,14 @@ def test_rivals_take_turns_after_one_call_each_that_does_not_count() -> None:
 
 def test_both_pipelines_give_the_same_condition_numbers() -> None:
     pytest.importorskip("pinocchio", reason="the engine Pinocchio is not installed")
-    from bench.speed.condition import against_pinocchio
+    from bench.studies.speed.evaluations import compare_with_pinocchio
 
-    assert against_pinocchio()["largest_relative_difference"] < 1e-10
+    assert compare_with_pinocchio()["largest_relative_difference"] < 1e-10
 
 
 def test_moving_the_links_frames_to_the_joints_moves_nothing_else() -> None:
     arm = load_arm("irb120-arm")
-    moved = in_joint_frames(arm)
+    moved = with_joint_frames(arm)
     motion = random_motions(arm, 1, 20)
     point_mass = np.zeros(30)
     point_mass[20] = 1.0  # 1 kg at the origin of the last frame, which is where the tail of joint 3 puts it
@@ -56,7 +56,7 @@ def test_the_page_shows_the_ratio_and_every_rival() -> None:
         "growth_us": {"samples": {"50": 5.0}},
         "provenance": {"processor": "a processor"},
     }
-    text = page(figures)
+    text = speed_page(figures)
     assert "Ratio to Pinocchio: 20.0" in text
     assert "| spso | pygmo, one | 1.60 |" in text
     assert "| samples | 50 | 5.0 |" in text

@@ -9,27 +9,42 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from bench.statistics.anytime import area_under_curve
-from bench.statistics.bootstrap import quantile_interval
-from bench.statistics.critical import critical_difference, groups
-from bench.statistics.holm import holm
-from bench.statistics.paired import signed_rank_p, superiority, superiority_unpaired
-from bench.statistics.power import powers, signed_rank_power, smallest_seen
-from bench.statistics.profiles import performance_profile
-from bench.statistics.targets import Run, expected_running_time, hits, running_times, share_reached, targets_between
+from bench.statistics.critical_difference import critical_difference, indistinguishable_groups
+from bench.statistics.ends import quantile_interval
+from bench.statistics.pairwise import holm, signed_rank_p, superiority, superiority_unpaired
+from bench.statistics.performance import (
+    Run,
+    area_under_curve,
+    condense_times,
+    expected_running_time,
+    performance_profile,
+    running_times,
+    share_reached,
+    targets_between,
+)
+from bench.statistics.power import powers, signed_rank_power, smallest_detectable_effect
 
 # Demšar 2006 (JMLR 7, 1), table 6: AUC of four variants of C4.5 on 14 data sets. The ranks printed there tell the two
 # 0.975 of the last row but one apart, which agree to the printed digits.
 DEMSAR = pd.DataFrame(
     [
-        [0.763, 0.768, 0.771, 0.798], [0.599, 0.591, 0.590, 0.569], [0.954, 0.971, 0.968, 0.967],
-        [0.628, 0.661, 0.654, 0.657], [0.882, 0.888, 0.886, 0.898], [0.936, 0.931, 0.916, 0.931],
-        [0.661, 0.668, 0.609, 0.685], [0.583, 0.583, 0.563, 0.625], [0.775, 0.838, 0.866, 0.875],
-        [1.000, 1.000, 1.000, 1.000], [0.940, 0.962, 0.965, 0.962], [0.619, 0.666, 0.614, 0.669],
-        [0.972, 0.981, 0.97501, 0.975], [0.957, 0.978, 0.946, 0.970],
+        [0.763, 0.768, 0.771, 0.798],
+        [0.599, 0.591, 0.590, 0.569],
+        [0.954, 0.971, 0.968, 0.967],
+        [0.628, 0.661, 0.654, 0.657],
+        [0.882, 0.888, 0.886, 0.898],
+        [0.936, 0.931, 0.916, 0.931],
+        [0.661, 0.668, 0.609, 0.685],
+        [0.583, 0.583, 0.563, 0.625],
+        [0.775, 0.838, 0.866, 0.875],
+        [1.000, 1.000, 1.000, 1.000],
+        [0.940, 0.962, 0.965, 0.962],
+        [0.619, 0.666, 0.614, 0.669],
+        [0.972, 0.981, 0.97501, 0.975],
+        [0.957, 0.978, 0.946, 0.970],
     ],
     columns=["C4.5", "C4.5+m", "C4.5+cf", "C4.5+m+cf"],
-)  # fmt: skip
+)
 
 
 def test_average_ranks_are_those_that_demsar_prints() -> None:
@@ -52,7 +67,7 @@ def test_p_values_of_pairs_are_wilcoxons_after_holms_correction_over_all_of_them
 def test_so_few_problems_that_no_pair_can_be_told_apart_are_noticed(blocks: int, nothing: bool) -> None:
     losses = pd.DataFrame({name: np.arange(float(blocks)) + 10 * k for k, name in enumerate("abcdefgh")})
     found = critical_difference(losses)  # 28 pairs: 28 * 2 / 2^9 > 0.05 > 28 * 2 / 2^11
-    assert found.sees_nothing is nothing
+    assert found.has_too_few_blocks is nothing
     assert (min(found.p.values()) > 0.05) is nothing
 
 
@@ -74,7 +89,7 @@ def test_groups_are_the_longest_runs_of_neighbours_of_which_no_pair_differs() ->
     names = list("abcde")
     differs = {("a", "c"), ("a", "d"), ("a", "e"), ("b", "e"), ("d", "e"), ("c", "e")}
     p = {(x, y): 0.01 if (x, y) in differs else 0.5 for i, x in enumerate(names) for y in names[i + 1 :]}
-    assert groups(names, p, 0.05) == (("a", "b"), ("b", "c", "d"))
+    assert indistinguishable_groups(names, p, 0.05) == (("a", "b"), ("b", "c", "d"))
 
 
 def test_algorithms_that_are_equal_everywhere_form_one_group() -> None:
@@ -135,8 +150,8 @@ def test_power_without_an_effect_is_the_level_and_falls_with_the_number_of_compa
 
 
 def test_so_few_repetitions_that_no_win_is_seen_have_no_smallest_effect() -> None:
-    assert smallest_seen(6, 0.05 / 36) is None  # the least p-value of 6 pairs is 2 / 64
-    seen = smallest_seen(30, 0.05)
+    assert smallest_detectable_effect(6, 0.05 / 36) is None  # the least p-value of 6 pairs is 2 / 64
+    seen = smallest_detectable_effect(30, 0.05)
     assert seen is not None
     assert signed_rank_power(30, seen, 0.05) == pytest.approx(0.8, abs=0.01)
 
@@ -169,7 +184,12 @@ def test_expected_running_time_adds_what_failures_cost() -> None:
 
 def test_the_share_of_targets_reached_counts_all_runs_and_targets() -> None:
     times = np.array([[100.0, np.inf], [50.0, 400.0]])
-    assert share_reached([hits(times)], np.array([49.0, 50.0, 100.0, 1000.0])).tolist() == [0.0, 0.25, 0.5, 0.75]
+    assert share_reached([condense_times(times)], np.array([49.0, 50.0, 100.0, 1000.0])).tolist() == [
+        0.0,
+        0.25,
+        0.5,
+        0.75,
+    ]
 
 
 def test_targets_are_evenly_spaced_in_the_logarithm_from_easy_to_hard() -> None:

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 import yaml
 
-from bench.experiment import Options
-from bench.study.command import EXPERIMENTS, describe_study, make_study
-from bench.study.tables import effect_table, median_table, variants_table
+from bench.run import RunOptions
+from bench.studies.beyond_paper.report import effect_table, median_table, variant_duels_table
+from bench.studies.beyond_paper.study import EXPERIMENTS, describe_study, make_study
 
 ROOT = Path(__file__).parents[2]
 SMALLER = {
@@ -35,8 +35,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return home
 
 
-def _options(home: Path) -> Options:
-    return Options(home / "runs.sqlite", home / "results", workers=1)
+def _options(home: Path) -> RunOptions:
+    return RunOptions(home / "runs.sqlite", home / "results", workers=1)
 
 
 @pytest.fixture(scope="module")
@@ -78,11 +78,18 @@ def test_a_study_that_is_done_has_nothing_left_to_run(home: Path, results: Path)
 
 def _frame(**ends: list[float]) -> pd.DataFrame:
     rows = [
-        {"problem": "paper", "swarm_size": 50, "budget": 100, "algorithm": name, "repetition": k,
-         "value": value, "violation": 0.0 if np.isfinite(value) else 1.0}
+        {
+            "problem": "paper",
+            "swarm_size": 50,
+            "budget": 100,
+            "algorithm": name,
+            "repetition": k,
+            "value": value,
+            "violation": 0.0 if np.isfinite(value) else 1.0,
+        }
         for name, values in ends.items()
         for k, value in enumerate(values)
-    ]  # fmt: skip
+    ]
     return pd.DataFrame(rows)
 
 
@@ -94,7 +101,7 @@ def test_medians_count_infeasible_ends_as_infinite_and_show_the_share_of_the_oth
 def test_a_variant_that_helps_has_an_effect_above_one_half_and_a_plus() -> None:
     rng = np.random.default_rng(0)
     base = rng.uniform(10, 20, 20)
-    table = variants_table(_frame(mupso=list(base), **{"Q 3": list(base * 0.5), "Q 5": list(base)}), "mupso")
+    table = variant_duels_table(_frame(mupso=list(base), **{"Q 3": list(base * 0.5), "Q 5": list(base)}), "mupso")
     shown = effect_table(table).set_index("variant")["paper, 100"]
     assert shown["Q 3"].startswith("1.00 (")
     assert shown["Q 3"].endswith("+")

@@ -7,24 +7,27 @@ import pandas as pd
 import pytest
 
 from bench.config import Experiment, read_experiment
-from bench.convergence import convergence_table
-from bench.figure2 import draw_cost, draw_times
-from bench.figure3 import draw_convergence
-from bench.markdown import summary_page
-from bench.outcome import Curves, Outcome
-from bench.plan import plan
+from bench.execute import Curves, Outcome
+from bench.figures import draw_convergence, draw_cost, draw_times
+from bench.plan import plan_trials
 from bench.store import open_store
-from bench.table import as_csv, summary_table, times_table
+from bench.tables import as_csv, convergence_table, summary_page, summary_table, times_table
 
 
 def _frame(values: list[float], violations: list[float], **columns: object) -> pd.DataFrame:
     n = len(values)
     facts = {"problem": "paper", "swarm_size": 50, "budget": 1550, "algorithm": "de"} | columns
     return pd.DataFrame(
-        {**{name: [fact] * n if not isinstance(fact, list) else fact for name, fact in facts.items()},
-         "repetition": range(n), "value": values, "violation": violations, "fitness": values,
-         "evaluations": 1550, "seconds": [1.0] * n}
-    )  # fmt: skip
+        {
+            **{name: [fact] * n if not isinstance(fact, list) else fact for name, fact in facts.items()},
+            "repetition": range(n),
+            "value": values,
+            "violation": violations,
+            "fitness": values,
+            "evaluations": 1550,
+            "seconds": [1.0] * n,
+        }
+    )
 
 
 def test_table_of_two_algorithms_one_with_an_infeasible_end() -> None:
@@ -46,9 +49,17 @@ def test_times_are_averaged_and_added_up() -> None:
 
 def test_the_page_shows_the_papers_figures_beside_ours() -> None:
     experiment = Experiment.model_validate(
-        {"name": "table3", "problem": "paper", "algorithms": ("mupso",), "swarm_size": 50, "iterations": 30,
-         "repetitions": 2, "seed": 1, "printed": True}
-    )  # fmt: skip
+        {
+            "name": "table3",
+            "problem": "paper",
+            "algorithms": ("mupso",),
+            "swarm_size": 50,
+            "iterations": 30,
+            "repetitions": 2,
+            "seed": 1,
+            "printed": True,
+        }
+    )
     page = summary_page(summary_table(_frame([5.0, 7.0], [0.0, 0.0], algorithm="mupso")), experiment)
     assert "| MuPSO | 5 (4.73) | 6 (7.16) | 1.41 (1.17) | 6 | 5.5 | 6.5 | 100% | 1550 | 7150 |" in page
     assert "feasible ends" in page.replace("\n", " ")
@@ -56,7 +67,7 @@ def test_the_page_shows_the_papers_figures_beside_ours() -> None:
 
 def test_convergence_averages_the_feasible_ends_of_each_iteration(small: Path) -> None:
     small.write_text(small.read_text().replace("[spso, de]", "[de]").replace("repetitions: 3", "repetitions: 2"))
-    entries = plan(read_experiment(small), "small.yaml")
+    entries = plan_trials(read_experiment(small), "small.yaml")
     curves = [
         Curves(np.array([5.0, 10.0]), *map(np.array, ([9.0, 4.0], [0.0, 0.0], [9.0, 8.0], [0.0, 0.0]))),
         Curves(np.array([5.0, 10.0]), *map(np.array, ([7.0, 2.0], [0.3, 0.0], [7.0, 6.0], [0.3, 0.1]))),
@@ -99,7 +110,11 @@ def test_figures_can_be_drawn_where_ends_are_infeasible(sweep: pd.DataFrame) -> 
 
 def test_convergence_can_be_drawn_where_nothing_is_feasible_at_first() -> None:
     table = pd.DataFrame(
-        {"algorithm": "de", "iteration": [0, 1, 2], "best_so_far": [np.nan, 30.0, 20.0],
-         "present_best": [np.nan, 30.0, 20.0]}
-    )  # fmt: skip
+        {
+            "algorithm": "de",
+            "iteration": [0, 1, 2],
+            "best_so_far": [np.nan, 30.0, 20.0],
+            "present_best": [np.nan, 30.0, 20.0],
+        }
+    )
     assert set(draw_convergence(table)) == {"png", "svg"}

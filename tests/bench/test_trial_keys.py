@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from bench.config import Experiment, read_experiment
-from bench.fingerprint import fingerprint
-from bench.lookup import find_algorithm
-from bench.plan import plan
-from bench.trial import Trial
-from problem.settings import Settings
+from armlab.common.settings import Settings
+from bench.config import Experiment, find_algorithm, read_experiment
+from bench.execute import Trial
+from bench.plan import plan_trials
+from bench.provenance import fingerprint
 
 
 class Bowl(Settings):
@@ -88,4 +87,4 @@ def test_a_file_that_the_problem_names_belongs_to_the_fingerprint(tmp_path: Path
 
 
 def _keys(experiment: Experiment) -> list[str]:
-    return [entry.key for entry in plan(experiment, "small.yaml")]
+    return [entry.key for entry in plan_trials(experiment, "small.yaml")]

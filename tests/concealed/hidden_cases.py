@@ -5,17 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from concealed.arms import machine
-from concealed.effects.hidden import Hidden
-from concealed.noise import Noise
-from concealed.passes import Simulated, simulated
-from concealed.plan import Plan, RunPlan
-from concealed.record import logged
-from concealed.simulate import rigid_torque
+from armlab.concealed.arms import make_machine
+from armlab.concealed.case_files import log_run
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.noise import Noise
+from armlab.concealed.plan import Plan, RunPlan
+from armlab.concealed.simulate import rigid_torque
+from armlab.concealed.sizing import SimulatedCase, simulate_case
+from armlab.recordings.recording import Array
 from problem.motion import Motion
-from recordings.run import Array
 
-MACHINE = machine("irb120-arm")
+MACHINE = make_machine("irb120-arm")
 RUNS = (RunPlan("multisine", 5.0, "identify"), RunPlan("fourier", 2.5, "validate"))
 
 
@@ -27,13 +27,13 @@ def plan(level: float = 0.05, rate_hz: int = 500, **others: Any) -> Plan:
     return replace(base, **others)
 
 
-def case(*hidden: Hidden, **others: Any) -> Simulated:
-    return simulated(plan(**others), tuple(hidden))
+def case(*hidden: HiddenEffect, **others: Any) -> SimulatedCase:
+    return simulate_case(plan(**others), tuple(hidden))
 
 
-def residual(made: Simulated, run: int = 0) -> tuple[Array, Motion, Array]:
+def residual(made: SimulatedCase, run: int = 0) -> tuple[Array, Motion, Array]:
     """Recorded torque less that of the nominal arm on the recorded motion, the motion, and the nominal torque."""
-    log = logged(made, run, noisy=False)
+    log = log_run(made, run, noisy=False)
     sampled = made.tracks[run].at(log.time).motion
     motion = Motion(log.position, sampled.velocity, sampled.acceleration)
     nominal = rigid_torque(made.plan.machine.arm, motion)

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from concealed.score.reading import Judged
-from concealed.score.rows import Rows, rows
+from armlab.concealed.score.cases import JudgedCase
+from armlab.concealed.score.rows import ScoreRows, make_rows
 
 
 def effect(
@@ -33,12 +33,12 @@ def truth(
     }
 
 
-def judged(answer: dict[str, Any], said: dict[str, Any], name: str = "c") -> Judged:
-    return Judged({**answer, "case": name}, said, Path("none"), Path("none"), Path("none"), 2.0)
+def judged(answer: dict[str, Any], said: dict[str, Any], name: str = "c") -> JudgedCase:
+    return JudgedCase({**answer, "case": name}, said, Path("none"), Path("none"), Path("none"), 2.0)
 
 
-def scored(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> Rows:
-    return rows([judged(answer, said, f"c{number}") for number, (answer, said) in enumerate(pairs)])
+def scored(*pairs: tuple[dict[str, Any], dict[str, Any]]) -> ScoreRows:
+    return make_rows([judged(answer, said, f"c{number}") for number, (answer, said) in enumerate(pairs)])
 
 
 NULL = truth(kind="null")

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from concealed.arms import Machine, machine
-from concealed.engine import Parts, Spring, inverse_dynamics, plant
-from concealed.motions import FAMILIES, reference
-from concealed.simulate import run_times
+from armlab.concealed.arms import Machine, make_machine
+from armlab.concealed.engine import Parts, Spring, build_plant, inverse_dynamics
+from armlab.concealed.motions import FAMILIES, make_reference
+from armlab.concealed.simulate import run_times
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -16,7 +16,7 @@ ARMS = ("irb120-arm", "irb120", "panda", "scara")
 
 @pytest.mark.parametrize("name", ARMS)
 def test_mujoco_and_the_regressor_agree_on_random_states(name: str) -> None:
-    arm = machine(name).arm
+    arm = make_machine(name).arm
     motion = Motion(*np.random.default_rng(1).uniform(-2, 2, (3, 40, len(arm))))
     ours = rigid_body_torque(arm, motion) + np.array(arm.rotor_inertia) * motion.acceleration
     np.testing.assert_allclose(inverse_dynamics(arm, motion), ours, rtol=0, atol=1e-9)
@@ -24,13 +24,13 @@ def test_mujoco_and_the_regressor_agree_on_random_states(name: str) -> None:
 
 @pytest.mark.parametrize("name", ARMS)
 def test_links_are_bodies_that_could_exist(name: str) -> None:
-    for link in machine(name).arm.links or ():
+    for link in make_machine(name).arm.links or ():
         xx, yy, zz, xy, xz, yz = link.inertia
         assert np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).min() > 0
 
 
 def test_a_horizontal_arm_feels_no_gravity() -> None:
-    arm = machine("scara").arm
+    arm = make_machine("scara").arm
     still = np.zeros((5, 2))
     motion = Motion(np.random.default_rng(0).uniform(-2, 2, (5, 2)), still, still)
     np.testing.assert_allclose(inverse_dynamics(arm, motion), 0, atol=1e-12)
@@ -38,7 +38,7 @@ def test_a_horizontal_arm_feels_no_gravity() -> None:
 
 def _deflection(spring: Spring, torque: float) -> float:
     """Where the spring of the second joint of a horizontal arm comes to rest under a torque on its link."""
-    made = plant(machine("scara").arm, Parts((spring,)))
+    made = build_plant(make_machine("scara").arm, Parts((spring,)))
     data = mujoco.MjData(made.model)
     motor, hinge = made.model.joint(f"motor{spring.joint}").dofadr[0], made.model.joint(f"spring{spring.joint}")
     for _ in range(8000):
@@ -66,9 +66,9 @@ def test_play_lets_the_link_move_by_half_the_gap_each_way(direction: int) -> Non
 @pytest.mark.parametrize("family", FAMILIES)
 @pytest.mark.parametrize("name", ARMS)
 def test_references_stay_within_range_speed_and_acceleration(name: str, family: str) -> None:
-    made: Machine = machine(name)
+    made: Machine = make_machine(name)
     time = run_times(8.0, 2000)
-    position = reference(family, np.random.default_rng(3), time, made)
+    position = make_reference(family, np.random.default_rng(3), time, made)
     velocity = np.diff(position, axis=0) * 2000
     low, high = made.range
     assert np.all((position > low) & (position < high))
@@ -77,7 +77,7 @@ def test_references_stay_within_range_speed_and_acceleration(name: str, family: 
 
 
 def test_identification_and_validation_move_in_different_families() -> None:
-    from concealed.plan import draw_plan
+    from armlab.concealed.plan import draw_plan
 
     for index in range(40):
         runs = draw_plan(1003, index, "clean", True, True).runs

@@ -5,10 +5,10 @@ import pytest
 from hidden_cases import case
 from scipy.stats import chi2
 
-from concealed.effects.drives import Rotor
-from concealed.effects.friction import Viscous
-from concealed.limit import FAMILY_WISE, ORACLE_HZ, Oracle, candidates, limit_noncentrality
-from concealed.noise import Noise, draw_noise
+from armlab.concealed.effects.drives import Rotor
+from armlab.concealed.effects.friction import Viscous
+from armlab.concealed.noise import Noise, draw_noise
+from armlab.concealed.sizing import FAMILY_WISE_LEVEL, ORACLE_HZ, Oracle, candidate_count, limit_noncentrality
 
 SAMPLES, JOINTS, TRIALS = 1500, 2, 600
 NOISE = Noise("coloured", np.array([0.05, 0.1]), np.array([0.08, 0.02]), 4.0)
@@ -38,9 +38,9 @@ def _statistics(size: float, noise: Noise) -> np.ndarray:
 
 def test_an_effect_of_one_limit_is_found_nine_times_out_of_ten() -> None:
     effect, free = _columns()
-    oracle = Oracle(NOISE, ORACLE_HZ).freed([free[..., None]])
+    oracle = Oracle(NOISE, ORACLE_HZ).with_free_columns([free[..., None]])
     limit = 1 / oracle.multiple([effect])
-    critical = chi2.isf(FAMILY_WISE / candidates(JOINTS), 1)
+    critical = chi2.isf(FAMILY_WISE_LEVEL / candidate_count(JOINTS), 1)
     assert np.mean(_statistics(limit, NOISE) > critical) == pytest.approx(0.9, abs=0.04)
     assert np.mean(_statistics(2 * limit, NOISE) > critical) > 0.995
 
@@ -60,7 +60,7 @@ def test_whitened_noise_is_white_with_unit_variance() -> None:
 
 def test_a_free_column_equal_to_the_effect_leaves_nothing_to_find() -> None:
     effect, _ = _columns()
-    assert Oracle(NOISE, ORACLE_HZ).freed([effect[..., None]]).multiple([effect]) < 1e-6
+    assert Oracle(NOISE, ORACLE_HZ).with_free_columns([effect[..., None]]).multiple([effect]) < 1e-6
 
 
 def test_noncentrality_grows_with_the_library() -> None:

@@ -8,37 +8,47 @@ import numpy as np
 import pytest
 from hidden_cases import MACHINE, case, residual
 
-from concealed.effects.bodies import Geometry, LinkError, Payload, Tilt
-from concealed.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
-from concealed.effects.drives import Backlash, Coupling, Elasticity, Rotor
-from concealed.effects.friction import Asymmetric, Coulomb, LoadDependent, NonlinearViscous, Stribeck, Viscous
-from concealed.effects.hidden import Hidden
-from concealed.effects.library import LIBRARY
-from concealed.effects.memory import Drift, Presliding, bouc_wen, recursion
-from concealed.effects.springs import Cable, Compensator, Ripple
-from concealed.outside import OUTSIDE
+from armlab.concealed.effects.bodies import Geometry, LinkError, Payload, Tilt
+from armlab.concealed.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
+from armlab.concealed.effects.drives import Backlash, Coupling, Elasticity, Rotor
+from armlab.concealed.effects.friction import (
+    Asymmetric,
+    Coulomb,
+    Drift,
+    LoadDependent,
+    NonlinearViscous,
+    Presliding,
+    Stribeck,
+    Viscous,
+    bouc_wen,
+    recursion,
+)
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.effects.springs import Cable, Compensator, Ripple
+from armlab.concealed.outside import OUTSIDE
+from armlab.recordings.recording import Array
+from armlab.recordings.vocabulary import EFFECT_IDS
 from problem.arm import link_poses
 from problem.motion import Motion
-from recordings.run import Array
-from recordings.vocabulary import EFFECT_IDS
 
 J = 1  # the second joint carries gravity
-Column = Callable[[Motion, Array, Hidden], Array]
+Column = Callable[[Motion, Array, HiddenEffect], Array]
 
 
-def _velocity(motion: Motion, nominal: Array, effect: Hidden) -> Array:
+def _velocity(motion: Motion, nominal: Array, effect: HiddenEffect) -> Array:
     return motion.velocity[:, J]
 
 
-def _sign(motion: Motion, nominal: Array, effect: Hidden) -> Array:
+def _sign(motion: Motion, nominal: Array, effect: HiddenEffect) -> Array:
     return np.sign(motion.velocity[:, J])
 
 
-def _slope(motion: Motion, nominal: Array, effect: Hidden) -> Array:
+def _slope(motion: Motion, nominal: Array, effect: HiddenEffect) -> Array:
     return np.gradient(nominal[:, J])
 
 
-MARKS: dict[type[Hidden], tuple[Column, float]] = {  # a column, and the least correlation with it
+MARKS: dict[type[HiddenEffect], tuple[Column, float]] = {  # a column, and the least correlation with it
     Coulomb: (_sign, 0.95),
     Viscous: (_velocity, 0.97),
     NonlinearViscous: (_velocity, 0.8),
@@ -60,7 +70,7 @@ MARKS: dict[type[Hidden], tuple[Column, float]] = {  # a column, and the least c
 }
 
 
-def _drawn(kind: type[Hidden], form: str | None = None, joint: int = J) -> Hidden:
+def _drawn(kind: type[HiddenEffect], form: str | None = None, joint: int = J) -> HiddenEffect:
     rng = np.random.default_rng(5)
     effect = kind.draw(rng, MACHINE, joint)
     while form is not None and effect.form != form:
@@ -76,8 +86,8 @@ FORMS = [(kind, form) for kind in MARKS for form in kind.forms]
 
 
 @pytest.mark.parametrize(("kind", "form"), FORMS, ids=[f"{kind.effect}-{form}" for kind, form in FORMS])
-def test_an_effect_shows_in_its_direction_at_its_joint_alone(kind: type[Hidden], form: str) -> None:
-    effect = _drawn(kind, form).informed(np.full(3, 25.0))
+def test_an_effect_shows_in_its_direction_at_its_joint_alone(kind: type[HiddenEffect], form: str) -> None:
+    effect = _drawn(kind, form).with_peak_torque(np.full(3, 25.0))
     left, motion, nominal = residual(case(effect))
     column, least = MARKS[kind]
     assert _cosine(left[:, J], column(motion, nominal, effect)) > least
@@ -87,7 +97,7 @@ def test_an_effect_shows_in_its_direction_at_its_joint_alone(kind: type[Hidden],
 
 
 @pytest.mark.parametrize("kind", [Payload, LinkError, Tilt, Geometry, EncoderOffset, Elasticity])
-def test_bodies_and_drives_leave_more_than_the_noise(kind: type[Hidden]) -> None:
+def test_bodies_and_drives_leave_more_than_the_noise(kind: type[HiddenEffect]) -> None:
     made = case(_drawn(kind))
     left, *_ = residual(made)
     assert np.sqrt(np.mean(left[:, J] ** 2)) > 0.2 * made.plan.noise.level[J]
@@ -152,7 +162,7 @@ def test_outside_effects_are_ten_and_none_has_a_name_of_the_library() -> None:
 
 
 @pytest.mark.parametrize("kind", OUTSIDE, ids=[kind.effect for kind in OUTSIDE])
-def test_an_outside_effect_can_be_seen(kind: type[Hidden]) -> None:
+def test_an_outside_effect_can_be_seen(kind: type[HiddenEffect]) -> None:
     joint = next(iter(kind.places(MACHINE)))
     made = case(_drawn(kind, joint=joint))
     left, *_ = residual(made)
@@ -164,7 +174,7 @@ def test_a_third_of_the_draws_take_another_than_the_obvious_form() -> None:
     rng = np.random.default_rng(0)
     for kind in LIBRARY:
         if len(kind.forms) > 1:
-            drawn = [kind.drawn_form(rng) != kind.forms[0] for _ in range(400)]
+            drawn = [kind.draw_form(rng) != kind.forms[0] for _ in range(400)]
             assert np.mean(drawn) > 1 / 3
 
 

@@ -10,17 +10,15 @@ import pytest
 import yaml
 from refusals import refusal
 
-from concealed.arms import machine
-from concealed.loop import case
-from concealed.loop.answers import NAME
-from concealed.loop.case import Forecast, Moved, Tools, play_case
-from concealed.loop.draw import draw
-from concealed.loop.poor import poor_reference
-from concealed.loop.run import LoopSettings, closed, play_all, results, sealed
-from concealed.loop.second import first_recording, second_recording, write_recording
-from concealed.manifest import checked_manifest
-from recordings.load import load_recording
-from recordings.run import Array
+from armlab.concealed.arms import make_machine
+from armlab.concealed.loop import case
+from armlab.concealed.loop.case import Forecast, SecondMotion, Tools, play_case
+from armlab.concealed.loop.draw import draw_case, poor_reference
+from armlab.concealed.loop.recordings import simulate_first_recording, simulate_second_recording, write_loop_recording
+from armlab.concealed.loop.run import ANSWERS_FILE, LoopSettings, close_loop, play_cases, read_results, seal_loop
+from armlab.concealed.sets import read_checked_manifest
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Array
 
 SECONDS, RATE_HZ = 2.0, 250.0
 
@@ -47,17 +45,17 @@ def suspect(verdict: Path, robot: Path, recording: Path) -> list[list[Any]]:
     return []
 
 
-def move(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> Moved:
+def move(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> SecondMotion:
     """The same motion for every kind."""
     names = frozenset({("time_delay", None), ("viscous_friction", 2)})
-    return Moved(gentle(), (Forecast(names, 0.7, 0.1, 0.2),))
+    return SecondMotion(gentle(), (Forecast(names, 0.7, 0.1, 0.2),))
 
 
 TOOLS = Tools(diagnose, suspect, move)
 
 
 def test_poor_motions_stay_far_below_what_the_arm_may_do() -> None:
-    made, time = machine("irb120-arm"), np.arange(0, 8, 1e-3)
+    made, time = make_machine("irb120-arm"), np.arange(0, 8, 1e-3)
     for seed in range(20):
         position = poor_reference(np.random.default_rng(seed), time, made)
         speed = np.abs(np.gradient(position, 1e-3, axis=0)).max(axis=0)
@@ -67,15 +65,17 @@ def test_poor_motions_stay_far_below_what_the_arm_may_do() -> None:
 
 
 def test_a_draw_depends_on_seed_case_and_attempt_alone() -> None:
-    one, same, other = draw(1700, 3, 1), draw(1700, 3, 1), draw(1700, 3, 2)
+    one, same, other = draw_case(1700, 3, 1), draw_case(1700, 3, 1), draw_case(1700, 3, 2)
     assert (one.pair, one.effect, one.target) == (same.pair, same.effect, same.target)
     assert one.plan.name != other.plan.name
 
 
 def test_a_second_recording_holds_the_first_runs_and_the_motion_that_was_asked_for(tmp_path: Path) -> None:
-    first = first_recording(draw(1700, 0, 0))
-    write_recording(first.simulated, tmp_path / "first", tmp_path / "first.json")
-    write_recording(second_recording(first, gentle(), "designed"), tmp_path / "both", tmp_path / "both.json")
+    first = simulate_first_recording(draw_case(1700, 0, 0))
+    write_loop_recording(first.simulated, tmp_path / "first", tmp_path / "first.json")
+    write_loop_recording(
+        simulate_second_recording(first, gentle(), "designed"), tmp_path / "both", tmp_path / "both.json"
+    )
     for run in ("run-1.parquet", "run-2.parquet"):
         alone, together = (pd.read_parquet(tmp_path / part / run) for part in ("first", "both"))
         assert alone.equals(together)
@@ -87,23 +87,25 @@ def test_a_second_recording_holds_the_first_runs_and_the_motion_that_was_asked_f
 
 
 def test_the_limits_for_second_motions_lie_within_those_of_the_arm(tmp_path: Path) -> None:
-    write_recording(first_recording(draw(1700, 0, 0)).simulated, tmp_path / "first", tmp_path / "first.json")
+    write_loop_recording(
+        simulate_first_recording(draw_case(1700, 0, 0)).simulated, tmp_path / "first", tmp_path / "first.json"
+    )
     limits = yaml.safe_load((tmp_path / "first/limits.yaml").read_text())["joints"]
-    made = machine("irb120-arm")
+    made = make_machine("irb120-arm")
     assert [joint["velocity_limit"] for joint in limits] == pytest.approx((0.35 * made.speed).tolist())
     assert all(joint["position_limits"][0] > low for joint, low in zip(limits, made.range[0], strict=True))
 
 
 def test_draws_without_doubt_are_passed_over_and_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(case, "ATTEMPTS", 1)
+    monkeypatch.setattr(case, "MAX_ATTEMPTS", 1)
     settings = LoopSettings(1, 1700)
-    sealed(settings, tmp_path / "loop")
-    list(play_all(settings, tmp_path / "loop", TOOLS, 1))
-    assert [each["start"] for each in results(settings, tmp_path / "loop")[0]["passed"]] == ["another class"]
+    seal_loop(settings, tmp_path / "loop")
+    list(play_cases(settings, tmp_path / "loop", TOOLS, 1))
+    assert [each["start"] for each in read_results(settings, tmp_path / "loop")[0]["passed"]] == ["another class"]
 
 
 def test_an_ambiguous_case_is_played_with_all_three_second_motions(tmp_path: Path) -> None:
-    hidden = draw(1700, 0, 0)
+    hidden = draw_case(1700, 0, 0)
 
     def told(recording: Path, out: Path) -> None:
         runs = yaml.safe_load((recording / "recording.yaml").read_text())["runs"]
@@ -113,36 +115,36 @@ def test_an_ambiguous_case_is_played_with_all_three_second_motions(tmp_path: Pat
         (out / "verdict.json").write_text(json.dumps({"findings": [{**truth, "rivals": rivals}]}))
 
     settings, out = LoopSettings(1, 1700), tmp_path / "loop"
-    answers = sealed(settings, out)
-    list(play_all(settings, out, Tools(told, suspect, move), 1))
-    found = results(settings, out)[0]
+    answers = seal_loop(settings, out)
+    list(play_cases(settings, out, Tools(told, suspect, move), 1))
+    found = read_results(settings, out)[0]
     assert found["start"] == "told"
     assert found["ends"] == {"designed": "right", "random": "right", "condition": "right"}
     assert found["forecast"] == {kind: [0.7, 0.1, 0.2] for kind in ("designed", "random", "condition")}
-    closed(settings, out, answers)
-    assert checked_manifest(out)[0]["cases"] == [found["name"]]
-    assert sealed(settings, out) == answers
-    assert not list(play_all(settings, out, Tools(told, suspect, move), 1))  # nothing is left to do
+    close_loop(settings, out, answers)
+    assert read_checked_manifest(out)[0]["cases"] == [found["name"]]
+    assert seal_loop(settings, out) == answers
+    assert not list(play_cases(settings, out, Tools(told, suspect, move), 1))  # nothing is left to do
 
 
 def test_a_folder_of_another_seed_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "loop"
     (out / "cases").mkdir(parents=True)
     (out / "settings.json").write_text('{"cases": 1, "seed": 1}\n')
-    assert "other settings" in refusal(sealed, LoopSettings(1, 2), out)
+    assert "other settings" in refusal(seal_loop, LoopSettings(1, 2), out)
 
 
 def test_answers_that_were_changed_after_the_seal_are_refused(tmp_path: Path) -> None:
     settings = LoopSettings(1, 1700)
-    answers = sealed(settings, tmp_path)
-    path = tmp_path / "truth" / NAME
+    answers = seal_loop(settings, tmp_path)
+    path = tmp_path / "truth" / ANSWERS_FILE
     path.write_text(path.read_text().replace('"attempt": 0', '"attempt": 1'))
-    assert "was changed" in refusal(closed, settings, tmp_path, answers)
-    assert "other answers" in refusal(sealed, settings, tmp_path)
+    assert "was changed" in refusal(close_loop, settings, tmp_path, answers)
+    assert "other answers" in refusal(seal_loop, settings, tmp_path)
 
 
 def test_a_design_that_cannot_help_leaves_the_question_open(tmp_path: Path) -> None:
-    hidden = draw(1700, 0, 0)
+    hidden = draw_case(1700, 0, 0)
 
     def told(recording: Path, out: Path) -> None:
         truth = {"effect": hidden.effect.effect, "joint": hidden.effect.place}
@@ -157,7 +159,7 @@ def test_a_design_that_cannot_help_leaves_the_question_open(tmp_path: Path) -> N
 
 
 def test_a_design_that_fails_leaves_the_question_open_and_is_told(tmp_path: Path) -> None:
-    hidden = draw(1700, 0, 0)
+    hidden = draw_case(1700, 0, 0)
 
     def told(recording: Path, out: Path) -> None:
         truth = {"effect": hidden.effect.effect, "joint": hidden.effect.place}
@@ -165,7 +167,7 @@ def test_a_design_that_fails_leaves_the_question_open_and_is_told(tmp_path: Path
         rivals = [{"effect": "torque_ripple", "joint": 1}]
         (out / "verdict.json").write_text(json.dumps({"findings": [{**truth, "rivals": rivals}]}))
 
-    def broken(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> Moved:
+    def broken(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> SecondMotion:
         raise ValueError("no columns")
 
     for part in ("truth", "observations", "verdicts"):

@@ -5,11 +5,19 @@ from typing import Any
 
 import pytest
 
-from concealed.loop.judge import Truth, end_of, start_of, suspects, truth_of
-from concealed.loop.page import Seal, text, write
-from concealed.loop.reliability import brier, on_average, reliability
-from concealed.loop.run import LoopSettings
-from concealed.loop.table import Share, Versus, rows, shares, versus
+from armlab.concealed.loop.case import Truth, find_suspects, judge_end, judge_start, read_truth
+from armlab.concealed.loop.counts import (
+    MotionComparison,
+    Share,
+    brier_scores,
+    compare_motions,
+    count_shares,
+    make_table,
+    mean_chances,
+    reliability_bins,
+)
+from armlab.concealed.loop.page import Seals, render_page, write_page
+from armlab.concealed.loop.run import LoopSettings
 
 LATE = ("time_delay", None)
 VISCOUS = ("viscous_friction", 2)
@@ -39,12 +47,12 @@ def verdict(*findings: tuple[tuple[str, int | None], list[tuple[str, int | None]
 def test_a_first_verdict_is_ambiguous_only_with_the_hidden_effect_among_rivals(
     given: dict[str, Any], start: str
 ) -> None:
-    assert start_of(given, TRUTH) == start
+    assert judge_start(given, TRUTH) == start
 
 
 def test_suspects_are_all_names_of_the_groups_with_the_hidden_effect() -> None:
     given = verdict((VISCOUS, [LATE]), (("torque_offset", 1), [("asymmetric_friction", 1)]))
-    assert suspects(given, TRUTH) == {LATE, VISCOUS}
+    assert find_suspects(given, TRUTH) == {LATE, VISCOUS}
 
 
 @pytest.mark.parametrize(
@@ -60,12 +68,12 @@ def test_suspects_are_all_names_of_the_groups_with_the_hidden_effect() -> None:
     ],
 )
 def test_only_the_hidden_name_alone_is_right(given: dict[str, Any], end: str) -> None:
-    assert end_of(given, TRUTH, frozenset({LATE, VISCOUS})) == end
+    assert judge_end(given, TRUTH, frozenset({LATE, VISCOUS})) == end
 
 
 def test_a_suspect_that_is_there_as_well_may_be_named() -> None:
     given = verdict((LATE, []), (VISCOUS, []))
-    assert end_of(given, Truth(LATE, frozenset({VISCOUS})), frozenset({LATE, VISCOUS})) == "right"
+    assert judge_end(given, Truth(LATE, frozenset({VISCOUS})), frozenset({LATE, VISCOUS})) == "right"
 
 
 def test_background_and_links_that_are_off_count_as_there() -> None:
@@ -74,7 +82,7 @@ def test_background_and_links_that_are_off_count_as_there() -> None:
         "background": [{"effect": "viscous_friction", "joint": 2}],
         "cad_errors": [{"effect": "inertial_parameter_error", "joint": 1}],
     }
-    assert truth_of(answer) == Truth(LATE, frozenset({VISCOUS, ("inertial_parameter_error", 1)}))
+    assert read_truth(answer) == Truth(LATE, frozenset({VISCOUS, ("inertial_parameter_error", 1)}))
 
 
 def result(number: int, start: str, designed: str, random: str, condition: str) -> dict[str, Any]:
@@ -82,10 +90,17 @@ def result(number: int, start: str, designed: str, random: str, condition: str) 
     ends = {"designed": designed, "random": random, "condition": condition}
     pair, suspected = ["time_delay", "viscous_friction"], [["time_delay", None], ["viscous_friction", 2]]
     return {
-        "case": number, "name": f"case{number}", "tier": "clean", "pair": pair, "multiple": 2.0, "start": start,
-        "suspected": suspected, "ends": ends, "passed": [{"pair": pair, "start": "nothing"}],
+        "case": number,
+        "name": f"case{number}",
+        "tier": "clean",
+        "pair": pair,
+        "multiple": 2.0,
+        "start": start,
+        "suspected": suspected,
+        "ends": ends,
+        "passed": [{"pair": pair, "start": "nothing"}],
         "forecast": {"designed": [0.9, 0.0, 0.1], "random": [0.3, 0.2, 0.5]},
-    }  # fmt: skip
+    }
 
 
 FOUND = [
@@ -97,12 +112,12 @@ FOUND = [
 
 
 def test_cases_that_ran_away_or_never_were_ambiguous_are_left_out_whole() -> None:
-    assert set(rows(FOUND)["case"]) == {"case0", "case1"}
+    assert set(make_table(FOUND)["case"]) == {"case0", "case1"}
 
 
 def test_shares_count_by_kind_of_motion_and_by_beginning() -> None:
-    assert shares(rows(FOUND))["designed", "right"] == Share(2, 2)
-    assert shares(rows(FOUND), "told")["random", "open"] == Share(1, 1)
+    assert count_shares(make_table(FOUND))["designed", "right"] == Share(2, 2)
+    assert count_shares(make_table(FOUND), "told")["random", "open"] == Share(1, 1)
 
 
 def test_a_share_is_told_with_wilsons_interval() -> None:
@@ -111,24 +126,24 @@ def test_a_share_is_told_with_wilsons_interval() -> None:
 
 
 def test_a_motion_is_compared_case_by_case() -> None:
-    assert versus(rows(FOUND), "random") == Versus(1, 0)
-    assert versus(rows(FOUND), "condition") == Versus(2, 0)
-    assert Versus(5, 0).p_value == pytest.approx(2 * 0.5**5)
-    assert Versus(0, 0).p_value == 1.0
+    assert compare_motions(make_table(FOUND), "random") == MotionComparison(1, 0)
+    assert compare_motions(make_table(FOUND), "condition") == MotionComparison(2, 0)
+    assert MotionComparison(5, 0).p_value == pytest.approx(2 * 0.5**5)
+    assert MotionComparison(0, 0).p_value == 1.0
 
 
 def test_forecasts_are_held_against_what_came() -> None:
-    table = rows(FOUND)
-    low, high = reliability(table)
-    assert (low.expected, low.came) == (pytest.approx(0.3), Share(1, 2))
-    assert (high.expected, high.came) == (pytest.approx(0.9), Share(2, 2))
-    assert on_average(table)["right"] == (pytest.approx(0.6), 0.75)
-    assert brier(table)[0] == pytest.approx((0.01 + 0.01 + 0.09 + 0.49) / 4)
+    table = make_table(FOUND)
+    low, high = reliability_bins(table)
+    assert (low.expected, low.observed) == (pytest.approx(0.3), Share(1, 2))
+    assert (high.expected, high.observed) == (pytest.approx(0.9), Share(2, 2))
+    assert mean_chances(table)["right"] == (pytest.approx(0.6), 0.75)
+    assert brier_scores(table)[0] == pytest.approx((0.01 + 0.01 + 0.09 + 0.49) / 4)
 
 
 def test_the_page_tells_shares_comparisons_forecasts_and_draws_that_were_passed_over(tmp_path: Path) -> None:
-    seal = Seal("abc", "def")
-    page = text(LoopSettings(4, 1001), FOUND, seal)
+    seal = Seals("abc", "def")
+    page = render_page(LoopSettings(4, 1001), FOUND, seal)
     assert "Seed 1001, 2 ambiguous cases of 4" in page
     assert "told before the first diagnosis: abc" in page
     assert "| designed motion | 100 % (34-100) |" in page
@@ -136,5 +151,5 @@ def test_the_page_tells_shares_comparisons_forecasts_and_draws_that_were_passed_
     assert "| time_delay | viscous_friction | 2 | 2, 0, 0 | 1, 0, 1 | 0, 1, 1 |" in page
     assert "| 0.8 to 1.0 | 2 | 90 % | 100 % (34-100) |" in page
     assert "- nothing: 3" in page
-    names = [path.name for path in write(LoopSettings(4, 1001), FOUND, seal, tmp_path)]
+    names = [path.name for path in write_page(LoopSettings(4, 1001), FOUND, seal, tmp_path)]
     assert names == ["loop.md", "loop.csv", "loop.png"]

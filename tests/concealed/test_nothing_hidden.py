@@ -6,32 +6,32 @@ import numpy as np
 import pytest
 from hidden_cases import case, plan
 
-from concealed.arms import machine
-from concealed.effects.friction import Viscous
-from concealed.passes import simulated
-from concealed.plan import RunPlan, draw_plan
-from concealed.record import logged
-from concealed.simulate import rigid_torque
+from armlab.concealed.arms import make_machine
+from armlab.concealed.case_files import log_run
+from armlab.concealed.effects.friction import Viscous
+from armlab.concealed.plan import RunPlan, draw_plan
+from armlab.concealed.simulate import rigid_torque
+from armlab.concealed.sizing import simulate_case
+from armlab.recordings.differentiate import Signals, differentiate
+from armlab.recordings.recording import Run
 from problem.motion import Motion
-from recordings.differentiate import Signals, differentiate
-from recordings.run import Run
 
 FIFTH = 0.2
 
 
 def _signals(made: object, number: int, cutoff_hz: float = 40.0) -> Signals:
-    log = logged(made, number, noisy=False)  # type: ignore[arg-type]
+    log = log_run(made, number, noisy=False)  # type: ignore[arg-type]
     return differentiate(Run("run", "identify", log.time, log.position, log.torque), cutoff_hz=cutoff_hz)
 
 
 @pytest.mark.parametrize("name", ["irb120-arm", "irb120", "panda", "scara"])
 def test_without_noise_less_than_a_fifth_of_the_noise_is_left(name: str) -> None:
-    made = machine(name)
+    made = make_machine(name)
     drawn = draw_plan(1004, 0, "clean", True, True)
     runs = tuple(RunPlan(family, 5.0, "identify") for family in ("chirp", "creeping", "point-to-point"))
     level = 0.0015 * made.rating  # the least that is ever drawn
     quiet = replace(drawn.noise, white=level, coloured=0.1 * level)
-    result = simulated(replace(drawn, machine=made, true_arm=made.arm, runs=runs, rate_hz=250, noise=quiet), ())
+    result = simulate_case(replace(drawn, machine=made, true_arm=made.arm, runs=runs, rate_hz=250, noise=quiet), ())
     for number in range(len(runs)):
         signals = _signals(result, number)
         left = signals.torque - signals.filter(rigid_torque(made.arm, signals.motion))
@@ -50,7 +50,7 @@ def test_nothing_hidden_leaves_no_apparent_delay(rate_hz: int) -> None:
 
 def test_recorded_positions_are_rounded_to_the_encoder_and_torques_are_not_late() -> None:
     made = case()
-    true, read = logged(made, 0, noisy=False), logged(made, 0)
+    true, read = log_run(made, 0, noisy=False), log_run(made, 0)
     assert 0 < np.abs(read.position - true.position).max() < 2e-4
     lags = [
         np.sum(np.roll(read.torque - read.torque.mean(0), -lag, 0) * (true.torque - true.torque.mean(0)))
@@ -60,14 +60,14 @@ def test_recorded_positions_are_rounded_to_the_encoder_and_torques_are_not_late(
 
 
 def test_a_seed_gives_the_same_run_again() -> None:
-    first, second = (logged(simulated(plan(), ()), 0) for _ in range(2))
+    first, second = (log_run(simulate_case(plan(), ()), 0) for _ in range(2))
     np.testing.assert_array_equal(first.torque, second.torque)
     np.testing.assert_array_equal(first.position, second.position)
 
 
 def test_viscous_friction_is_not_late() -> None:
     made = case(Viscous(1, 8.0, 99.0, "linear", {"phase": 0.0}))
-    log = logged(made, 0, noisy=False)
+    log = log_run(made, 0, noisy=False)
     velocity = np.gradient(log.position, 1 / made.plan.rate_hz, axis=0)
     acceleration = np.gradient(velocity, 1 / made.plan.rate_hz, axis=0)
     motion = Motion(log.position, velocity, acceleration)

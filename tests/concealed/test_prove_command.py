@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 from made_verdicts import finding, verdict, write
 
-from concealed import prove as proving
-from concealed.ablation import Ablation, ablate
-from concealed.prove import LOG, Proof, chosen_proof, prove
-from concealed.sets import SetSettings
-from problem.errors import InputError
+from armlab.common.errors import InputError
+from armlab.concealed import prove as proving
+from armlab.concealed.ablation import AblationSettings, ablate
+from armlab.concealed.prove import LOG_FILE, Proof, choose_proof, prove
+from armlab.concealed.sets import SetSettings
 
 SETS = {"mixed": SetSettings(1, 5000, "clean", "nulls")}
 
@@ -36,7 +36,7 @@ def test_a_judged_proof_is_logged_once_with_commit_seed_seal_and_score(silent: l
     proof = Proof(SETS, "judged", "a" * 40)
     said = list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
     list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
-    entries = [json.loads(line) for line in (tmp_path / "results" / LOG).read_text().splitlines()]
+    entries = [json.loads(line) for line in (tmp_path / "results" / LOG_FILE).read_text().splitlines()]
     assert len(entries) == 1
     assert entries[0]["commit"] == "a" * 40
     assert entries[0]["seed"] == 5000
@@ -48,7 +48,7 @@ def test_sets_that_are_proved_one_after_another_are_logged_each(silent: list[str
     for name in ("mixed", "nulls"):
         proof = Proof({name: SETS["mixed"]}, "judged", "c" * 40)
         list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
-    entries = [json.loads(line) for line in (tmp_path / "results" / LOG).read_text().splitlines()]
+    entries = [json.loads(line) for line in (tmp_path / "results" / LOG_FILE).read_text().splitlines()]
     assert [each["set"] for each in entries] == ["mixed", "nulls"]
 
 
@@ -66,15 +66,15 @@ def test_a_finished_quick_proof_starts_anew_and_is_not_logged(silent: list[str],
     for _ in range(2):
         list(prove(Proof(SETS, "quick"), tmp_path / "work", tmp_path / "results", 1))
     assert len(silent) == 2
-    assert not (tmp_path / "results" / LOG).exists()
+    assert not (tmp_path / "results" / LOG_FILE).exists()
 
 
 def test_a_development_proof_has_a_development_seed_and_no_commit() -> None:
-    proof = chosen_proof(False, 1200, 4, 0)
+    proof = choose_proof(False, 1200, 4, 0)
     assert proof.commit is None
     assert proof.sets == {"mixed": SetSettings(4, 1200, development=True)}
     with pytest.raises(InputError, match="seed 5000 should be one for development, 1000 to 1999"):
-        chosen_proof(False, 5000, 4, 0)
+        choose_proof(False, 5000, 4, 0)
 
 
 def test_an_ablation_scores_the_same_cases_with_each_guard_off(tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_an_ablation_scores_the_same_cases_with_each_guard_off(tmp_path: Path) -
         wrong = verdict("mismatch", (finding("viscous_friction", 2),))
         return {"all guards on": verdict(), "robust_variance": verdict(), "correction": wrong}
 
-    told = list(ablate(Ablation(1300, 1, 1), diagnose, tmp_path / "work", tmp_path / "results", 1))
+    told = list(ablate(AblationSettings(1300, 1, 1), diagnose, tmp_path / "work", tmp_path / "results", 1))
     assert len(set(asked)) == len(asked) == 2
     assert told[-1] == f"wrote {tmp_path / 'results' / 'guards.md'}"
     rows = (tmp_path / "results" / "guards.md").read_text().splitlines()

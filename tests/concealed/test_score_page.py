@@ -13,24 +13,20 @@ import yaml
 from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
-from concealed.arms import machine
-from concealed.score import gap
-from concealed.score.figures import draw_all
-from concealed.score.gallery import EACH, chosen, tally, write_gallery
-from concealed.score.gap import Gap, gap_closed
-from concealed.score.held_out import HeldOut, held_out, rms
-from concealed.score.matrix import confusion_figure
-from concealed.score.measures import Measure, measures
-from concealed.score.misses import misses
-from concealed.score.outcomes import GROUPS, outcomes
-from concealed.score.page import judgement, page, shown
-from concealed.score.reading import MISSING, Judged
-from concealed.score.rows import rows
-from concealed.score.tables import by_arm, confusion
-from concealed.score.words import hidden_words, said_words
-from concealed.simulate import rigid_torque
+from armlab.concealed.arms import make_machine
+from armlab.concealed.score import held_out
+from armlab.concealed.score.cases import MISSING_VERDICT, JudgedCase
+from armlab.concealed.score.figures import draw_confusion, draw_figures
+from armlab.concealed.score.gallery import CASES_PER_GROUP, choose_items, tally_outcomes, write_gallery
+from armlab.concealed.score.held_out import Gap, HeldOut, filter_held_out_run, measure_gap_closed, rms
+from armlab.concealed.score.measures import Measure, arm_table, compute_measures, confusion_table
+from armlab.concealed.score.outcomes import OUTCOME_GROUPS, list_misses, list_outcomes
+from armlab.concealed.score.page import format_measure, judge_measure, render_page
+from armlab.concealed.score.rows import make_rows
+from armlab.concealed.score.words import describe_hidden, describe_said
+from armlab.concealed.simulate import rigid_torque
+from armlab.recordings.recording import Array
 from problem.motion import Motion
-from recordings.run import Array
 
 ELSEWHERE = verdict("mismatch", (finding("backlash", 3),))
 UNEXPLAINED = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depends_on": ["position_1"]}])
@@ -46,7 +42,7 @@ UNEXPLAINED = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depen
             ["class", "wrong claim"],
         ),
         (COULOMB, verdict(), ["missed"]),
-        (COULOMB, MISSING, ["missed"]),
+        (COULOMB, MISSING_VERDICT, ["missed"]),
         (COULOMB, ELSEWHERE, ["missed", "wrong claim"]),
         (COULOMB, verdict("mismatch", (finding("coulomb_friction", 3),)), ["wrong claim"]),
         (truth(effect("coulomb_friction", 2, 2.9)), verdict(), []),
@@ -55,28 +51,28 @@ UNEXPLAINED = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depen
         (NULL, verdict(), ["silent"]),
         (NULL, ELSEWHERE, ["false claim"]),
         (NULL, UNEXPLAINED, ["false unknown"]),
-        (NULL, MISSING, ["no verdict"]),
+        (NULL, MISSING_VERDICT, ["no verdict"]),
     ],
 )
 def test_every_case_is_a_success_or_a_failure_of_one_kind(
     answer: dict[str, Any], said: dict[str, Any], groups: list[str]
 ) -> None:
-    assert outcomes(scored((answer, said)))["group"].tolist() == groups
+    assert list_outcomes(scored((answer, said)))["group"].tolist() == groups
 
 
 def test_the_gallery_takes_the_first_cases_of_each_group_in_the_order_of_the_manifest() -> None:
     table = scored(*((COULOMB, verdict() if number % 2 else perfect(COULOMB)) for number in range(8)))
-    picked = chosen(table).groupby("group")["case"].apply(list)
-    assert EACH == 2
+    picked = choose_items(table).groupby("group")["case"].apply(list)
+    assert CASES_PER_GROUP == 2
     assert picked["missed"] == ["c1", "c3"]
     assert picked["named"] == ["c0", "c2"]
-    assert "| Not named | failure | 4 |" in tally(table)
+    assert "| Not named | failure | 4 |" in tally_outcomes(table)
 
 
 def test_each_miss_has_a_row_that_says_what_was_hidden_and_what_was_said() -> None:
     pairs = ((COULOMB, perfect(COULOMB)), (COULOMB, ELSEWHERE), (OUTSIDE, verdict()), (NULL, ELSEWHERE))
     cases = [judged(answer, said, f"c{number}") for number, (answer, said) in enumerate(pairs)]
-    table = misses(cases, rows(cases))
+    table = list_misses(cases, make_rows(cases))
     assert table["miss"].tolist() == ["missed", "not unknown", "wrong claim", "false claim"]
     assert table["case"].tolist() == ["c1", "c2", "c1", "c3"]
     missed = table.iloc[0]
@@ -90,10 +86,10 @@ def test_answers_and_verdicts_in_words() -> None:
     background = finding("viscous_friction", 1)
     answer = truth(effect("coulomb_friction", 2, level=2.0), background=(effect("viscous_friction", 1),))
     case = judged(answer, verdict("mismatch", (right, background)))
-    assert hidden_words(case) == "coulomb_friction (x), joint 2, 8.0 limits: level = 2"
+    assert describe_hidden(case) == "coulomb_friction (x), joint 2, 8.0 limits: level = 2"
     told = "coulomb_friction, joint 2: level = 2.2 (1.9 to 2.5) N m (or stribeck_friction)"
-    assert said_words(case) == f"{told}; 1 right finding of the background"
-    assert said_words(judged(NULL, verdict())) == "nothing is missing"
+    assert describe_said(case) == f"{told}; 1 right finding of the background"
+    assert describe_said(judged(NULL, verdict())) == "nothing is missing"
 
 
 @pytest.mark.parametrize(
@@ -112,21 +108,21 @@ def test_answers_and_verdicts_in_words() -> None:
 def test_a_figure_is_held_against_what_is_wanted_with_its_interval(
     value: float | None, low: float | None, high: float | None, wanted: str, said: str
 ) -> None:
-    assert judgement(Measure("a", value, low, high, 100, wanted, "share")) == said
+    assert judge_measure(Measure("a", value, low, high, 100, wanted, "share")) == said
 
 
 def test_shares_are_shown_in_per_cent_and_times_in_seconds() -> None:
-    assert shown(Measure("a", 0.012, 0.005, 0.03, 300, "", "share")) == "1.2 % (0.5 to 3)"
-    assert shown(Measure("a", 3.5, None, None, 300, "", "s")) == "3.5 s"
-    assert shown(Measure("a", None, None, None, 0, "")) == "-"
+    assert format_measure(Measure("a", 0.012, 0.005, 0.03, 300, "", "share")) == "1.2 % (0.5 to 3)"
+    assert format_measure(Measure("a", 3.5, None, None, 300, "", "s")) == "3.5 s"
+    assert format_measure(Measure("a", None, None, None, 0, "")) == "-"
 
 
 def test_the_page_puts_what_is_wanted_beside_what_was_found_and_names_the_misses() -> None:
     cases = [judged(COULOMB, verdict(), "c0"), judged(NULL, verdict(), "c1")]
-    table = rows(cases)
+    table = make_rows(cases)
     result = {"cases": 2, "seed": 1, "manifest": "abc", "development": True}
-    result["tiers"] = {"clean": [vars(each) for each in measures(table, "clean")]}
-    text = page(table, result, misses(cases, table), ["gap"])
+    result["tiers"] = {"clean": [vars(each) for each in compute_measures(table, "clean")]}
+    text = render_page(table, result, list_misses(cases, table), ["gap"])
     above = (
         "| right name or class of four, above 3 limits | at least 90 % | 0 % (0 to 79.3) | 1 | **not met**, surely |"
     )
@@ -140,20 +136,22 @@ def test_the_page_puts_what_is_wanted_beside_what_was_found_and_names_the_misses
 
 def test_the_longest_diagnosis_is_on_the_page_beside_the_median() -> None:
     cases = [replace(judged(NULL, verdict(), f"c{seconds}"), seconds=float(seconds)) for seconds in (1, 2, 9)]
-    found = {each.name: each.value for each in measures(rows(cases), "clean")}
+    found = {each.name: each.value for each in compute_measures(make_rows(cases), "clean")}
     assert (found["seconds a case (median)"], found["seconds a case (longest)"]) == (2.0, 9.0)
-    assert by_arm(rows(cases))[["cases", "seconds, median", "seconds, longest"]].to_numpy().tolist() == [[3, 2.0, 9.0]]
+    assert arm_table(make_rows(cases))[["cases", "seconds, median", "seconds, longest"]].to_numpy().tolist() == [
+        [3, 2.0, 9.0]
+    ]
 
 
 def test_a_null_without_a_verdict_is_not_counted_as_silent_in_the_confusion() -> None:
-    counts = confusion(scored((NULL, MISSING), (NULL, verdict())), "clean")
+    counts = confusion_table(scored((NULL, MISSING_VERDICT), (NULL, verdict())), "clean")
     assert counts.loc["nothing"].to_dict() == {"invalid": 1, "none": 1}
 
 
 def test_right_answers_stand_on_the_diagonal_of_the_matrix() -> None:
     hidden = truth(effect("torque_ripple", 2))
-    table = confusion(scored((COULOMB, perfect(COULOMB)), (hidden, ELSEWHERE), (OUTSIDE, verdict())), "clean")
-    axes = confusion_figure(table, "made by hand").axes[0]
+    table = confusion_table(scored((COULOMB, perfect(COULOMB)), (hidden, ELSEWHERE), (OUTSIDE, verdict())), "clean")
+    axes = draw_confusion(table, "made by hand").axes[0]
     rows_, columns = (
         [each.get_text() for each in labels] for labels in (axes.get_yticklabels(), axes.get_xticklabels())
     )
@@ -163,7 +161,7 @@ def test_right_answers_stand_on_the_diagonal_of_the_matrix() -> None:
 
 def test_a_figure_with_nothing_to_show_does_not_stay_from_an_older_score(tmp_path: Path) -> None:
     (tmp_path / "detection.svg").write_text("old", encoding="utf-8")
-    drawn = draw_all(scored((NULL, verdict())), tmp_path)
+    drawn = draw_figures(scored((NULL, verdict())), tmp_path)
     assert {path.name for path in drawn} == {path.name for path in tmp_path.iterdir()}
     assert "detection.svg" not in {path.name for path in drawn}
 
@@ -171,11 +169,11 @@ def test_a_figure_with_nothing_to_show_does_not_stay_from_an_older_score(tmp_pat
 # --- a case with Coulomb friction of 2 N m at joint 1, made without any engine
 
 LEVEL, NOISE, RATE_HZ = 2.0, 0.05, 250.0
-SCARA = machine("scara")
+SCARA = make_machine("scara")
 
 
 @pytest.fixture(scope="module")
-def friction(tmp_path_factory: pytest.TempPathFactory) -> Judged:
+def friction(tmp_path_factory: pytest.TempPathFactory) -> JudgedCase:
     """With a verdict whose prediction is the true torque."""
     folder = tmp_path_factory.mktemp("friction")
     recording, clean, own = folder / "recording", folder / "clean.parquet", folder / "verdict"
@@ -192,7 +190,7 @@ def friction(tmp_path_factory: pytest.TempPathFactory) -> Judged:
     predicted = pd.DataFrame({"t": time, "tau1": torque[:, 0], "tau2": torque[:, 1]})
     predicted.to_csv(own / "predicted" / "run-2.csv", index=False)
     answer = {**truth(effect("coulomb_friction", 1, level=LEVEL)), "case": "friction", "arm": "scara", "joints": 2}
-    return Judged(answer, perfect(answer), recording, clean, own, 1.0)
+    return JudgedCase(answer, perfect(answer), recording, clean, own, 1.0)
 
 
 def _settings() -> dict[str, Any]:
@@ -214,42 +212,44 @@ def _run(frequencies: tuple[float, ...]) -> tuple[Array, Array, Array]:
     return time, position, torque
 
 
-def test_friction_is_left_by_the_simulation_and_not_by_the_verdict_that_has_it(friction: Judged) -> None:
-    run = held_out(friction)
+def test_friction_is_left_by_the_simulation_and_not_by_the_verdict_that_has_it(friction: JudgedCase) -> None:
+    run = filter_held_out_run(friction)
     assert run.after is not None
     assert rms(run.given)[0] == pytest.approx(LEVEL, rel=0.05)
     assert rms(run.refit)[0] > 0.5 * LEVEL
     assert rms(run.friction)[0] < 0.1 * LEVEL
     assert rms(run.after) == pytest.approx(rms(run.floor), rel=0.05)
-    assert gap_closed(friction).closed == pytest.approx(1, abs=0.02)
+    assert measure_gap_closed(friction).closed == pytest.approx(1, abs=0.02)
 
 
 def test_the_gap_beyond_plain_friction_is_counted_where_friction_is_in_the_background(
-    friction: Judged, monkeypatch: pytest.MonkeyPatch
+    friction: JudgedCase, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     left = {"given": 10.0, "refit": 4.0, "friction": 2.0, "after": 1.5, "floor": 1.0}
     constant = {name: np.full((5, 1), value) for name, value in left.items()}
-    monkeypatch.setattr(gap, "held_out", lambda case: HeldOut(np.arange(5.0), np.zeros((5, 1)), **constant))
+    monkeypatch.setattr(
+        held_out, "filter_held_out_run", lambda case: HeldOut(np.arange(5.0), np.zeros((5, 1)), **constant)
+    )
     realistic = replace(friction, truth={**friction.truth, "background": [effect("viscous_friction", 1)]})
-    assert gap_closed(realistic) == Gap(pytest.approx(2.5 / 3), pytest.approx(0.5), "counted")
-    assert gap_closed(friction).beyond is None
+    assert measure_gap_closed(realistic) == Gap(pytest.approx(2.5 / 3), pytest.approx(0.5), "counted")
+    assert measure_gap_closed(friction).beyond is None
 
 
-def test_a_picture_is_small_and_the_same_to_the_byte(friction: Judged, tmp_path: Path) -> None:
+def test_a_picture_is_small_and_the_same_to_the_byte(friction: JudgedCase, tmp_path: Path) -> None:
     for name in ("first", "second"):
-        write_gallery([friction], rows([friction]), tmp_path / name)
+        write_gallery([friction], make_rows([friction]), tmp_path / name)
     pictures = [sorted((tmp_path / name / "gallery").glob("*.png")) for name in ("first", "second")]
     assert [path.name for path in pictures[0]] == ["friction-joint-1.png"]
     assert pictures[0][0].read_bytes() == pictures[1][0].read_bytes()
     assert pictures[0][0].stat().st_size < 60_000
     text = (tmp_path / "first" / "gallery.md").read_text(encoding="utf-8")
-    assert f"### {GROUPS['named'].title}: 1 of 1 clean" in text
+    assert f"### {OUTCOME_GROUPS['named'].title}: 1 of 1 clean" in text
     assert "*hidden:* coulomb_friction (x), joint 1, 8.0 limits: level = 2" in text
     assert "![friction](gallery/friction-joint-1.png)" in text
 
 
-def test_a_verdict_without_a_prediction_has_a_picture_too(friction: Judged, tmp_path: Path) -> None:
-    silent = replace(friction, verdict=MISSING, folder=tmp_path / "nowhere")
-    write_gallery([silent], rows([silent]), tmp_path)
+def test_a_verdict_without_a_prediction_has_a_picture_too(friction: JudgedCase, tmp_path: Path) -> None:
+    silent = replace(friction, verdict=MISSING_VERDICT, folder=tmp_path / "nowhere")
+    write_gallery([silent], make_rows([silent]), tmp_path)
     assert (tmp_path / "gallery" / "friction-joint-1.png").is_file()
     assert "### Not named: 1 of 1 clean" in (tmp_path / "gallery.md").read_text(encoding="utf-8")

@@ -7,14 +7,20 @@ import pytest
 from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
-from concealed.score.matching import category
-from concealed.score.measures import Measure, measures, wilson
-from concealed.score.rows import Rows, rows
-from concealed.score.tables import by_effect, confusion, detection
+from armlab.concealed.score.cases import categorize_finding
+from armlab.concealed.score.measures import (
+    Measure,
+    compute_measures,
+    confusion_table,
+    detection_table,
+    effect_table,
+    wilson_interval,
+)
+from armlab.concealed.score.rows import ScoreRows, make_rows
 
 
-def measured(table: Rows, start: str) -> Measure:
-    return next(each for each in measures(table, "clean") if each.name.startswith(start))
+def measured(table: ScoreRows, start: str) -> Measure:
+    return next(each for each in compute_measures(table, "clean") if each.name.startswith(start))
 
 
 def test_perfect_verdicts_score_perfectly() -> None:
@@ -40,8 +46,8 @@ def test_wrong_names_are_counted_among_claims_and_on_nulls() -> None:
     table = scored((NULL, wrong), (COULOMB, wrong))
     assert measured(table, "wrong names among claims").value == 1
     assert measured(table, "false claims on nulls").value == 1
-    assert confusion(table, "clean").loc["coulomb_friction", "backlash"] == 1
-    assert confusion(table, "clean").loc["nothing", "backlash"] == 1
+    assert confusion_table(table, "clean").loc["coulomb_friction", "backlash"] == 1
+    assert confusion_table(table, "clean").loc["nothing", "backlash"] == 1
 
 
 def test_the_right_name_at_the_wrong_joint_is_misplaced() -> None:
@@ -93,18 +99,18 @@ NOT_IDENTICAL = [
 
 @pytest.mark.parametrize(("answer", "said"), IDENTICAL)
 def test_what_no_motion_separates_is_no_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
-    assert category(judged(answer, verdict("mismatch", (said,))), said) == "identical"
+    assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "identical"
 
 
 @pytest.mark.parametrize(("answer", "said"), NOT_IDENTICAL)
 def test_what_motion_can_separate_is_a_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
-    assert category(judged(answer, verdict("mismatch", (said,))), said) == "wrong"
+    assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "wrong"
 
 
 def test_unknown_is_right_for_an_effect_outside_and_false_where_nothing_is() -> None:
     said = verdict("mismatch", (finding("unknown", 1),))
-    assert category(judged(OUTSIDE, said), said["findings"][0]) == "injected"
-    assert category(judged(NULL, said), said["findings"][0]) == "unknown"
+    assert categorize_finding(judged(OUTSIDE, said), said["findings"][0]) == "injected"
+    assert categorize_finding(judged(NULL, said), said["findings"][0]) == "unknown"
     assert measured(scored((NULL, said)), "false claims on nulls").value == 1
     listed = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depends_on": ["position_1"]}])
     assert measured(scored((OUTSIDE, listed)), "unknown on effects outside").value == 1
@@ -129,7 +135,7 @@ def test_gap_closed_is_taken_from_the_verdict_where_nothing_was_predicted() -> N
 
 def test_detection_curve_sorts_by_size() -> None:
     small, large = truth(effect("coulomb_friction", 2, 0.7)), truth(effect("coulomb_friction", 2, 12.0))
-    curve = detection(scored((small, verdict()), (large, perfect(large))), "clean")
+    curve = detection_table(scored((small, verdict()), (large, perfect(large))), "clean")
     first = curve[curve["name"] == "named_first"].set_index("from")["value"]
     assert first[0.5] == 0
     assert first[10.0] == 1
@@ -137,18 +143,18 @@ def test_detection_curve_sorts_by_size() -> None:
 
 def test_names_by_effect_count_hidden_found_and_wrongly_claimed() -> None:
     wrong = verdict("mismatch", (finding("backlash", 3),))
-    table = by_effect(scored((COULOMB, perfect(COULOMB)), (COULOMB, wrong)), "clean").set_index("effect")
+    table = effect_table(scored((COULOMB, perfect(COULOMB)), (COULOMB, wrong)), "clean").set_index("effect")
     assert table.loc["coulomb_friction", ["above", "first"]].tolist() == [2, 1]
     assert table.loc["backlash", "wrong_claims"] == 1
 
 
 def test_wilson_intervals_are_those_of_the_textbook() -> None:
-    assert wilson(0, 100) == pytest.approx((0.0, 0.036995), abs=1e-5)  # Newcombe 1998, method 3
-    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)  # Newcombe 1998, table I
+    assert wilson_interval(0, 100) == pytest.approx((0.0, 0.036995), abs=1e-5)  # Newcombe 1998, method 3
+    assert wilson_interval(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)  # Newcombe 1998, table I
 
 
 def test_rows_of_no_case_keep_their_columns() -> None:
-    empty = rows([])
+    empty = make_rows([])
     assert isinstance(empty.effects, pd.DataFrame)
     assert "multiple" in empty.effects
     assert not len(empty.claims)

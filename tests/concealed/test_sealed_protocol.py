@@ -10,17 +10,23 @@ import yaml
 from click.testing import CliRunner
 from made_verdicts import perfect, verdict, write
 
-from concealed.cli import conceal as conceal_command
-from concealed.cli import score as score_command
-from concealed.manifest import NAME, checked_manifest, digest
-from concealed.noise import JUDGED, USUAL
-from concealed.plan import DEVELOPMENT_SEEDS, SMALLEST, draw_plan, target_multiple
-from concealed.prove import diagnose_all, judged_seed
-from concealed.score.command import score
-from concealed.score.reading import FAILED
-from concealed.sets import SetSettings, conceal, settings_for
-from problem.errors import InputError
-from recordings.load import load_recording
+from armlab.cli.proof import conceal as conceal_command
+from armlab.cli.proof import score as score_command
+from armlab.common.errors import InputError
+from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, MIN_MULTIPLE, draw_plan, target_multiple
+from armlab.concealed.prove import diagnose_all, judged_seed
+from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.scoring import score_set
+from armlab.concealed.sets import (
+    MANIFEST_FILE,
+    SetSettings,
+    conceal_set,
+    file_digest,
+    make_set_settings,
+    read_checked_manifest,
+)
+from armlab.recordings.load import load_recording
 
 SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
 
@@ -28,7 +34,7 @@ SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("concealed") / "set"
-    list(conceal(SETTINGS, folder, 1))
+    list(conceal_set(SETTINGS, folder, 1))
     return folder
 
 
@@ -44,21 +50,21 @@ def _verdicts(folder: Path, out: Path) -> Path:
 
 
 def test_a_set_is_the_same_to_the_byte_for_one_and_two_jobs(made: Path, tmp_path: Path) -> None:
-    list(conceal(SETTINGS, tmp_path / "again", 2))
-    assert digest(tmp_path / "again" / NAME) == digest(made / NAME)
+    list(conceal_set(SETTINGS, tmp_path / "again", 2))
+    assert file_digest(tmp_path / "again" / MANIFEST_FILE) == file_digest(made / MANIFEST_FILE)
 
 
 def test_an_interrupted_set_goes_on_where_it_stopped(copy: Path) -> None:
-    sealed = digest(copy / NAME)
+    sealed = file_digest(copy / MANIFEST_FILE)
     lost = sorted((copy / "observations").iterdir())[0]
     shutil.rmtree(lost)
-    assert list(conceal(SETTINGS, copy, 1)) == [lost.name]
-    assert digest(copy / NAME) == sealed
+    assert list(conceal_set(SETTINGS, copy, 1)) == [lost.name]
+    assert file_digest(copy / MANIFEST_FILE) == sealed
 
 
 def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
     with pytest.raises(InputError, match="holds another concealed set"):
-        list(conceal(SetSettings(3, 1006), copy, 1))
+        list(conceal_set(SetSettings(3, 1006), copy, 1))
 
 
 @pytest.mark.parametrize("part", ["truth", "observations"])
@@ -66,22 +72,22 @@ def test_a_file_changed_after_sealing_is_refused(copy: Path, tmp_path: Path, par
     file = next(path for path in sorted((copy / part).rglob("*")) if path.suffix in (".json", ".yaml"))
     file.write_text(file.read_text() + " ")
     with pytest.raises(InputError, match="was changed after"):
-        score(copy, _verdicts(copy, tmp_path / "v"), None, tmp_path / "out")
+        score_set(copy, _verdicts(copy, tmp_path / "v"), None, tmp_path / "out")
 
 
 def test_a_manifest_made_anew_is_refused_by_its_printed_hash(copy: Path) -> None:
-    sealed = digest(copy / NAME)
-    (copy / NAME).write_text((copy / NAME).read_text().replace('"seed": 1005', '"seed": 1006'))
+    sealed = file_digest(copy / MANIFEST_FILE)
+    (copy / MANIFEST_FILE).write_text((copy / MANIFEST_FILE).read_text().replace('"seed": 1005', '"seed": 1006'))
     with pytest.raises(InputError, match="is not the manifest that was sealed"):
-        checked_manifest(copy, sealed)
+        read_checked_manifest(copy, sealed)
 
 
 def test_conceal_prints_the_hash_and_score_takes_it(made: Path, tmp_path: Path) -> None:
     arguments = ["--cases", "3", "--seed", "1005", "--development", "--out", str(made)]
     printed = CliRunner().invoke(conceal_command, arguments)
-    assert digest(made / NAME) in printed.output
+    assert file_digest(made / MANIFEST_FILE) in printed.output
     verdicts = _verdicts(made, tmp_path / "v")
-    told = [str(made), "--verdicts", str(verdicts), "--manifest", digest(made / NAME)]
+    told = [str(made), "--verdicts", str(verdicts), "--manifest", file_digest(made / MANIFEST_FILE)]
     scored = CliRunner().invoke(score_command, told)
     assert scored.exit_code == 0, scored.output
     assert (verdicts / "score" / "score.json").is_file()
@@ -109,18 +115,18 @@ def test_the_robot_file_holds_the_nominal_links_and_not_the_true_ones(made: Path
 
 def test_development_never_draws_the_noise_of_judged_nulls() -> None:
     kinds = {draw_plan(1000, index, "clean", True, True).noise.kind for index in range(150)}
-    assert kinds == set(USUAL)
+    assert kinds == set(USUAL_KINDS)
 
 
 def test_half_of_the_judged_nulls_have_noise_that_development_never_saw() -> None:
     kinds = [draw_plan(77, index, "realistic", True, False).noise.kind for index in range(300)]
-    assert 0.4 < np.mean([kind in JUDGED for kind in kinds]) < 0.6
-    assert set(JUDGED) < set(kinds)
+    assert 0.4 < np.mean([kind in JUDGED_KINDS for kind in kinds]) < 0.6
+    assert set(JUDGED_KINDS) < set(kinds)
 
 
 def test_development_seeds_are_marked_whatever_was_asked() -> None:
-    assert settings_for(1, 1500, "both", "mixed", False).development
-    assert not settings_for(1, 5, "both", "mixed", False).development
+    assert make_set_settings(1, 1500, "both", "mixed", False).development
+    assert not make_set_settings(1, 5, "both", "mixed", False).development
 
 
 def test_a_judged_seed_follows_from_the_commit_and_is_no_development_seed() -> None:
@@ -132,7 +138,7 @@ def test_a_judged_seed_follows_from_the_commit_and_is_no_development_seed() -> N
 
 def test_sizes_spread_evenly_from_half_a_limit_to_twenty() -> None:
     sizes = [target_multiple(draw_plan(1000, index, "clean", False, True), 0) for index in range(60)]
-    assert SMALLEST <= min(sizes) < 0.6
+    assert MIN_MULTIPLE <= min(sizes) < 0.6
     assert 17 < max(sizes) <= 20
     counts, _ = np.histogram(np.log(sizes), bins=6, range=(np.log(0.5), np.log(20)))
     assert counts.min() >= 8
@@ -146,18 +152,18 @@ def test_realistic_links_are_three_to_ten_per_cent_off() -> None:
 
 
 def test_a_diagnosis_that_fails_is_kept_as_failed(made: Path, tmp_path: Path) -> None:
-    case = json.loads((made / NAME).read_text())["cases"][0]
+    case = json.loads((made / MANIFEST_FILE).read_text())["cases"][0]
     (tmp_path / "nothing" / "observations" / case).mkdir(parents=True)
     assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == [case]
-    assert (tmp_path / "v" / case / FAILED).is_file()
+    assert (tmp_path / "v" / case / FAILURE_FILE).is_file()
     assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == []
 
 
 def test_missing_and_broken_verdicts_count_against_and_stop_nothing(made: Path, tmp_path: Path) -> None:
-    cases = json.loads((made / NAME).read_text())["cases"]
+    cases = json.loads((made / MANIFEST_FILE).read_text())["cases"]
     write(tmp_path / "v", cases[0], verdict())
     write(tmp_path / "v", cases[1], "{ no json")
-    found = score(made, tmp_path / "v", None, tmp_path / "out")
+    found = score_set(made, tmp_path / "v", None, tmp_path / "out")
     counted = {
         tier: next(each for each in measures if each["name"] == "missing or invalid verdicts")
         for tier, measures in found["tiers"].items()
@@ -167,4 +173,4 @@ def test_missing_and_broken_verdicts_count_against_and_stop_nothing(made: Path, 
 
 def test_no_verdict_at_all_is_refused(made: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="holds no valid verdict"):
-        score(made, tmp_path / "v", None, tmp_path / "out")
+        score_set(made, tmp_path / "v", None, tmp_path / "out")

@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from hidden_cases import plan
 
-from concealed import passes
-from concealed.effects.drives import Backlash, Elasticity
-from concealed.effects.hidden import Hidden
-from concealed.passes import corrected
-from concealed.plan import Plan
-from concealed.play import play, thinned, wanted_track
-from concealed.simulate import Controller, draw_controller
-from concealed.sizing import Sized, multiples, next_size
-from concealed.track import Track
+from armlab.concealed import sizing
+from armlab.concealed.effects.drives import Backlash, Elasticity
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.engine import Track
+from armlab.concealed.plan import Plan
+from armlab.concealed.simulate import Controller, coarse_track, draw_controller, reference_track, simulate_runs
+from armlab.concealed.sizing import SizedEffects, correct_sizes, effect_multiples, next_size
 
 GAP = Backlash(1, 1e-3, 2e-2, "gap", {"hz": 80.0, "stiffness": 2e4})
 
@@ -24,29 +22,29 @@ class Coarse:
     """A case with one effect, as it was played coarsely for the first time."""
 
     plan: Plan
-    hidden: Hidden
+    hidden: HiddenEffect
     controller: Controller
     wanted: list[Track]
     tracks: tuple[Track, ...]
 
-    def corrected(self, target: float) -> tuple[Hidden, tuple[Track, ...]]:
-        sized = Sized((self.hidden,), (target,))
-        sized, tracks = corrected(self.plan, sized, self.controller, self.wanted, self.tracks)
+    def corrected(self, target: float) -> tuple[HiddenEffect, tuple[Track, ...]]:
+        sized = SizedEffects((self.hidden,), (target,))
+        sized, tracks = correct_sizes(self.plan, sized, self.controller, self.wanted, self.tracks)
         return sized.hidden[0], tracks
 
 
-def coarse(hidden: Hidden) -> Coarse:
+def coarse(hidden: HiddenEffect) -> Coarse:
     made = plan()
     controller = draw_controller(made.stream("controller"), made.machine.arm)
-    wanted = [wanted_track(made, number, run) for number, run in enumerate(made.runs)]
-    tracks = play(made, (hidden,), controller, wanted, [thinned(track) for track in wanted])
+    wanted = [reference_track(made, number, run) for number, run in enumerate(made.runs)]
+    tracks = simulate_runs(made, (hidden,), controller, wanted, [coarse_track(track) for track in wanted])
     return Coarse(made, hidden, controller, wanted, tracks)
 
 
 def test_a_gap_whose_torque_does_not_grow_in_proportion_meets_its_aim() -> None:
     first = coarse(GAP)
     gap, tracks = first.corrected(6.0)
-    assert multiples(first.plan, (gap,), tracks)[0] == pytest.approx(6.0, rel=0.15)
+    assert effect_multiples(first.plan, (gap,), tracks)[0] == pytest.approx(6.0, rel=0.15)
 
 
 def test_a_spring_that_cannot_be_as_soft_stays_at_its_bound() -> None:
@@ -59,7 +57,7 @@ def test_where_the_engine_cannot_follow_the_nearest_so_far_is_taken(monkeypatch:
         raise FloatingPointError("the simulated arm runs away")
 
     first = coarse(GAP)
-    monkeypatch.setattr(passes, "play", runs_away)
+    monkeypatch.setattr(sizing, "simulate_runs", runs_away)
     gap, tracks = first.corrected(1.0)
     assert gap == GAP
     assert tracks is first.tracks

@@ -7,10 +7,10 @@ from random_arms import random_arm
 
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.library import BUILT_IN
+from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
-from recordings.run import Array
 
 RATE_HZ = 500.0
 HARMONICS = 2 * np.pi * 0.2 * np.arange(1, 5)

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.recordings.recording import Array, Recording, Role, Run, Transmission
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
-from recordings.recording import Recording, Transmission
-from recordings.run import Array, Role, Run
 
 RATE_HZ = 200.0
 NOISE = 0.05  # N m

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 import yaml
 
-from diagnosis.next.preset import RivalSettings, TellApartSettings
-from diagnosis.next.problem import TellApartProblem
-from problem.robot_file import BUILT_IN
-from recordings.run import Array
+from armlab.diagnosis.next.problem import RivalSettings, TellApartProblem, TellApartSettings
+from armlab.recordings.recording import Array
+from problem.robot_file import BUILT_IN_FOLDER
 
 VISCOUS: dict[str, Any] = {"effect": "viscous_friction", "joint": 2, "parameters": {"coefficient": 0.3}}
 LATE = {"effect": "time_delay", "joint": None}
@@ -20,12 +19,14 @@ def verdict_file(folder: Path, *findings: dict[str, Any], joints: int = 3) -> Pa
     """A verdict/1 with findings of an effect, a joint, parameters and rivals."""
     whole = [
         {
-            "effect": each["effect"], "joint": each["joint"], "joints": [each["joint"]] if each["joint"] else [],
+            "effect": each["effect"],
+            "joint": each["joint"],
+            "joints": [each["joint"]] if each["joint"] else [],
             "parameters": {n: {"value": v, "ci95": None, "unit": ""} for n, v in each["parameters"].items()},
             "rivals": each.get("rivals", []),
         }
         for each in findings
-    ]  # fmt: skip
+    ]
     fit = [{"joint": joint + 1, "noise_floor": 0.05} for joint in range(joints)]
     path = folder / "verdict.json"
     path.write_text(json.dumps({"schema": "verdict/1", "status": "mismatch", "findings": whole, "fit": fit}))
@@ -34,7 +35,7 @@ def verdict_file(folder: Path, *findings: dict[str, Any], joints: int = 3) -> Pa
 
 def robot_file(folder: Path, **limits: float) -> Path:
     """The three-joint arm with limits of speed and acceleration."""
-    data = yaml.safe_load((BUILT_IN / "irb120-arm.yaml").read_text())
+    data = yaml.safe_load((BUILT_IN_FOLDER / "irb120-arm.yaml").read_text())
     for joint in data["joints"]:
         joint.update({"velocity_limit": 2.0, "acceleration_limit": 10.0, **limits})
     path = folder / "robot.yaml"

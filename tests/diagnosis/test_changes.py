@@ -12,15 +12,14 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
+from armlab.cli.main import main
+from armlab.diagnosis.compare.comparison import Comparison, compare
+from armlab.diagnosis.compare.report import comparison_content, comparison_lines, comparison_sentences
+from armlab.diagnosis.compare.structure import Change, holm_correction, predict_torque
 from armlab.effects.contract import Scene
-from bench.cli import main
-from diagnosis.compare.changes import Change, holm
-from diagnosis.compare.compare import Comparison, compare
-from diagnosis.compare.structure import predicted
-from diagnosis.compare.tell import as_json, sentences, terminal_lines
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Recording
 from problem.regressor import rigid_body_torque
-from recordings.load import load_recording
-from recordings.recording import Recording
 
 LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
 
@@ -49,7 +48,7 @@ def test_two_recordings_of_an_unchanged_robot_are_the_same() -> None:
     found = comparison("same")
     assert found.status == "same"
     assert changed(found) == []
-    assert sentences(found)[0] == "Nothing changed between cold and again that the recordings show."
+    assert comparison_sentences(found)[0] == "Nothing changed between cold and again that the recordings show."
 
 
 def test_friction_that_fell_is_found_although_friction_itself_cannot_be_negative() -> None:
@@ -85,7 +84,7 @@ def test_the_old_model_predicts_its_own_robot() -> None:
     time = np.arange(800) / 200
     motion = motion_at(time, 77)
     zero = np.zeros(motion.position.shape)
-    torque = predicted(old, Scene("run", time, motion, ARM, ARM.parameters, zero))
+    torque = predict_torque(old, Scene("run", time, motion, ARM, ARM.parameters, zero))
     truth = rigid_body_torque(ARM, motion) + np.array(VISCOUS) * motion.velocity
     truth += np.array([1.0, 1.5, 0.7]) * np.sign(motion.velocity)
     assert np.all(np.sqrt(np.mean((torque - truth) ** 2, axis=0)) < 0.1)
@@ -103,22 +102,22 @@ def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path)
     short = load_recording(recording_in(tmp_path / "short", frame(0, 0.8), frame(1, 0.8)))
     found = compare(recording("cold", 0), short)
     assert found.status == "inconclusive"
-    assert "too short" in " ".join(sentences(found))
+    assert "too short" in " ".join(comparison_sentences(found))
 
 
 def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
-    content = json.loads(json.dumps(as_json(comparison("warm")), allow_nan=False))
+    content = json.loads(json.dumps(comparison_content(comparison("warm")), allow_nan=False))
     assert content["schema"] == "comparison/1"
     assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient"]
     assert content["against"]["status"] == "mismatch"
-    text = " ".join(terminal_lines(comparison("warm")))
+    text = " ".join(comparison_lines(comparison("warm")))
     assert "viscous friction at joint 2" in text
-    assert max(map(len, terminal_lines(comparison("warm")))) < 180
+    assert max(map(len, comparison_lines(comparison("warm")))) < 180
 
 
 def test_holm_multiplies_the_smallest_by_all_and_keeps_the_order() -> None:
-    assert_allclose(holm(np.array([0.04, 0.01, 0.5])), [0.08, 0.03, 0.5])
-    assert_allclose(holm(np.array([0.02, 0.01])), [0.02, 0.02])
+    assert_allclose(holm_correction(np.array([0.04, 0.01, 0.5])), [0.08, 0.03, 0.5])
+    assert_allclose(holm_correction(np.array([0.02, 0.01])), [0.02, 0.02])
 
 
 def test_the_command_writes_page_and_json(tmp_path: Path) -> None:

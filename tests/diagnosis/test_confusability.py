@@ -12,23 +12,22 @@ from numpy.testing import assert_allclose
 from refusals import refusal
 from told_recordings import ARM, frame, motion_at, recording_in
 
+from armlab.cli.main import main
+from armlab.diagnosis.confusability.card import Card, Entry, PlannedMotion, confusability_card, read_planned_motions
+from armlab.diagnosis.confusability.report import card_content, card_csv, card_lines, card_markdown
 from armlab.effects.library import library
-from bench.cli import main
-from diagnosis.confusability.card import Card, Entry, confusability
-from diagnosis.confusability.planned import Planned, planned_motions
-from diagnosis.confusability.tables import as_csv, as_json, markdown, terminal_lines
 
 RECORDS = Path(__file__).parents[2] / "results" / "best_known.json"
 
 
-def planned(seconds: float = 10.0, seed: int = 0) -> Planned:
+def planned(seconds: float = 10.0, seed: int = 0) -> PlannedMotion:
     time = np.arange(round(seconds * 200)) / 200
-    return Planned("motion", time, motion_at(time, seed))
+    return PlannedMotion("motion", time, motion_at(time, seed))
 
 
 @pytest.fixture(scope="module")
 def card() -> Card:
-    return confusability(ARM, (planned(),), library())
+    return confusability_card(ARM, (planned(),), library())
 
 
 def entry(card: Card, effect: str, joint: int | None = None, form: str = "") -> Entry:
@@ -68,57 +67,57 @@ def test_one_constant_speed_cannot_tell_coulomb_from_viscous_friction() -> None:
     speed = np.tanh(40 * np.sin(np.pi * time / 2))[:, None] * np.array([0.4, 0.3, 0.2])
     position = np.cumsum(speed, axis=0) / 200
     swinging = planned(20.0)
-    slow = Planned("square", time, type(swinging.motion)(position, speed, np.gradient(speed, time, axis=0)))
-    found = confusability(ARM, (slow,), library())
+    slow = PlannedMotion("square", time, type(swinging.motion)(position, speed, np.gradient(speed, time, axis=0)))
+    found = confusability_card(ARM, (slow,), library())
     assert ("viscous_friction", 2) in rivals(found, entry(found, "coulomb_friction", 2), "nominal")
-    rich = confusability(ARM, (swinging,), library())
+    rich = confusability_card(ARM, (swinging,), library())
     assert ("viscous_friction", 2) not in rivals(rich, entry(rich, "coulomb_friction", 2), "nominal")
 
 
 def test_twice_the_time_shows_effects_that_are_smaller_by_the_root_of_two(card: Card) -> None:
-    twice = confusability(ARM, (planned(20.0),), library())
+    twice = confusability_card(ARM, (planned(20.0),), library())
     sizes = [entry(each, "coulomb_friction", 2).shows_from["nominal"] for each in (card, twice)]
     assert sizes[0] / sizes[1] == pytest.approx(np.sqrt(2), rel=0.01)
 
 
 def test_noise_sets_how_the_joints_are_weighed(card: Card) -> None:
-    noisy = confusability(ARM, (planned(),), library(), np.array([0.1, 10.0, 0.1]))
+    noisy = confusability_card(ARM, (planned(),), library(), np.array([0.1, 10.0, 0.1]))
     assert_allclose(noisy.noise, [0.1, 10.0, 0.1])
     assert not np.allclose(noisy.cosines["nominal"], card.cosines["nominal"])
 
 
 def test_tables_tell_the_same_as_the_card(card: Card) -> None:
-    content = as_json(card)
+    content = card_content(card)
     json.dumps(content, allow_nan=False)
     assert len(content["effects"]) == len(card.entries)
-    rows = list(csv.DictReader(io.StringIO(as_csv(card))))
+    rows = list(csv.DictReader(io.StringIO(card_csv(card))))
     told = {(row["effect"], row["joint"], row["rival"]) for row in rows if row["view"] == "nominal" and row["rival"]}
     assert len(told) == len({(e.effect, e.joint, r.index) for e in card.entries for r in e.rivals["nominal"]})
-    assert markdown(card).count("\n| ") == 2 * (len(card.entries) + 1)
-    assert any("a refit hides" in line and "rotor_inertia 1" in line for line in terminal_lines(card))
+    assert card_markdown(card).count("\n| ") == 2 * (len(card.entries) + 1)
+    assert any("a refit hides" in line and "rotor_inertia 1" in line for line in card_lines(card))
 
 
 def test_a_motion_comes_from_a_csv_a_recording_or_a_known_trajectory(tmp_path: Path) -> None:
     folder = recording_in(tmp_path / "recording", frame(0, 4), frame(1, 4))
-    assert [each.name for each in planned_motions(str(folder), ARM)] == ["run-0.csv", "run-1.csv"]
+    assert [each.name for each in read_planned_motions(str(folder), ARM)] == ["run-0.csv", "run-1.csv"]
     table = frame(0, 4)[["t", "q1", "q2", "q3"]][::5]
     table.to_csv(tmp_path / "plan.csv", index=False)
-    (own,) = planned_motions(str(tmp_path / "plan.csv"), ARM)
+    (own,) = read_planned_motions(str(tmp_path / "plan.csv"), ARM)
     exact = motion_at(own.time, 0)
     assert own.rate_hz == pytest.approx(250, rel=1e-3)
     assert_allclose(own.motion.acceleration[50:-50], exact.acceleration[50:-50], atol=2e-3)
-    (known,) = planned_motions("joint-fourier-rest", ARM, RECORDS)
+    (known,) = read_planned_motions("joint-fourier-rest", ARM, RECORDS)
     assert known.motion.joints == 3
 
 
 def test_what_is_no_motion_of_this_arm_is_refused_in_one_line(tmp_path: Path) -> None:
-    assert "is no CSV file, no recording folder" in refusal(planned_motions, "nowhere", ARM, RECORDS)
+    assert "is no CSV file, no recording folder" in refusal(read_planned_motions, "nowhere", ARM, RECORDS)
     (tmp_path / "plan.csv").write_text("t,q1\n0,0\n1,1\n")
-    assert "no column 'q2'" in refusal(planned_motions, str(tmp_path / "plan.csv"), ARM)
+    assert "no column 'q2'" in refusal(read_planned_motions, str(tmp_path / "plan.csv"), ARM)
     frame(0, 4)[["t", "q1", "q2", "q3"]][::-1].to_csv(tmp_path / "back.csv", index=False)
-    assert "with t increasing" in refusal(planned_motions, str(tmp_path / "back.csv"), ARM)
+    assert "with t increasing" in refusal(read_planned_motions, str(tmp_path / "back.csv"), ARM)
     folder = recording_in(tmp_path / "recording", frame(0, 4), frame(1, 4))
-    assert "moves 3 joints" in refusal(planned_motions, str(folder), ARM.first(2))
+    assert "moves 3 joints" in refusal(read_planned_motions, str(folder), ARM.first(2))
 
 
 def test_the_command_writes_page_tables_and_pictures(tmp_path: Path) -> None:

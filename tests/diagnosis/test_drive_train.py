@@ -13,8 +13,8 @@ from scipy.interpolate import make_interp_spline
 from armlab.effects.contract import Scene
 from armlab.effects.sensitivity import directional_derivative
 from armlab.effects.transmission import WALL_HZ, Backlash, JointElasticity, Twist, felt_inertia, integrate_twist
+from armlab.recordings.recording import Array
 from problem.motion import Motion
-from recordings.run import Array
 
 JOINT = 1
 FINER = 8  # instants a sample: an impact is shorter than one

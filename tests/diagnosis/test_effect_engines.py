@@ -10,10 +10,10 @@ from engines import inverse_dynamics, mujoco_model
 from random_arms import random_arm
 
 from armlab.effects.contract import Scene
+from armlab.recordings.recording import Array
 from problem.arm import Arm, Link
 from problem.inertia import link_from_centre_of_mass
 from problem.transforms import rotation_x, translation
-from recordings.run import Array
 
 MUJOCO = 1e-5  # N m: MuJoCo's text and its own arithmetic
 KINDS = ("RRR", "RPR")

@@ -12,7 +12,7 @@ from scipy.interpolate import make_interp_spline
 from armlab.effects.coupling import neighbour_pairs
 from armlab.effects.friction import direction_of_motion
 from armlab.effects.memory import HeatedFriction, ThermometerFriction, ViscousDrift, dahl_state
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 
 def integrated(time: Array, position: Array, way: float) -> Array:

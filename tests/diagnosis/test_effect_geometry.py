@@ -10,10 +10,10 @@ from effect_scenes import scene_of, waves
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.library import BUILT_IN
 from armlab.effects.separability import Confusion, base_rows, candidate_rows, compute_confusion
+from armlab.recordings.filters import Butterworth
+from armlab.recordings.recording import Array
 from problem.base_parameters import base_parameters
 from problem.robot_file import load_arm
-from recordings.filters import Butterworth
-from recordings.run import Array
 
 
 @lru_cache(maxsize=1)

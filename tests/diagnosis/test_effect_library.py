@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from effect_scenes import family, scene, torque_of
 
+from armlab.effects import extras
 from armlab.effects.contract import Candidate, Family, Scene
+from armlab.effects.extras import BrokenEffectError
 from armlab.effects.friction import CoulombFriction
 from armlab.effects.library import BUILT_IN, library
 from armlab.effects.term import EveryJoint, Term
-from identification import extras
-from identification.extras import BrokenEffectError
+from armlab.recordings.vocabulary import EFFECT_IDS, effect_named
 from problem.arm import PARAMETER_NAMES
-from recordings.vocabulary import EFFECT_IDS, effect_named
 
 KINDS = ("RRR", "P", "PRR")
 BEYOND = {
@@ -104,8 +104,11 @@ def test_reshaped_candidates_keep_their_place_and_take_the_shape(kinds: str) -> 
         other = each.with_shape(middle)
         assert len(each.shape) == len(each.bounds), each
         assert (other.effect, other.joint, other.joints, other.rows) == (
-            each.effect, each.joint, each.joints, each.rows,
-        )  # fmt: skip
+            each.effect,
+            each.joint,
+            each.joints,
+            each.rows,
+        )
         assert len(other.shape) == len(middle)
         assert each.shape == () or other.shape != each.shape
 

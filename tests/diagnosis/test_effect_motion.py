@@ -9,11 +9,11 @@ from engines import pinocchio_model
 from random_arms import random_arm
 from scipy.interpolate import make_interp_spline
 
+from armlab.concealed.effects.channels import EncoderOffset as HiddenOffset
 from armlab.effects.contract import Scene
-from concealed.effects.channels import EncoderOffset as HiddenOffset
+from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
-from recordings.run import Array
 
 INNER = slice(40, -40)
 

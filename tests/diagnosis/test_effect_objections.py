@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from effect_scenes import candidate, scene
 
+from armlab.recordings.recording import Array
 from problem.inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
-from recordings.run import Array
 
 WRONG: list[tuple[str, str, int | None, list[float], str]] = [
     ("coulomb_friction", "", 1, [-1.0], "level"),

@@ -7,7 +7,7 @@ import pytest
 from effect_scenes import family, scene
 
 from armlab.effects.contract import Candidate, Scene
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 
 def scanned(effect: str, residual: Callable[[Scene], Array], joint: int) -> list[Candidate]:

@@ -13,10 +13,10 @@ import yaml
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.verdict_files import verdict_content, write_verdict
-from identification.identifier import Identifier
+from armlab.identification.identifier import Identifier
+from armlab.recordings.recording import Array
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from recordings.run import Array
 
 SLIGHT = 0.006  # N m s/rad: some ten standard errors of noise
 SCHEMAS = Path(__file__).parents[1] / "schemas"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from armlab.diagnosis.location import period_scatter
-from recordings.differentiate import differentiate
-from recordings.filters import Butterworth
-from recordings.run import Array, Run
+from armlab.recordings.differentiate import differentiate
+from armlab.recordings.filters import Butterworth
+from armlab.recordings.recording import Array, Run
 
 
 def run_of(position: Array, torque: Array, time: Array) -> Run:

@@ -7,9 +7,9 @@ import yaml
 from told_recordings import frame, recording_in
 
 from armlab.diagnosis.diagnose import diagnose
-from diagnosis.command import diagnose_recording
-from identification.model_file import read_model
-from recordings.load import load_recording
+from armlab.diagnosis.report.write import diagnose_recording
+from armlab.identification.model_file import read_model
+from armlab.recordings.load import load_recording
 
 
 @pytest.mark.parametrize("sampled", [False, True])

@@ -3,11 +3,11 @@
 import engine_cases as cases
 import pytest
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.ablation import ALL_ON, GUARDS_AFTER_SEARCH, GUARDS_IN_SEARCH, diagnose_without_each
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import GUARDS, Guards, Settings, guards_without
-from problem.errors import InputError
 
 
 def test_a_guard_that_is_named_is_off_and_all_others_are_on() -> None:

@@ -10,7 +10,7 @@ from armlab.diagnosis.data import Observed, Segment
 from armlab.diagnosis.evidence import Evidence, reason_no_contact
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import is_form_error, names_contradicted_by_residual
-from recordings.run import Array
+from armlab.recordings.recording import Array
 
 
 def _evidence(gain: float, joint: int = 1, usual: bool = False) -> Evidence:

@@ -9,8 +9,8 @@ import yaml
 from click.testing import CliRunner
 from next_questions import LATE, verdict_file
 
-from bench.cli import main
-from problem.robot_file import BUILT_IN
+from armlab.cli.main import main
+from problem.robot_file import BUILT_IN_FOLDER
 
 QUICK = ["--evaluations", "60", "--duration", "3", "--harmonics", "4", "--rate", "50"]
 BODY = {"mass": 3.0, "first_moment": [0.0, 0.0, 0.3], "inertia": [0.05, 0.05, 0.02, 0.0, 0.0, 0.0]}
@@ -18,7 +18,7 @@ BODY = {"mass": 3.0, "first_moment": [0.0, 0.0, 0.3], "inertia": [0.05, 0.05, 0.
 
 def six_joints() -> dict[str, object]:
     """The whole arm with moderate limits."""
-    data: dict[str, list[dict[str, object]]] = yaml.safe_load((BUILT_IN / "irb120.yaml").read_text())
+    data: dict[str, list[dict[str, object]]] = yaml.safe_load((BUILT_IN_FOLDER / "irb120.yaml").read_text())
     for joint in data["joints"]:
         joint.update({"velocity_limit": 2.0, "acceleration_limit": 10.0})
     return dict(data)

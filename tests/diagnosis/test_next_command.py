@@ -11,7 +11,7 @@ import yaml
 from click.testing import CliRunner, Result
 from next_questions import LATE, VISCOUS, robot_file, verdict_file
 
-from bench.cli import main
+from armlab.cli.main import main
 
 QUICK = ["--evaluations", "60", "--duration", "4", "--harmonics", "4", "--rate", "100"]
 ROTOR: dict[str, Any] = {"effect": "rotor_inertia", "joint": 1, "parameters": {"inertia": 0.05}}

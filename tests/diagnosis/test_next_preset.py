@@ -5,11 +5,11 @@ import pytest
 from next_questions import points, told_apart
 from refusals import refusal
 
-from diagnosis.next.design import Budget, random_point, searched
-from diagnosis.next.preset import RivalSettings, TellApartSettings
+from armlab.common.settings import validate
+from armlab.diagnosis.next.motion import Budget, random_point, search_motion
+from armlab.diagnosis.next.problem import RivalSettings, TellApartSettings
 from problem.contract_suite import ProblemContract
-from problem.frame import ShiftedProblem
-from problem.settings import validate
+from problem.excitation import ShiftedProblem
 
 
 class TestTellApart(ProblemContract):
@@ -45,9 +45,9 @@ def test_registered_algorithms_find_motions_that_tell_more_than_random_ones(algo
     problem = told_apart()
     budget = Budget(4.0, 4, algorithm, 250, seed=3)
     others = [problem.strength(random_point(problem, Budget(seed=seed))) for seed in range(12)]
-    assert problem.strength(searched(problem, budget)) > np.median(others)
+    assert problem.strength(search_motion(problem, budget)) > np.median(others)
 
 
 def test_an_unknown_algorithm_is_refused_with_the_nearest_name() -> None:
-    message = refusal(searched, told_apart(), Budget(4.0, 4, "mupsi", 100))
+    message = refusal(search_motion, told_apart(), Budget(4.0, 4, "mupsi", 100))
     assert "did you mean 'mupso'" in message

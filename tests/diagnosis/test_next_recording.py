@@ -8,17 +8,16 @@ import pytest
 from engine_cases import NOISE, of_runs, recording, run
 from next_questions import verdict_file
 
-from diagnosis.next.design import Budget, excitation, limits_in_force, random_point
-from diagnosis.next.experiment import groups_of, ready
-from diagnosis.next.prepare import Prepared
-from diagnosis.next.problem import tell_apart_problem
-from diagnosis.next.question import Name
-from diagnosis.next.verdict_file import read_verdict
+from armlab.diagnosis.next.experiment import choose_rival_groups, prepare_experiment
+from armlab.diagnosis.next.motion import Budget, build_excitation_problem, limits_in_force, random_point
+from armlab.diagnosis.next.prepare import PreparedQuestions
+from armlab.diagnosis.next.problem import tell_apart_problem
+from armlab.diagnosis.next.question import Name
+from armlab.diagnosis.next.verdict_file import read_verdict
+from armlab.recordings.recording import Array, Recording
 from problem.arm import Arm, Limits
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from recordings.recording import Recording
-from recordings.run import Array
 
 BUDGET = Budget(4.0, 4, evaluations=100)
 LOAD = {"effect": "load_dependent_friction", "joint": 2}
@@ -39,8 +38,8 @@ def limited() -> Arm:
     return replace(arm, joints=tuple(joints))
 
 
-def prepared(folder: Path, first: Recording | None) -> Prepared:
-    return ready(verdict_file(folder, LEVEL), limited(), first, None, BUDGET, "exact")[0]
+def prepared(folder: Path, first: Recording | None) -> PreparedQuestions:
+    return prepare_experiment(verdict_file(folder, LEVEL), limited(), first, None, BUDGET, "exact")[0]
 
 
 def test_the_noise_is_that_of_the_recording(tmp_path: Path) -> None:
@@ -61,7 +60,7 @@ def test_a_rival_has_the_size_that_fits_the_recording(tmp_path: Path) -> None:
 def test_what_is_known_already_adds_to_what_a_motion_shows(tmp_path: Path) -> None:
     first, arm = recording(level), limited()
     path = verdict_file(tmp_path, LEVEL)
-    known, plain = ready(path, arm, first, None, BUDGET, "exact")
+    known, plain = prepare_experiment(path, arm, first, None, BUDGET, "exact")
     question, problem = known.questions[0], tell_apart_problem(known, plain)
     point = random_point(plain, BUDGET)
     before = question.separation(known.before.gram, 0, 1)
@@ -84,7 +83,7 @@ def test_only_rows_from_which_a_diagnosis_learns_count_for_its_score(tmp_path: P
     found = prepared(tmp_path, recording(level))
     assert {each.role for each in recording(level).runs} == {"identify", "validate"}
     assert np.trace(found.before.gram) < 0.9 * np.trace(found.seen.gram)
-    assert found.counted == 1.0
+    assert found.learned_share == 1.0
 
 
 def test_rivals_count_by_how_well_they_fit_the_recording(tmp_path: Path) -> None:
@@ -95,7 +94,7 @@ def test_rivals_count_by_how_well_they_fit_the_recording(tmp_path: Path) -> None
 
 def test_sizes_are_drawn_about_the_fit_and_keep_the_laws_of_physics(tmp_path: Path) -> None:
     rival = prepared(tmp_path, recording(level)).questions[0].rivals[0]
-    (law, sizes), *_ = rival.possible
+    (law, sizes), *_ = rival.possible_sizes
     assert len(sizes) == 12
     assert law.candidate.effect == "coulomb_friction"
     assert sizes.mean() == pytest.approx(0.4, rel=0.1)
@@ -123,8 +122,8 @@ def near(folder: Path, size: float) -> set[Name]:
 
     found = {"effect": "coulomb_friction", "joint": 2, "parameters": {"level": size}}
     verdict, arm, first = read_verdict(verdict_file(folder, found)), limited(), recording(hidden, seconds=4.0)
-    plain = excitation(arm, limits_in_force(arm, first), BUDGET)
-    return set(groups_of(verdict, arm, plain, first, "library", "exact", BUDGET)[0])
+    plain = build_excitation_problem(arm, limits_in_force(arm, first), BUDGET)
+    return set(choose_rival_groups(verdict, arm, plain, first, "library", "exact", BUDGET)[0])
 
 
 def test_hysteresis_that_turns_over_at_once_comes_near_any_coulomb_friction(tmp_path: Path) -> None:

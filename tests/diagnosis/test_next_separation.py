@@ -8,19 +8,24 @@ from next_questions import points, told_apart
 from refusals import refusal
 
 from armlab.diagnosis.claims import MAX_DEFICIT
+from armlab.diagnosis.next.decision import (
+    decision_chances,
+    decision_strength,
+    judge_draws,
+    log_doubt,
+    required_lead,
+    usual_friction_gain,
+)
+from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
+from armlab.diagnosis.next.motion import fourier_within_limits
+from armlab.diagnosis.next.problem import RivalSettings, TellApartProblem, TellApartSettings
+from armlab.diagnosis.next.question import Law, Name, Question, Rival
+from armlab.diagnosis.next.remedies import find_remedies
+from armlab.diagnosis.next.sampling import kept_columns, white_noise_sampling
 from armlab.effects.friction import ViscousFriction
-from diagnosis.next.chances import chances, decided
-from diagnosis.next.deciding import gained, log_doubt, need, strength
-from diagnosis.next.moments import left_over, solved
-from diagnosis.next.preset import RivalSettings, TellApartSettings
-from diagnosis.next.problem import TellApartProblem
-from diagnosis.next.question import Law, Name, Question, Rival
-from diagnosis.next.remedies import remedies
-from diagnosis.next.sampling import kept_columns, white
-from diagnosis.next.within import fourier_within
+from armlab.recordings.recording import Array
 from problem.arm import Limits
 from problem.robot_file import load_arm
-from recordings.run import Array
 
 COULOMB = RivalSettings(effect="coulomb_friction", joint=2, parameters=(("level", 0.3),))
 STRIBECK = RivalSettings(
@@ -48,18 +53,18 @@ def separation(problem: TellApartProblem, point: Array) -> float:
 
 def test_what_an_orthogonal_column_cannot_explain_is_the_whole_signal() -> None:
     gram = np.diag([4.0, 9.0])
-    assert left_over(gram, np.array([0]), np.array([3.0]), np.array([1])) == pytest.approx(36.0)
+    assert unexplained_power(gram, np.array([0]), np.array([3.0]), np.array([1])) == pytest.approx(36.0)
 
 
 def test_what_an_equal_column_cannot_explain_is_nothing() -> None:
     column = np.array([[1.0, 2.0], [2.0, 4.0], [-1.0, -2.0]])
-    assert left_over(column.T @ column, np.array([0]), np.array([1.0]), np.array([1])) < 1e-6
+    assert unexplained_power(column.T @ column, np.array([0]), np.array([1.0]), np.array([1])) < 1e-6
 
 
 def test_coefficients_from_moments_are_those_of_least_squares() -> None:
     rng = np.random.default_rng(3)
     rows, torque = rng.normal(size=(50, 4)) * [1, 10, 100, 1000], rng.normal(size=50)
-    found = solved(rows.T @ rows, np.arange(4), rows.T @ torque)
+    found = solve_least_squares(rows.T @ rows, np.arange(4), rows.T @ torque)
     assert found == pytest.approx(np.linalg.lstsq(rows, torque)[0], rel=1e-6)
 
 
@@ -108,21 +113,21 @@ def test_farther_apart_is_stronger_and_a_pair_that_stays_alike_hides_nothing() -
     alike[0, 1] = alike[1, 0] = 15.99
     better = alike.copy()
     better[2, 2] = 36.0
-    assert strength((question,), better, 100) > strength((question,), alike, 100) + 0.05
-    assert strength((question,), 4 * alike, 100) > strength((question,), alike, 100)
+    assert decision_strength((question,), better, 100) > decision_strength((question,), alike, 100) + 0.05
+    assert decision_strength((question,), 4 * alike, 100) > decision_strength((question,), alike, 100)
 
 
 def test_a_special_law_of_friction_has_to_gain_on_held_out_data_too() -> None:
     problem = told_apart(STRIBECK, RivalSettings(effect="coulomb_friction", joint=2))
     special, usual = (rival.laws[0] for rival in problem.prepared.questions[0].rivals)
-    assert need(special, usual, 9000) == pytest.approx(0.5 * 0.03 * 3000)
-    assert need(usual, special, 9000) < MAX_DEFICIT
+    assert required_lead(special, usual, 9000) == pytest.approx(0.5 * 0.03 * 3000)
+    assert required_lead(usual, special, 9000) < MAX_DEFICIT
 
 
 def test_one_usual_term_more_explains_at_its_price() -> None:
     left, products = np.eye(3), np.array([[0.0], [5.0], [1.0]])
-    assert gained(products, left, np.array([1, 2]), 100) == pytest.approx([12.5 - 0.5 * np.log(100)])
-    assert gained(products, left, np.array([2]), 100) == pytest.approx([0.0])
+    assert usual_friction_gain(products, left, np.array([1, 2]), 100) == pytest.approx([12.5 - 0.5 * np.log(100)])
+    assert usual_friction_gain(products, left, np.array([2]), 100) == pytest.approx([0.0])
 
 
 def test_twice_the_effect_is_twice_as_far_apart() -> None:
@@ -152,8 +157,8 @@ def test_the_larger_of_two_nested_laws_is_measured_by_what_the_smaller_cannot_ex
     problem = told_apart(STRIBECK, smaller)
     question, point = problem.prepared.questions[0], points(problem, 1)[0]
     gram = problem.prepared.together(problem.moments(point).gram)
-    assert question.blind[1, 0]
-    assert not question.blind[0, 1]
+    assert question.inseparable[1, 0]
+    assert not question.inseparable[0, 1]
     assert question.separation(gram, 0, 1) == pytest.approx(np.sqrt(question.noncentrality(gram, 0, 1)))
 
 
@@ -163,12 +168,12 @@ def test_chances_are_those_of_noisy_rows_that_are_fitted_whole() -> None:
     problem = told_apart(level, load, links="exact")
     question, rng = problem.prepared.questions[0], np.random.default_rng(1)
     rows = rows_of(problem, points(problem, 1)[0])
-    found = chances(problem.prepared, question, rows.T @ rows, len(rows), rng)
+    found = decision_chances(problem.prepared, question, rows.T @ rows, len(rows), rng)
     shares = []
     for right, rival in enumerate(question.rivals):
         torque = (rows[:, rival.laws[0].columns] @ rival.values)[:, None] + rng.normal(size=(len(rows), 400))
         explained = [np.array([best_fit(question, rows, law, torque) for law in each.laws]) for each in question.rivals]
-        ended = decided(question, explained, right, len(rows))
+        ended = judge_draws(question, explained, right, len(rows))
         shares.append([ended.right, ended.wrong, ended.open])
     assert [found.right, found.wrong, found.open] == pytest.approx(np.mean(shares, axis=0).tolist(), abs=0.08)
     assert found.right > 0.05
@@ -190,7 +195,7 @@ def test_a_law_that_every_arm_has_costs_less_than_one_that_was_looked_for() -> N
 
 def test_motions_keep_position_speed_and_acceleration_between_instants_too() -> None:
     limits = (Limits((-1.0, 0.4), 1.5, 6.0), Limits((-2.0, 2.0), 3.0, 4.0))
-    trajectory = fourier_within(limits, 5.0, 6)
+    trajectory = fourier_within_limits(limits, 5.0, 6)
     rng = np.random.default_rng(0)
     drawn = rng.uniform(trajectory.lower, trajectory.upper, (200, len(trajectory.lower)))
     motion = trajectory.motions(drawn, np.linspace(0, 5.0, 5001)).motion
@@ -203,7 +208,7 @@ def test_motions_keep_position_speed_and_acceleration_between_instants_too() -> 
 
 
 def test_a_small_swing_stays_as_it_is() -> None:
-    trajectory = fourier_within((Limits((-1.0, 1.0), 2.0, 10.0),), 5.0, 3)
+    trajectory = fourier_within_limits((Limits((-1.0, 1.0), 2.0, 10.0),), 5.0, 3)
     small = 0.01 * trajectory.upper
     times = np.linspace(0, 5.0, 50)
     own = trajectory.series.motions(small[None], times).motion
@@ -211,7 +216,7 @@ def test_a_small_swing_stays_as_it_is() -> None:
 
 
 def test_rows_in_which_a_joint_stands_still_tell_nothing() -> None:
-    sampling = replace(white(np.ones(2), 10.0), standing=(0.1, 0.1))
+    sampling = replace(white_noise_sampling(np.ones(2), 10.0), standing=(0.1, 0.1))
     velocity = np.ones((301, 2))  # 60 samples a second, every other one kept
     velocity[60, 1] = 0.0
     rows = sampling.whitened(np.ones((151, 2, 1)), velocity)
@@ -225,7 +230,7 @@ def test_rows_in_which_a_joint_stands_still_tell_nothing() -> None:
 
 def test_a_joint_without_a_limit_of_speed_is_refused() -> None:
     with pytest.raises(ValueError, match="limits of position and speed"):
-        fourier_within((Limits((-1.0, 1.0)),), 5.0, 3)
+        fourier_within_limits((Limits((-1.0, 1.0)),), 5.0, 3)
 
 
 def test_a_law_that_free_links_hold_already_costs_nothing() -> None:
@@ -234,7 +239,7 @@ def test_a_law_that_free_links_hold_already_costs_nothing() -> None:
     question, point = problem.prepared.questions[0], points(problem, 1)[0]
     gain_law, link_law = (rival.laws[0] for rival in question.rivals)
     assert (gain_law.freedom, link_law.freedom) == (1, 0)
-    found = chances(problem.prepared, question, problem.moments(point).gram, 1000, np.random.default_rng(0))
+    found = decision_chances(problem.prepared, question, problem.moments(point).gram, 1000, np.random.default_rng(0))
     assert found.wrong < 0.05
 
 
@@ -244,7 +249,7 @@ def test_a_second_encoder_sees_a_spring_by_how_far_it_twists() -> None:
     problem = told_apart(spring, RivalSettings(effect="channel_skew", joint=2))
     motion = problem.trajectory.motions(points(problem, 1), problem.times).motion.select(np.intp(0))
     prepared = problem.prepared
-    told = remedies(prepared, prepared.questions[0], (0, 1), motion, problem.times)
+    told = find_remedies(prepared, prepared.questions[0], (0, 1), motion, problem.times)
     found = next(each for each in told if each.what.startswith("a second encoder behind the gear of joint 2"))
     twist = prepared.present.scene(motion, problem.times).torque[:, 1] / stiffness
     assert found.separation == pytest.approx(np.std(twist) * np.sqrt(len(twist)) / 2e-5)
@@ -254,6 +259,6 @@ def test_a_column_that_a_motion_never_shows_explains_nothing() -> None:
     rows = np.random.default_rng(0).normal(size=(50, 3))
     rows[:, 1] = 0.0
     gram, right = rows.T @ rows, np.array([1.0, 1e-17, 2.0])
-    values = solved(gram, np.arange(3), right)
+    values = solve_least_squares(gram, np.arange(3), right)
     assert values[1] == 0.0
-    np.testing.assert_allclose(values[[0, 2]], solved(gram, np.array([0, 2]), right), rtol=1e-9)
+    np.testing.assert_allclose(values[[0, 2]], solve_least_squares(gram, np.array([0, 2]), right), rtol=1e-9)

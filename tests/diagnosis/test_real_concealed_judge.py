@@ -1,11 +1,11 @@
 """The judge of concealed cases, on findings that are made up."""
 
-from diagnosis.real_concealed.judge import Answer, Verdict, verdict_on
-from diagnosis.real_concealed.outcome import Outcome, Rival, Said, Size
-from diagnosis.real_concealed.plan import Case, Disturbance
-from diagnosis.real_concealed.withhold import Sought
+from armlab.diagnosis.real_concealed.conceal import SoughtEffect
+from armlab.diagnosis.real_concealed.examine import Outcome, ParameterSize, ReportedFinding, Rival
+from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, judge_case
+from armlab.diagnosis.real_concealed.plan import Case, Disturbance
 
-LOAD = Sought(
+LOAD = SoughtEffect(
     "payload of 2 kg at link 3",
     ("payload",),
     (3,),
@@ -15,22 +15,26 @@ LOAD = Sought(
 CASE = Case("told", (), Disturbance("payload", 3, 2.0, "kg"))
 
 
-def _said(effect: str, *joints: int, size: float = 1.0, rivals: tuple[Rival, ...] = (), name: str = "mass") -> Said:
-    return Said(effect, joints, "", (Size(name, size, (size - 0.2, size + 0.2), "kg"),), rivals)
+def _said(
+    effect: str, *joints: int, size: float = 1.0, rivals: tuple[Rival, ...] = (), name: str = "mass"
+) -> ReportedFinding:
+    return ReportedFinding(effect, joints, "", (ParameterSize(name, size, (size - 0.2, size + 0.2), "kg"),), rivals)
 
 
-def _outcome(*said: Said, joints: int = 3, given: float = 3.0, named: float = 1.0) -> Outcome:
+def _outcome(*said: ReportedFinding, joints: int = 3, given: float = 3.0, named: float = 1.0) -> Outcome:
     every = (given,) * joints
     hidden = (0.5, 4.0, 0.5)[:joints]
     return Outcome("told", said, every, (named,) * joints, (named,) * joints, hidden, (9.0,) * joints, 1.0, 0.1)
 
 
-def _verdict(*said: Said, control: tuple[Said, ...] = (), sought: Sought = LOAD, joints: int = 3) -> Verdict:
+def _verdict(
+    *said: ReportedFinding, control: tuple[ReportedFinding, ...] = (), sought: SoughtEffect = LOAD, joints: int = 3
+) -> CaseVerdict:
     nothing = _outcome(*control, joints=joints, given=2.0)
-    return verdict_on(CASE, _outcome(*said, joints=joints), (sought,), nothing)
+    return judge_case(CASE, _outcome(*said, joints=joints), (sought,), nothing)
 
 
-def _answer(*said: Said) -> Answer:
+def _answer(*said: ReportedFinding) -> Answer:
     return _verdict(*said).judged[0].answer
 
 
@@ -60,7 +64,7 @@ def test_what_the_control_says_as_well_is_no_answer_and_is_taken_off_where_it_is
 
 
 def test_the_only_joint_cannot_tell_its_skew_from_a_delay_of_all() -> None:
-    late = Sought("late", ("time_delay",), (), {"time_delay": {"seconds": (1.0, None)}}, ("channel_skew",))
+    late = SoughtEffect("late", ("time_delay",), (), {"time_delay": {"seconds": (1.0, None)}}, ("channel_skew",))
     control = (_said("channel_skew", 1, size=-0.5, name="seconds"),)
     verdict = _verdict(_said("time_delay", size=0.4, name="seconds"), control=control, sought=late, joints=1)
     (judged,) = verdict.judged
@@ -71,7 +75,7 @@ def test_the_only_joint_cannot_tell_its_skew_from_a_delay_of_all() -> None:
 
 def test_numbers_are_not_judged_where_other_laws_were_found_than_were_withheld() -> None:
     laws = {"coulomb_friction": {"level": (1.0, None)}, "viscous_friction": {"coefficient": (1.0, None)}}
-    friction = Sought("friction, joint 2", tuple(laws), (2,), laws)
+    friction = SoughtEffect("friction, joint 2", tuple(laws), (2,), laws)
     level = _said("coulomb_friction", 2, size=5.0, name="level")
     both = (level, _said("viscous_friction", 2, size=1.0, name="coefficient"))
     assert [each.holds for each in _verdict(level, sought=friction).judged[0].numbers] == [None]
@@ -80,21 +84,21 @@ def test_numbers_are_not_judged_where_other_laws_were_found_than_were_withheld()
 
 def test_the_gap_is_that_of_the_joint_where_it_shows_most() -> None:
     verdict = _verdict(_said("payload", 3))
-    assert verdict.shows == 2
+    assert verdict.joint_shown == 2
     assert verdict.strength == 4.0 / 2.0
     assert verdict.gap == (3.0 - 1.0) / (3.0 - 1.0)
 
 
 def test_a_disturbance_that_cancels_what_the_control_names_is_counted_apart() -> None:
-    late = Sought("late", ("time_delay",), (), {"time_delay": {"seconds": (2.0, None)}})
+    late = SoughtEffect("late", ("time_delay",), (), {"time_delay": {"seconds": (2.0, None)}})
     control = (_said("time_delay", size=-1.7, name="seconds"),)
     assert _verdict(control=control, sought=late).judged[0].answer == "cancelled"
-    more = Sought("late", ("time_delay",), (), {"time_delay": {"seconds": (5.0, None)}})
+    more = SoughtEffect("late", ("time_delay",), (), {"time_delay": {"seconds": (5.0, None)}})
     assert _verdict(control=control, sought=more).judged[0].answer == "missed"
 
 
 def test_another_law_of_friction_is_an_answer_of_its_own_and_further_laws_are_no_others() -> None:
-    friction = Sought("friction, joint 2", ("coulomb_friction",), (2,), {}, (), ("viscous_friction",))
+    friction = SoughtEffect("friction, joint 2", ("coulomb_friction",), (2,), {}, (), ("viscous_friction",))
     assert _verdict(_said("viscous_friction", 2), sought=friction).judged[0].answer == "law"
     verdict = _verdict(_said("coulomb_friction", 2), _said("viscous_friction", 2), sought=friction)
     assert verdict.judged[0].answer == "named"

@@ -11,7 +11,7 @@ import yaml
 from click.testing import CliRunner
 from told_recordings import POSITION, TORQUE, frame, recording_in
 
-from bench.cli import main
+from armlab.cli.main import main
 
 Make = Callable[[Path], Path]
 

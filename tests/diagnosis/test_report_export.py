@@ -8,15 +8,15 @@ import yaml
 from numpy.testing import assert_allclose
 from told_recordings import TORQUE, frame, motion_at, recording_in
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.simulator_export import export_model
 from armlab.diagnosis.verdict_files import write_verdict
-from diagnosis.export.command import export_model
-from identification.model_file import read_model
-from problem.errors import InputError
+from armlab.identification.model_file import read_model
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Run
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from recordings.load import load_recording
-from recordings.run import Run
 
 ARM = load_arm("irb120-arm")
 ROBOT = Path(__file__).parents[2] / "problem" / "robots" / "irb120-arm.yaml"

@@ -13,15 +13,22 @@ import pytest
 import yaml
 from told_recordings import frame, recording_in
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.report.charts import (
+    FLOOR_LOOK,
+    FOUND_LOOK,
+    GIVEN_LOOK,
+    MEASURED_LOOK,
+    REFITTED_LOOK,
+    UNKNOWN_COLOR,
+)
+from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds
+from armlab.diagnosis.report.words import verdict_lines
+from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts, write_texts
-from diagnosis.report.looks import FLOOR, FOUND, GIVEN, MEASURED, REFITTED, UNKNOWN
-from diagnosis.report.memory import filter_memory_seconds, memory_seconds
-from diagnosis.report.terminal import terminal_lines
-from diagnosis.report.write import report_texts, write_report
-from problem.errors import InputError
-from recordings.load import load_recording
+from armlab.recordings.load import load_recording
 
 HOSTILE = "x<script>alert(1)<!script>\"&'<img src=y onerror=alert(2)>"
 ARM_FILE = Path(__file__).parents[2] / "problem" / "robots" / "irb120-arm.yaml"
@@ -170,12 +177,12 @@ def test_each_picture_is_a_file_that_stands_by_itself(texts: dict[str, str]) -> 
 
 
 def test_series_differ_by_more_than_their_colour() -> None:
-    looks = [MEASURED, GIVEN, REFITTED, FOUND, FLOOR]
+    looks = [MEASURED_LOOK, GIVEN_LOOK, REFITTED_LOOK, FOUND_LOOK, FLOOR_LOOK]
     assert len({(each.width, each.dash) for each in looks}) == len(looks)
 
 
 def test_the_terminal_text_is_short_and_names_effect_law_and_gain(found: Diagnosis) -> None:
-    lines = list(terminal_lines(found))
+    lines = list(verdict_lines(found))
     assert lines[0].startswith("MISMATCH: ")
     assert max(map(len, lines)) <= 110
     assert len(lines) < 60
@@ -216,9 +223,9 @@ def test_what_is_left_is_called_white_or_not_by_how_long_it_remembers_itself(fou
     low_pass = observed.signals[0].filter
     white = np.concatenate([low_pass(rng.standard_normal((each.run.samples, 1))) for each in observed.signals])[:, 0]
     slow = np.convolve(rng.standard_normal(len(white)), np.ones(40), mode="same")
-    expected = filter_memory_seconds(observed)
-    assert 0.3 * expected < memory_seconds(white, 0, observed) < 2.5 * expected
-    assert memory_seconds(slow, 0, observed) > 5 * expected
+    expected = filter_correlation_seconds(observed)
+    assert 0.3 * expected < correlation_seconds(white, 0, observed) < 2.5 * expected
+    assert correlation_seconds(slow, 0, observed) > 5 * expected
 
 
 def test_every_link_of_the_page_leads_somewhere(browser: Any, address: str) -> None:
@@ -235,6 +242,6 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     texts = report_texts(told)
     assert "surrogate" in texts["figures/finding1_unknown.svg"]
     assert "time from the start of the run, s" in texts["figures/finding1_unknown.svg"]
-    assert UNKNOWN in texts["figures/arm.svg"]
+    assert UNKNOWN_COLOR in texts["figures/arm.svg"]
     assert "something that no known effect explains at joint 2" in texts["report.html"]
     assert "40 % of the held-out error variance depends on time" in texts["report.html"]

@@ -8,7 +8,7 @@ from told_recordings import frame, recording_in
 
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.verdict_files import predicted_texts
-from recordings.load import load_recording
+from armlab.recordings.load import load_recording
 
 
 def test_the_prediction_of_a_held_out_run_is_as_far_from_the_measurement_as_the_verdict_says(tmp_path: Path) -> None:

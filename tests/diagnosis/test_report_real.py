@@ -7,11 +7,9 @@ import numpy as np
 import pytest
 from told_recordings import frame, recording_in
 
+from armlab.diagnosis.real_arms import diagnose_public_recordings, mass_agreement, study_recording
 from armlab.diagnosis.result import Parameter
-from diagnosis.real.command import diagnose_public
-from diagnosis.real.study import study
-from diagnosis.real.tell import agreement
-from identification.real.looks import Looks
+from armlab.identification.real.looks import Looks
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +22,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_page_tells_findings_gains_and_what_each_run_says_alone_and_every_look_is_logged(
     recordings: Path, tmp_path: Path
 ) -> None:
-    lines = list(diagnose_public(tmp_path, recordings, ("kuka-kr300",)))
+    lines = list(diagnose_public_recordings(tmp_path, recordings, ("kuka-kr300",)))
     page = (tmp_path / "diagnosis.md").read_text()
     assert lines[-1] == str(tmp_path / "diagnosis.md")
     assert "## kuka-kr300" in page
@@ -37,7 +35,7 @@ def test_the_page_tells_findings_gains_and_what_each_run_says_alone_and_every_lo
 
 
 def test_gains_are_percent_of_the_torque_of_the_run_that_took_no_part(recordings: Path, tmp_path: Path) -> None:
-    found = study("kuka-kr300", recordings, Looks(tmp_path / "looks.jsonl"), lambda message: None)
+    found = study_recording("kuka-kr300", recordings, Looks(tmp_path / "looks.jsonl"), lambda message: None)
     (gain,) = found.gains
     assert gain.run == "run-1.csv"
     observed = found.diagnosis.observed
@@ -52,7 +50,7 @@ def test_gains_are_percent_of_the_torque_of_the_run_that_took_no_part(recordings
 
 
 def test_recordings_that_were_not_asked_for_are_left_alone(recordings: Path, tmp_path: Path) -> None:
-    assert list(diagnose_public(tmp_path, recordings, ("unisa-panda",))) == []
+    assert list(diagnose_public_recordings(tmp_path, recordings, ("unisa-panda",))) == []
     assert list(tmp_path.iterdir()) == []
 
 
@@ -60,6 +58,6 @@ def test_masses_agree_where_their_intervals_allow_one_mass() -> None:
     def mass(value: float, half: float) -> Parameter:
         return Parameter("mass", value, (value - half, value + half), "kg")
 
-    assert "they agree" in agreement([mass(150.0, 10.0), mass(155.0, 10.0), mass(149.0, 8.0)])
-    assert "they do not agree" in agreement([mass(100.0, 10.0), mass(180.0, 10.0)])
-    assert "Too few" in agreement([mass(100.0, 10.0)])
+    assert "they agree" in mass_agreement([mass(150.0, 10.0), mass(155.0, 10.0), mass(149.0, 8.0)])
+    assert "they do not agree" in mass_agreement([mass(100.0, 10.0), mass(180.0, 10.0)])
+    assert "Too few" in mass_agreement([mass(100.0, 10.0)])

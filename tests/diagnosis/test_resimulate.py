@@ -10,14 +10,13 @@ from numpy.testing import assert_allclose
 from told_recordings import ARM, frame, recording_in
 
 from armlab.diagnosis.diagnose import diagnose
-from diagnosis.resimulate.dynamics import Body, NoInertiaError, runge_kutta
-from diagnosis.resimulate.windows import WINDOW_S, resimulate
+from armlab.diagnosis.resimulate import WINDOW_SECONDS, Body, NoInertiaError, resimulate, runge_kutta
+from armlab.recordings.load import load_recording
 from problem.arm import Arm, Joint, Link
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
 from problem.transforms import translation
-from recordings.load import load_recording
 
 
 @settings(max_examples=20, deadline=None)
@@ -71,7 +70,7 @@ def test_the_found_model_follows_the_measured_motion_where_the_given_one_leaves_
     folder = recording_in(tmp_path / "loaded", frame(0, 8, mass=0.5), frame(1, 8, mass=0.5))
     found = resimulate(diagnose(load_recording(folder)))
     assert found.run == "run-1.csv"
-    assert found.time[-1] == pytest.approx(WINDOW_S, abs=0.05)
+    assert found.time[-1] == pytest.approx(WINDOW_SECONDS, abs=0.05)
     assert found.old is not None
     old, new = found.growth(found.old)[-1], found.growth(found.new)[-1]
     assert np.all(new < 0.2)

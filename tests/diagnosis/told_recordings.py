@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from armlab.recordings.recording import Array
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
-from recordings.run import Array
 
 ARM = load_arm("irb120-arm")
 RATE_HZ = 200.0

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from identification.components import Component, usual_components
-from identification.structure import Structure
+from armlab.identification.components import Component, usual_components
+from armlab.identification.structure import Structure
+from armlab.recordings.recording import Array, Role, Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from recordings.run import Array, Role, Run
 
 RATE_HZ = 250.0
 

@@ -11,14 +11,14 @@ import yaml
 from refusals import refusal
 from simulated_arm import arm, motion, run, structure, truth
 
-from identification import extras
-from identification.components import every_joint
-from identification.model import Model
-from identification.scene import Scene
-from identification.torque_model import TorqueModel
+from armlab.effects import extras
+from armlab.effects.scene import Scene
+from armlab.identification.components import every_joint
+from armlab.identification.model import Model
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.recording import Array, Run
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
-from recordings.run import Array, Run
 
 LINEAR = structure(every_joint("coulomb_friction", 3))
 

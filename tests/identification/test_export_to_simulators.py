@@ -6,18 +6,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from identification.components import usual_components
-from identification.export.command import export_model
-from identification.export.mjcf import mjcf
-from identification.export.srdf import srdf
-from identification.export.urdf import urdf
-from identification.model import Model
-from identification.pseudo_inertia import parameters_of, regular_nominal
-from identification.structure import Structure
-from problem.errors import InputError
+from armlab.common.errors import InputError
+from armlab.identification.components import usual_components
+from armlab.identification.export import export_model, mjcf_document, srdf_document, urdf_document
+from armlab.identification.model import Model
+from armlab.identification.structure import Structure
+from armlab.recordings.recording import Array
 from problem.motion import Motion
+from problem.pseudo_inertia import parameters_of, regular_nominal
 from problem.robot_file import load_arm
-from recordings.run import Array
 
 ARMS = ("irb120-arm", "irb120", "staubli-tx40")
 SMOOTH = ("viscous_friction", "rotor_inertia")
@@ -53,14 +50,14 @@ def mujoco_torque(document: str, motion: Motion) -> Array:
 def test_mujoco_reproduces_rigid_armature_and_viscous_torque_of_the_mjcf(name: str) -> None:
     model = model_of(name)
     motion = states(len(model.arm))
-    assert_allclose(mujoco_torque(mjcf(model), motion), model.torque(motion), atol=1e-9)
+    assert_allclose(mujoco_torque(mjcf_document(model), motion), model.torque(motion), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_mujoco_reproduces_rigid_and_viscous_torque_of_the_urdf(name: str) -> None:
     model = model_of(name, ("viscous_friction",))
     motion = states(len(model.arm))
-    assert_allclose(mujoco_torque(urdf(model), motion), model.torque(motion), atol=1e-9)
+    assert_allclose(mujoco_torque(urdf_document(model), motion), model.torque(motion), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -70,8 +67,8 @@ def test_pinocchio_reproduces_the_exported_torque(name: str, form: str, tmp_path
     model = model_of(name)
     motion = states(len(model.arm))
     path = tmp_path / ("arm.xml" if form == "mjcf" else "arm.srdf")
-    path.write_text(mjcf(model) if form == "mjcf" else srdf(model))
-    read = pin.buildModelFromMJCF(str(path)) if form == "mjcf" else pin.buildModelFromXML(urdf(model))
+    path.write_text(mjcf_document(model) if form == "mjcf" else srdf_document(model))
+    read = pin.buildModelFromMJCF(str(path)) if form == "mjcf" else pin.buildModelFromXML(urdf_document(model))
     if form == "urdf":
         pin.loadRotorParameters(read, str(path), False)
     read.gravity.linear[:] = model.arm.gravity
@@ -99,7 +96,7 @@ def test_gravity_along_any_direction_survives_the_urdf() -> None:
     inertial = np.concatenate([[10, 1, 2, 0.5, 2.0, 2.0, 2.0, 0, 0, 0] for _ in range(6)]).astype(float)
     model = Model("kuka-kr300", structure, structure.base.values(inertial), inertial=inertial)
     motion = states(6)
-    assert_allclose(mujoco_torque(urdf(model), motion), model.torque(motion), atol=1e-7)
+    assert_allclose(mujoco_torque(urdf_document(model), motion), model.torque(motion), atol=1e-7)
 
 
 def test_a_model_without_links_cannot_be_exported(tmp_path: Path) -> None:

@@ -5,18 +5,22 @@ import pytest
 from numpy.testing import assert_allclose
 from simulated_arm import arm, run, structure, truth
 
-from identification.components import every_joint
-from identification.estimators.linear import BayesianLeastSquares, OrdinaryLeastSquares, Prior, WeightedLeastSquares
-from identification.estimators.robust import RobustLeastSquares
-from identification.groups import candidate_groups
-from identification.identifier import METHODS, Identifier
-from identification.model import Model
-from identification.priors import Pull, nominal_prior, point_mass
-from identification.pseudo_inertia import least_eigenvalues, parameters_of, regular_nominal
-from identification.regression import Regression, regression, signals_of
-from identification.selection import select
+from armlab.identification.components import every_joint
+from armlab.identification.estimators.least_squares import (
+    BayesianLeastSquares,
+    OrdinaryLeastSquares,
+    Prior,
+    RobustLeastSquares,
+    WeightedLeastSquares,
+)
+from armlab.identification.identifier import METHODS, Identifier
+from armlab.identification.model import Model
+from armlab.identification.priors import Pull, nominal_prior, point_mass
+from armlab.identification.regression import Regression, regression, signals_of
+from armlab.identification.selection import candidate_groups, select_structure
+from armlab.recordings.recording import Array, Run
 from problem.motion import Motion
-from recordings.run import Array, Run
+from problem.pseudo_inertia import least_eigenvalues, parameters_of, regular_nominal
 
 MODEL = structure()
 TRUTH = truth(MODEL)
@@ -144,7 +148,7 @@ def test_positions_with_a_higher_cut_off_leave_the_columns_what_the_torque_has()
 
 def test_the_smoothing_of_positions_is_chosen_by_what_predicts_held_out_blocks() -> None:
     clean = run(MODEL, TRUTH)
-    choice = select(arm(), [clean], candidate_groups(3), (Pull(),), cutoffs=(0.2,)).choice
+    choice = select_structure(arm(), [clean], candidate_groups(3), (Pull(),), cutoffs=(0.2,)).choice
     assert choice.position_factor == 2.0
 
 

@@ -9,24 +9,28 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 from simulated_arm import arm, motion, run, structure, truth
 
-from identification.components import every_joint
-from identification.covariance import uncertainty
-from identification.coverage.experiment import Noise, three_joint_experiment
-from identification.cross_validation import folds
-from identification.estimators.linear import OrdinaryLeastSquares
-from identification.groups import USUAL, candidate_groups, components_of, toggled
-from identification.moments import moments
-from identification.payload import identify_payload, torque_gains
-from identification.priors import Pull, point_mass
-from identification.pseudo_inertia import link_of
-from identification.real.looks import Looks
-from identification.regression import Regression, regression, signals_of
-from identification.selection import select
-from identification.structure import Structure
+from armlab.identification.components import every_joint
+from armlab.identification.covariance import uncertainty
+from armlab.identification.coverage import Noise, three_joint_experiment
+from armlab.identification.cross_validation import folds, regression_moments
+from armlab.identification.estimators.least_squares import OrdinaryLeastSquares
+from armlab.identification.payload import identify_payload, torque_gains
+from armlab.identification.priors import Pull, point_mass
+from armlab.identification.real.looks import Looks
+from armlab.identification.regression import Regression, regression, signals_of
+from armlab.identification.selection import (
+    USUAL_GROUPS,
+    candidate_groups,
+    components_of,
+    select_structure,
+    toggle_group,
+)
+from armlab.identification.structure import Structure
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.recording import Array, Run
+from problem.pseudo_inertia import link_of
 from problem.regressor import observation_matrix
 from problem.robot_file import load_arm
-from recordings.differentiate import Signals
-from recordings.run import Array, Run
 
 
 def test_intervals_hold_the_truth_in_about_95_percent_of_experiments() -> None:
@@ -69,9 +73,9 @@ def test_every_sample_judges_once_and_never_fits_its_own_block_or_the_gap() -> N
 def test_moments_fit_like_the_rows_themselves() -> None:
     model = structure()
     data = regression(model, [signals_of(run(model, truth(model), noise=0.3))])
-    fitted = moments(data).fit(np.arange(model.size), None, by_joint=False)
+    fitted = regression_moments(data).fit(np.arange(model.size), None, by_joint=False)
     assert_allclose(fitted, OrdinaryLeastSquares()(data).values, rtol=1e-3, atol=1e-4)
-    errors = moments(data).errors(fitted, np.arange(model.size))
+    errors = regression_moments(data).errors(fitted, np.arange(model.size))
     assert_allclose(errors, np.sum(data.residuals(fitted) ** 2, axis=0), rtol=1e-6)
 
 
@@ -81,15 +85,15 @@ def test_selection_finds_the_square_root_that_is_there_and_leaves_out_what_is_no
     values = truth(model)
     values[model.slices[6].start :] = 6.0  # the square roots
     recorded = [run(model, values, seed, noise=0.05) for seed in (0, 1)]
-    choice = select(arm(), recorded, groups, (Pull(),), cutoffs=(1.0,)).choice
+    choice = select_structure(arm(), recorded, groups, (Pull(),), cutoffs=(1.0,)).choice
     assert "square root" in choice.groups or "cube root" in choice.groups
     assert "wrist coupling" not in choice.groups
     assert choice.held_out < 0.05
 
 
 def test_groups_that_exclude_each_other_are_exchanged() -> None:
-    assert toggled(USUAL, "direction") == ("coulomb", "rotor", "offset", "direction")
-    assert toggled(USUAL, "offset") == ("viscous", "coulomb", "rotor")
+    assert toggle_group(USUAL_GROUPS, "direction") == ("coulomb", "rotor", "offset", "direction")
+    assert toggle_group(USUAL_GROUPS, "offset") == ("viscous", "coulomb", "rotor")
 
 
 def test_looks_are_appended_and_counted_for_each_run(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import yaml
 from numpy.testing import assert_allclose
 from simulated_arm import arm, motion, run, structure, truth
 
-from identification.components import Component, every_joint, neighbour_couplings
-from identification.identifier import Identifier
-from identification.model import Model
-from problem.errors import InputError
+from armlab.common.errors import InputError
+from armlab.identification.components import Component, every_joint, neighbour_couplings
+from armlab.identification.identifier import Identifier
+from armlab.identification.model import Model
 
 PARTS = (
     *every_joint("viscous_friction", 3),

@@ -9,20 +9,19 @@ from public_copies import needs_copies
 from refusals import refusal
 from simulated_arm import RATE_HZ, arm, motion
 
-from identification.cli import gains, payload
-from identification.payload import Place, identify_payload
-from identification.payload_command import Setting, gains_lines, payload_lines
-from identification.priors import point_mass
-from identification.pseudo_inertia import least_eigenvalues
-from identification.regression import signals_of
-from identification.structure import Structure
+from armlab.cli.identification import gains, payload
+from armlab.identification.payload import PayloadSetting, Place, gains_lines, identify_payload, payload_lines
+from armlab.identification.priors import point_mass
+from armlab.identification.regression import signals_of
+from armlab.identification.structure import Structure
+from armlab.recordings.public import fetch_recording
+from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 from problem.arm import Arm
 from problem.motion import Motion
+from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import observation_matrix
 from problem.robot_file import load_arm
-from recordings.public.fetch import fetch_recording
-from recordings.run import Array, Run
-from recordings.write import Draft, DraftRun, write_recording
 
 CENTRE = (0.05, -0.02, 0.1)
 MASS = 3.0
@@ -74,7 +73,7 @@ def test_the_mass_of_a_load_is_found_with_an_interval_that_holds_it(pair: tuple[
 
 
 def test_nominal_links_stand_for_runs_without_the_load(pair: tuple[Path, Path]) -> None:
-    (line,) = payload_lines(pair[0], None, Setting(ON_LINK_2))
+    (line,) = payload_lines(pair[0], None, PayloadSetting(ON_LINK_2))
     low, high = interval(line)
     assert low < MASS < high
     assert high - low < 0.2
@@ -116,19 +115,21 @@ def test_a_load_is_a_body_that_can_exist_even_where_noise_says_otherwise() -> No
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        (Setting(Place(4, CENTRE)), "--link 4 should be one from 1 to 3"),
-        (Setting(ON_LINK_2, counterbalanced=5), "--counterbalance 5 should be one from 1 to 3"),
-        (Setting(Place(1)), "do not tell the load's parameters apart"),
+        (PayloadSetting(Place(4, CENTRE)), "--link 4 should be one from 1 to 3"),
+        (PayloadSetting(ON_LINK_2, counterbalanced=5), "--counterbalance 5 should be one from 1 to 3"),
+        (PayloadSetting(Place(1)), "do not tell the load's parameters apart"),
     ],
 )
-def test_what_cannot_be_told_is_refused_in_one_line(pair: tuple[Path, Path], setting: Setting, message: str) -> None:
+def test_what_cannot_be_told_is_refused_in_one_line(
+    pair: tuple[Path, Path], setting: PayloadSetting, message: str
+) -> None:
     assert message in refusal(lambda: list(payload_lines(*pair, setting)))
 
 
 def test_a_recording_without_the_load_that_has_nothing_to_identify_from_is_refused(pair: tuple[Path, Path]) -> None:
     settings = pair[1] / "recording.yaml"
     settings.write_text(settings.read_text().replace("role: identify", "role: validate"))
-    assert "no run to identify from" in refusal(lambda: list(payload_lines(*pair, Setting(ON_LINK_2))))
+    assert "no run to identify from" in refusal(lambda: list(payload_lines(*pair, PayloadSetting(ON_LINK_2))))
 
 
 def test_recordings_of_different_arms_are_refused(pair: tuple[Path, Path], tmp_path: Path) -> None:
@@ -139,14 +140,14 @@ def test_recordings_of_different_arms_are_refused(pair: tuple[Path, Path], tmp_p
     table = np.column_stack([run.time, run.position, run.torque])
     units = {"time": "s", "position": "rad", "torque": "N.m"}
     write_recording(Draft("irb120", columns, units, (DraftRun("run.csv", "identify", names, table),)), other)
-    assert "has 6 joints" in refusal(lambda: list(gains_lines(pair[0], other, 1.0, Setting(ON_LINK_2))))
+    assert "has 6 joints" in refusal(lambda: list(gains_lines(pair[0], other, 1.0, PayloadSetting(ON_LINK_2))))
 
 
 @needs_copies("kuka-kr300")
 def test_the_payload_of_the_kuka_is_found_with_its_counterbalance(tmp_path: Path) -> None:
     """Its mass is not published; a fit of others with this counterbalance gave 157 kg."""
     folder = fetch_recording("kuka-kr300", tmp_path / "kuka")
-    (line,) = payload_lines(folder, None, Setting(Place(None, (0.0, 0.0, 0.1)), counterbalanced=2))
+    (line,) = payload_lines(folder, None, PayloadSetting(Place(None, (0.0, 0.0, 0.1)), counterbalanced=2))
     low, high = interval(line)
     assert low < 157 < high
     assert high - low < 40

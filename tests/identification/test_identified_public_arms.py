@@ -6,14 +6,14 @@ import pytest
 from numpy.testing import assert_allclose
 from public_copies import needs_copies
 
-from identification.components import neighbour_couplings, usual_components
-from identification.model import Model
-from identification.real.command import LOG, identify_public
-from identification.real.published import Comparison, functional
-from identification.real.recipes import RECIPES
-from identification.structure import Structure
+from armlab.identification.components import neighbour_couplings, usual_components
+from armlab.identification.model import Model
+from armlab.identification.real.published import Comparison, sum_weights
+from armlab.identification.real.report import LOOKS_FILE, identify_public
+from armlab.identification.real.study import RECIPES
+from armlab.identification.structure import Structure
+from armlab.recordings.public import PUBLIC_RECORDINGS
 from problem.robot_file import load_arm
-from recordings.public.registry import PUBLIC
 
 
 def tx40() -> Model:
@@ -40,19 +40,19 @@ def test_published_sums_have_the_value_that_the_links_give(expression: str) -> N
     names |= {"Ia1": 0.0}  # in the links' own inertia
     terms = (term.split("*") for term in expression.replace("- ", "+ -").split(" + "))
     expected = sum(float(np.prod([float(word) for word in term[:-1]])) * names[term[-1]] for term in terms)
-    assert functional(model, expression) @ model.values == pytest.approx(expected, abs=1e-9)
+    assert sum_weights(model, expression) @ model.values == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_coupling_is_the_mean_of_what_both_joints_show() -> None:
     model = tx40()
     couplings = [i for i, part in enumerate(model.structure.components) if part.effect == "joint_coupling"]
     values = [model.values[model.structure.slices[i]][0] for i in couplings]
-    assert functional(model, "fvm6") @ model.values == pytest.approx(np.mean(values))
+    assert sum_weights(model, "fvm6") @ model.values == pytest.approx(np.mean(values))
 
 
 def test_a_sum_that_torques_do_not_tell_is_refused() -> None:
     with pytest.raises(ValueError, match="no sum of base parameters"):
-        functional(tx40(), "m1")
+        sum_weights(tx40(), "m1")
 
 
 def test_differences_are_told_in_combined_standard_errors() -> None:
@@ -60,7 +60,7 @@ def test_differences_are_told_in_combined_standard_errors() -> None:
 
 
 def test_every_public_recording_has_a_recipe() -> None:
-    assert {recipe.name for recipe in RECIPES} == set(PUBLIC)
+    assert {recipe.name for recipe in RECIPES} == set(PUBLIC_RECORDINGS)
 
 
 @needs_copies("emps")
@@ -71,7 +71,7 @@ def test_real_writes_the_table_and_logs_each_look_at_validation_data(tmp_path: P
     assert list(table.columns) == ["recording", "model", "run", "relative_error_percent"]
     errors = table.set_index(["model", "run"])["relative_error_percent"]
     assert errors["chosen", "pulses.csv"] < errors["friction", "pulses.csv"] < errors["rigid", "pulses.csv"]
-    looks = (tmp_path / "results" / LOG).read_text().splitlines()
+    looks = (tmp_path / "results" / LOOKS_FILE).read_text().splitlines()
     assert len(looks) == 3
     assert all("pulses.csv" in look for look in looks)
     assert_allclose(errors["rigid", "identify.csv"], 69.5, atol=1)

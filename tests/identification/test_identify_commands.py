@@ -7,11 +7,11 @@ import yaml
 from click.testing import CliRunner
 from simulated_arm import RATE_HZ, arm, run, structure, truth
 
-from diagnosis.cli import export_model
-from identification.cli import coverage, identify, predict, real
-from identification.model import Model
-from problem.errors import InputError
-from recordings.write import Draft, DraftRun, write_recording
+from armlab.cli.diagnosis import export_model
+from armlab.cli.identification import coverage, identify, predict, real
+from armlab.common.errors import InputError
+from armlab.identification.model import Model
+from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 
 COLUMNS = {"time": "t", "position": ("q1", "q2", "q3"), "torque": ("tau1", "tau2", "tau3")}
 NAMES = ("t", "q1", "q2", "q3", "tau1", "tau2", "tau3")

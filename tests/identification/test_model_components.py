@@ -3,13 +3,13 @@ import pytest
 from numpy.testing import assert_allclose
 from simulated_arm import arm, motion, structure, truth
 
-from identification.components import FORMS, Component, every_joint, neighbour_couplings, usual_components
-from identification.identifier import Identifier
-from identification.structure import Structure
+from armlab.identification.components import FORMS, Component, every_joint, neighbour_couplings, usual_components
+from armlab.identification.identifier import Identifier
+from armlab.identification.structure import Structure
+from armlab.recordings.recording import Run
+from armlab.recordings.vocabulary import effect_named
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
-from recordings.run import Run
-from recordings.vocabulary import effect_named
 
 
 def test_a_rotor_inertia_that_acts_like_the_links_own_is_left_out_and_named() -> None:

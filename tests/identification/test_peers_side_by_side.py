@@ -8,11 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from public_copies import needs_copies
 from simulated_arm import run, structure, truth
 
-from identification.peers.exchange import PeerRun, read_runs, write_runs
-from identification.peers.report import write_peers
-from identification.peers.side_by_side import Row
-from identification.real.command import identify_public
-from identification.regression import signals_of
+from armlab.identification.peers.exchange import PeerRun, read_runs, write_runs
+from armlab.identification.peers.side_by_side import PeerResult, write_peers
+from armlab.identification.real.report import identify_public
+from armlab.identification.regression import signals_of
 
 
 @pytest.fixture
@@ -42,7 +41,10 @@ def test_a_thinned_run_shows_the_same_filtered_torque(peer_run: PeerRun) -> None
 
 
 def test_the_page_holds_a_row_for_each_package_and_why_one_has_no_figure(tmp_path: Path) -> None:
-    rows = [Row("emps", "armlab, chosen", "pulses.csv", 4.7, 0.1), Row("emps", "other", "", None, None, "no module")]
+    rows = [
+        PeerResult("emps", "armlab, chosen", "pulses.csv", 4.7, 0.1),
+        PeerResult("emps", "other", "", None, None, "no module"),
+    ]
     text = write_peers(rows, tmp_path).read_text()
     assert "| emps | pulses.csv | armlab, chosen | 4.70 | 0.1 |" in text
     assert "| emps | | other | no module | |" in text

@@ -8,11 +8,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from armlab.common.settings import read_yaml
 from problem.arm import Link, link_poses
-from problem.inertia import about_origin, link_from_centre_of_mass, moved, pseudo_link
-from problem.robot_file import BUILT_IN, built_in_arms, load_arm
+from problem.inertia import (
+    link_from_centre_of_mass,
+    link_from_pseudo_inertia,
+    pseudo_inertia_of,
+    transform_pseudo_inertia,
+)
+from problem.robot_file import BUILT_IN_FOLDER, built_in_arms, load_arm
 from problem.transforms import Array, inverse, translation
-from problem.yaml_input import read_yaml
 
 SCHEMA = Path(__file__).parents[1] / "schemas" / "robot.schema.json"
 BY_HAND = ("irb120-arm", "irb120-arm-eq49", "irb120")
@@ -44,9 +49,13 @@ def about_the_frame(mass: float, moment: tuple[float, ...], diagonal: tuple[floa
     x, y, z = (component * 1e-3 / mass for component in moment)
     xx, yy, zz = (entry * 1e-6 for entry in diagonal)
     inertia = (
-        xx + mass * (y * y + z * z), yy + mass * (x * x + z * z), zz + mass * (x * x + y * y),
-        -mass * x * y, -mass * x * z, -mass * y * z,
-    )  # fmt: skip
+        xx + mass * (y * y + z * z),
+        yy + mass * (x * x + z * z),
+        zz + mass * (x * x + y * y),
+        -mass * x * y,
+        -mass * x * z,
+        -mass * y * z,
+    )
     return Link(mass, (x * mass, y * mass, z * mass), inertia)
 
 
@@ -67,13 +76,13 @@ def test_links_4_to_6_carry_the_ros_industrial_values_turned_into_the_dh_frames(
     for link, pose, origin, (mass, centre, entries) in zip(links("irb120")[3:], poses, URDF_ORIGINS, URDF, strict=True):
         xx, xy, xz, yy, yz, zz = entries
         about_mass = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        body = about_origin(link_from_centre_of_mass(mass, np.array(centre), about_mass))
-        expected = pseudo_link(moved(body, inverse(pose) @ translation(*origin)))
+        body = pseudo_inertia_of(link_from_centre_of_mass(mass, np.array(centre), about_mass))
+        expected = link_from_pseudo_inertia(transform_pseudo_inertia(body, inverse(pose) @ translation(*origin)))
         assert_allclose(link.parameters, expected.parameters, rtol=1e-9, atol=1e-15)
 
 
 def test_lengths_and_limits_are_those_of_table_1_and_the_data_sheet() -> None:
-    data = read_yaml(BUILT_IN / "irb120.yaml")["joints"]
+    data = read_yaml(BUILT_IN_FOLDER / "irb120.yaml")["joints"]
     assert [(row["a"], row["d"]) for row in data] == [(0, 0.29), (0.27, 0), (0.07, 0), (0, 0.302), (0, 0), (0, 0.072)]
     assert_allclose([row["alpha"] for row in data], np.array([-1, 0, -1, 1, -1, 0]) * np.pi / 2)
     joints = load_arm("irb120").joints
@@ -83,7 +92,7 @@ def test_lengths_and_limits_are_those_of_table_1_and_the_data_sheet() -> None:
 
 
 def smallest_eigenvalue(link: Link) -> float:
-    return float(np.linalg.eigvalsh(about_origin(link))[0])
+    return float(np.linalg.eigvalsh(pseudo_inertia_of(link))[0])
 
 
 @pytest.mark.parametrize("name", BY_HAND)
@@ -98,7 +107,7 @@ def test_link_2_of_table_4_could_not_exist_if_its_inertia_were_about_the_frame()
 
 @pytest.mark.parametrize("name", built_in_arms())
 def test_every_built_in_arm_loads_and_keeps_the_schema(name: str) -> None:
-    data = read_yaml(BUILT_IN / f"{name}.yaml")
+    data = read_yaml(BUILT_IN_FOLDER / f"{name}.yaml")
     jsonschema.validate(data, json.loads(SCHEMA.read_text()))
     assert load_arm(name).name == name
 
@@ -112,13 +121,15 @@ def test_a_cut_arm_is_the_beginning_of_the_whole_one() -> None:
 def test_a_body_moved_there_and_back_is_the_same() -> None:
     link = links("irb120")[3]
     pose = link_poses(load_arm("irb120"), np.full(6, 0.4))[-1]
-    there = moved(about_origin(link), pose)
-    assert_allclose(pseudo_link(moved(there, inverse(pose))).parameters, link.parameters, atol=1e-15)
+    there = transform_pseudo_inertia(pseudo_inertia_of(link), pose)
+    assert_allclose(
+        link_from_pseudo_inertia(transform_pseudo_inertia(there, inverse(pose))).parameters, link.parameters, atol=1e-15
+    )
 
 
 def test_a_pseudo_inertia_is_the_sum_over_point_masses() -> None:
     points, masses = np.array([[1.0, 2.0, 3.0], [-1.0, 0.5, 0.0]]), np.array([2.0, 4.0])
-    link = pseudo_link(
+    link = link_from_pseudo_inertia(
         sum(mass * np.outer([*point, 1], [*point, 1]) for mass, point in zip(masses, points, strict=True))
     )
     inertia = sum(

@@ -8,8 +8,8 @@ from random_arms import random_motion
 
 import problem.fitness as fitness
 from problem.base_parameters import base_parameters
-from problem.excitation_problem import ExcitationProblem, FeasibilityRules, Penalty
-from problem.fitness import GRAM_LIMIT, Criterion, condition_number, singular_values
+from problem.excitation import ExcitationProblem, FeasibilityRules, Penalty
+from problem.fitness import MAX_GRAM_CONDITION, Criterion, condition_number, singular_values
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.regressor import observation_matrix
@@ -66,14 +66,14 @@ def test_a_nearly_singular_motion_takes_the_exact_route_and_agrees_with_numpy(
     unit_columns: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     motion = nearly_singular(1e-3)
-    exactly = Mock(side_effect=fitness._exactly)
-    monkeypatch.setattr(fitness, "_exactly", exactly)
+    exactly = Mock(side_effect=fitness._singular_values_of_matrix)
+    monkeypatch.setattr(fitness, "_singular_values_of_matrix", exactly)
     condition = condition_number(singular_values(ARM, motion, COLUMNS, unit_columns))[0]
     matrix = observation_matrix(ARM, motion.select(np.intp(0)))[:, COLUMNS]
     if unit_columns:
         matrix = matrix / np.linalg.norm(matrix, axis=0)
     exactly.assert_called_once()
-    assert condition > GRAM_LIMIT
+    assert condition > MAX_GRAM_CONDITION
     assert condition == pytest.approx(np.linalg.cond(matrix), rel=1e-6)
 
 

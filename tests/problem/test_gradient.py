@@ -8,12 +8,17 @@ import pytest
 from random_arms import random_arm, random_motion
 
 from problem.arm import Arm
-from problem.excitation_problem import ExcitationProblem
-from problem.gradient import condition, condition_gradient, motion_gradient, spectral_gradient
+from problem.excitation import ExcitationProblem
+from problem.gradient import (
+    condition_gradient,
+    condition_with_derivatives,
+    motion_gradient,
+    spectral_gradient,
+    tangents,
+)
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.regressor import observation_matrix
-from problem.tangents import tangents
 from problem.transforms import Array
 
 EIGHTH_ORDER = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
@@ -124,7 +129,7 @@ def test_a_spectral_function_without_slope_has_no_gradient() -> None:
 
 
 def test_condition_of_8_4_2_and_its_slopes_by_hand() -> None:
-    value, slopes = condition(np.array([8.0, 4.0, 2.0]))
+    value, slopes = condition_with_derivatives(np.array([8.0, 4.0, 2.0]))
     assert value == 4.0
     assert slopes.tolist() == [0.5, 0.0, -2.0]
 

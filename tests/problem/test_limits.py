@@ -8,7 +8,7 @@ import pytest
 from problem.arm import Arm, Joint, Limits, Link
 from problem.limits import Constraints, Workspace, drive_torque, peaks
 from problem.motion import Motion
-from problem.trajectory import Excitation
+from problem.trajectories import Excitation
 from problem.transforms import translation
 
 FREE = Limits()

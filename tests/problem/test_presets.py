@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from refusals import refusal
 
+from armlab.common.errors import InputError
 from problem.contract import Problem
-from problem.errors import InputError
-from problem.excitation_problem import ExcitationProblem
-from problem.frame import ShiftedProblem
+from problem.excitation import ExcitationProblem, ShiftedProblem
 from problem.functions import FUNCTIONS
 from problem.registry import names, parse_problem
 from problem.transforms import Array

@@ -13,7 +13,7 @@ from problem import registry
 from problem.contract import Evaluation
 from problem.contract_suite import ProblemContract
 from problem.presets import FunctionSettings
-from problem.registry import GROUP, names, parse_problem
+from problem.registry import ENTRY_POINT_GROUP, names, parse_problem
 
 Register = Callable[..., None]
 
@@ -46,8 +46,8 @@ def plug_ins(monkeypatch: pytest.MonkeyPatch) -> Register:
     """Pretend that other packages registered these problems."""
 
     def register(**values: str) -> None:
-        entries = [EntryPoint(name, value, GROUP) for name, value in values.items()]
-        monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == GROUP else [])
+        entries = [EntryPoint(name, value, ENTRY_POINT_GROUP) for name, value in values.items()]
+        monkeypatch.setattr(registry, "entry_points", lambda group: entries if group == ENTRY_POINT_GROUP else [])
 
     return register
 
@@ -71,7 +71,9 @@ def test_a_broken_plug_in_is_named_and_troubles_no_other(plug_ins: Register, val
 
 def test_a_plug_in_that_is_no_class_of_settings_is_refused(plug_ins: Register) -> None:
     plug_ins(odd="problem.functions:sphere")
-    assert "should be a class of problem.settings.Settings" in refusal(parse_problem, {"preset": "odd"}, "mine.yaml")
+    assert "should be a class of armlab.common.settings.Settings" in refusal(
+        parse_problem, {"preset": "odd"}, "mine.yaml"
+    )
 
 
 def test_a_name_that_is_registered_twice_is_refused(plug_ins: Register) -> None:

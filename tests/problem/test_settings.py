@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field, ValidationError, field_validator
 
-from problem.errors import InputError
-from problem.settings import Settings, validate
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings, validate
 
 
 class Trajectory(Settings):

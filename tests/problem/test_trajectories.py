@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from problem.arm import Arm, link_poses
-from problem.cartesian_fourier import CartesianFourier
-from problem.errors import InputError
+from armlab.common.errors import InputError
+from problem.arm import Arm, body_points, link_poses
 from problem.inverse_kinematics import planar_arm
-from problem.joint_fourier import JointFourier
-from problem.kinematics import body_points
 from problem.motion import Motion
 from problem.robot_file import load_arm
-from problem.trajectory import Trajectory, instants
+from problem.trajectories import CartesianFourier, JointFourier, Trajectory, sample_instants
 from problem.transforms import Array
 
 ARM = load_arm("irb120-arm")
@@ -114,7 +111,7 @@ def test_every_number_has_a_name_and_bounds(trajectory: Trajectory) -> None:
 @pytest.mark.parametrize("elbow_up", [True, False])
 @pytest.mark.parametrize("rest", [True, False])
 def test_the_tool_is_on_the_path(rest: bool, elbow_up: bool) -> None:
-    trajectory, times = cartesian(rest, elbow_up), instants(DURATION, 101)
+    trajectory, times = cartesian(rest, elbow_up), sample_instants(DURATION, 101)
     path = np.stack(trajectory.path(POINTS, times).position, axis=-1)
     excitation = trajectory.motions(POINTS, times)
     tool = body_points(ARM, excitation.motion.position, TOOL)[..., -1, :]
@@ -123,7 +120,7 @@ def test_the_tool_is_on_the_path(rest: bool, elbow_up: bool) -> None:
 
 
 def test_elbow_up_is_above_elbow_down() -> None:
-    times = instants(DURATION, 21)
+    times = sample_instants(DURATION, 21)
     up, down = (
         body_points(ARM, motion_at(cartesian(elbow_up=side), POINTS, times).position, TOOL)[..., 1, 2]
         for side in (True, False)
@@ -132,7 +129,7 @@ def test_elbow_up_is_above_elbow_down() -> None:
 
 
 def test_joint_1_turns_once_round_without_a_jump_and_the_others_stay_within_half_a_turn() -> None:
-    position = motion_at(cartesian(), POINTS, instants(DURATION, 401)).position
+    position = motion_at(cartesian(), POINTS, sample_instants(DURATION, 401)).position
     assert np.abs(np.diff(position[..., 0], axis=1)).max() < 0.2
     np.testing.assert_allclose(position[:, -1, 0] - position[:, 0, 0], 2 * np.pi)
     assert np.all(np.abs(position[:, 0, 0]) <= np.pi)
@@ -140,7 +137,7 @@ def test_joint_1_turns_once_round_without_a_jump_and_the_others_stay_within_half
 
 
 def test_the_literal_path_is_eq_45_to_47() -> None:
-    times = instants(DURATION, 41)
+    times = sample_instants(DURATION, 41)
     x, y, z = cartesian(rest=False).path(POINTS, times).position
     w = 2 * np.pi / DURATION
     for index, (a1, a2, a3, b1, b2, b3, c) in enumerate(POINTS):
@@ -166,7 +163,7 @@ def test_overreach_is_the_distance_to_what_the_arm_can_reach() -> None:
     # a circle of 0.9 m about the shoulder; upper arm 0.27 m, elbow to tool sqrt(0.07^2 + 0.374^2) m
     far, near = np.array([[0.9, 0, 0, 0, 0, 0, 0.0]]), np.array([[0.05, 0, 0, 0, 0, 0, 0.0]])
     fore = np.hypot(0.07, 0.374)
-    trajectory, times = cartesian(), instants(DURATION, 11)
+    trajectory, times = cartesian(), sample_instants(DURATION, 11)
     assert trajectory.motions(far, times).overreach == pytest.approx([0.9 - 0.27 - fore])
     assert trajectory.motions(near, times).overreach == pytest.approx([fore - 0.27 - 0.05])
     assert np.all(np.isfinite(trajectory.motions(far, times).motion.acceleration))
@@ -209,4 +206,4 @@ def test_an_arm_that_is_not_anthropomorphic_is_refused_in_one_line(arm: Arm, too
 @pytest.mark.parametrize("trajectory", [joint_fourier(), cartesian()])
 def test_points_of_a_wrong_length_are_refused(trajectory: Trajectory) -> None:
     with pytest.raises(ValueError, match=r"reshape|broadcast"):
-        trajectory.motions(np.zeros((2, 6)), instants(DURATION, 5))
+        trajectory.motions(np.zeros((2, 6)), sample_instants(DURATION, 5))

@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from problem.errors import InputError
-from problem.yaml_input import MAX_BYTES, read_yaml
+from armlab.common.errors import InputError
+from armlab.common.settings import MAX_YAML_BYTES, read_yaml
 
 
 def _written(tmp_path: Path, content: str | bytes) -> Path:
@@ -56,7 +56,7 @@ def test_yaml_is_read_with_its_numbers_and_aliases(tmp_path: Path, text: str, co
         ("a: \x01", "not valid YAML"),
         (b"\xff\xfe\x00", "not UTF-8"),
         ("[" * 10_000, "nested too deeply"),
-        ("a" * (MAX_BYTES + 1), "larger than"),
+        ("a" * (MAX_YAML_BYTES + 1), "larger than"),
         ("a: &a [*a]", "aliases unfold"),
     ],
 )

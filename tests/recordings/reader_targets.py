@@ -14,14 +14,13 @@ from joint_state_bags import write_bag, write_ros1_bag
 from recording_folders import POSITION, SETTINGS, TORQUE, frame
 from scipy.io import savemat
 
-from problem.errors import InputError
-from recordings.check import check_recording
-from recordings.imports.matlab import read_mat
-from recordings.imports.matlab_arrays import numeric_arrays
-from recordings.imports.ros import read_bag
-from recordings.imports.text import read_odd_csv
-from recordings.load import load_recording
-from recordings.recording import Recording
+from armlab.common.errors import InputError
+from armlab.recordings.check import check_recording
+from armlab.recordings.imports.matlab import read_mat, read_numeric_arrays
+from armlab.recordings.imports.ros import read_bag
+from armlab.recordings.imports.text import read_odd_csv
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Recording
 
 SHORT = frame(seconds=0.3)
 CSV = SHORT.to_csv(index=False).encode()
@@ -92,7 +91,7 @@ def _in_a_fork(folder: Path) -> None:
     child = os.fork()
     if child == 0:
         try:
-            _read(Target("log.mat", lambda place: numeric_arrays(place / "log.mat"), _mat_seed), folder)
+            _read(Target("log.mat", lambda place: read_numeric_arrays(place / "log.mat"), _mat_seed), folder)
         except BaseException:
             traceback.print_exc()
             os._exit(1)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from recordings.vocabulary import EFFECT_IDS, EFFECTS, effect_named
+from armlab.recordings.vocabulary import EFFECT_IDS, EFFECTS, effect_named
 
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "verdict.schema.json").read_text())
 # design, contract of the diagnosis

@@ -15,19 +15,24 @@ from numpy.testing import assert_allclose
 from public_copies import needs_copies
 from refusals import refusal
 
+from armlab.cli.recordings import PUBLIC_RECORDING_NAMES
+from armlab.recordings.differentiate import Signals, differentiate
+from armlab.recordings.load import load_recording
+from armlab.recordings.public import (
+    LOCAL_COPIES_VARIABLE,
+    PUBLIC_RECORDINGS,
+    fetch_recording,
+    find_raw_file,
+    is_available,
+)
+from armlab.recordings.recording import Recording
+from armlab.recordings.recording_file import FILE_NAME
 from problem.arm import Arm, link_poses
 from problem.base_parameters import base_parameters
 from problem.regressor import observation_matrix
 from problem.robot_file import load_arm
 from problem.transforms import Array
 from problem.urdf import read_urdf
-from recordings.cli import PUBLIC_NAMES
-from recordings.differentiate import Signals, differentiate
-from recordings.load import load_recording
-from recordings.public.fetch import LOCAL_COPIES, at_hand, fetch_recording, raw_file
-from recordings.public.registry import PUBLIC
-from recordings.recording import Recording
-from recordings.recording_file import FILE_NAME
 
 NEEDS_COPIES = needs_copies()
 FIGURES = {  # percent of the torque, all joints: first run / the last one, rigid and with friction, rounded up
@@ -39,7 +44,7 @@ FIGURES = {  # percent of the torque, all joints: first run / the last one, rigi
 }
 
 
-@pytest.fixture(params=PUBLIC_NAMES)
+@pytest.fixture(params=PUBLIC_RECORDING_NAMES)
 def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Recording:
     return load_recording(fetch_recording(request.param, tmp_path / request.param))
 
@@ -98,9 +103,11 @@ def test_axes_5_and_6_of_the_tx40_are_coupled_as_published(tmp_path: Path) -> No
     assert_allclose(np.diag(transmission.torque), np.diag(gears))
 
 
-@pytest.mark.skipif(LOCAL_COPIES not in os.environ, reason=f"{LOCAL_COPIES} names no folder with the URDF of the TX40")
+@pytest.mark.skipif(
+    LOCAL_COPIES_VARIABLE not in os.environ, reason=f"{LOCAL_COPIES_VARIABLE} names no folder with the URDF of the TX40"
+)
 def test_the_tx40_is_that_of_its_urdf() -> None:
-    published = read_urdf(Path(os.environ[LOCAL_COPIES]) / "staubli_tx40" / "tx40_mdh_modified.urdf")
+    published = read_urdf(Path(os.environ[LOCAL_COPIES_VARIABLE]) / "staubli_tx40" / "tx40_mdh_modified.urdf")
     built_in = load_arm("staubli-tx40")
     for position in np.random.default_rng(0).uniform(-2, 2, (5, 6)):
         for one, other in zip(link_poses(published, position), link_poses(built_in, position), strict=True):
@@ -123,32 +130,34 @@ def test_raw_files_in_the_download_cache_are_at_hand_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     pooch = pytest.importorskip("pooch")
-    monkeypatch.delenv(LOCAL_COPIES, raising=False)
+    monkeypatch.delenv(LOCAL_COPIES_VARIABLE, raising=False)
     monkeypatch.setattr(pooch, "os_cache", lambda _: str(tmp_path))
-    assert not at_hand(PUBLIC[name])
-    (tmp_path / PUBLIC[name].folder).mkdir()
-    for file in PUBLIC[name].files:
-        (tmp_path / PUBLIC[name].folder / file.name).touch()
-    assert at_hand(PUBLIC[name])
+    assert not is_available(PUBLIC_RECORDINGS[name])
+    (tmp_path / PUBLIC_RECORDINGS[name].folder).mkdir()
+    for file in PUBLIC_RECORDINGS[name].files:
+        (tmp_path / PUBLIC_RECORDINGS[name].folder / file.name).touch()
+    assert is_available(PUBLIC_RECORDINGS[name])
 
 
 @NEEDS_COPIES
 def test_a_raw_file_with_another_content_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LOCAL_COPIES, str(tmp_path))
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path))
     (tmp_path / "emps").mkdir()
     (tmp_path / "emps" / "DATA_EMPS.mat").write_bytes(b"something else")
-    assert "is not the registered file" in refusal(raw_file, PUBLIC["emps"], PUBLIC["emps"].files[0])
+    assert "is not the registered file" in refusal(
+        find_raw_file, PUBLIC_RECORDINGS["emps"], PUBLIC_RECORDINGS["emps"].files[0]
+    )
 
 
 def test_a_missing_local_copy_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LOCAL_COPIES, str(tmp_path))
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path))
     assert "cannot read" in refusal(fetch_recording, "emps", tmp_path / "new")
     assert not (tmp_path / "new").exists()
 
 
 def test_a_download_without_connection_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pooch = pytest.importorskip("pooch")
-    monkeypatch.delenv(LOCAL_COPIES, raising=False)
+    monkeypatch.delenv(LOCAL_COPIES_VARIABLE, raising=False)
 
     def no_connection(*_: object) -> None:
         raise OSError("name or service not known")
@@ -156,12 +165,12 @@ def test_a_download_without_connection_is_told_in_one_line(tmp_path: Path, monke
     monkeypatch.setattr(pooch, "retrieve", no_connection)
     message = refusal(fetch_recording, "emps", tmp_path / "new")
     assert "cannot fetch https://" in message
-    assert LOCAL_COPIES in message
+    assert LOCAL_COPIES_VARIABLE in message
 
 
 def test_a_download_is_checked_against_the_registered_hash(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pooch = pytest.importorskip("pooch")
-    monkeypatch.delenv(LOCAL_COPIES, raising=False)
+    monkeypatch.delenv(LOCAL_COPIES_VARIABLE, raising=False)
     asked = []
 
     def retrieve(address: str, known_hash: str, name: str, cache: Path) -> str:
@@ -170,13 +179,13 @@ def test_a_download_is_checked_against_the_registered_hash(tmp_path: Path, monke
 
     monkeypatch.setattr(pooch, "retrieve", retrieve)
     assert "does not match" in refusal(fetch_recording, "unisa-panda", tmp_path / "new")
-    (file,) = PUBLIC["unisa-panda"].files
+    (file,) = PUBLIC_RECORDINGS["unisa-panda"].files
     assert asked == [(file.address, f"sha256:{file.sha256}")]
 
 
 def test_every_public_recording_has_a_built_in_robot_and_a_command() -> None:
-    assert tuple(PUBLIC) == PUBLIC_NAMES
-    assert [load_arm(name).name for name in PUBLIC] == list(PUBLIC)
+    assert tuple(PUBLIC_RECORDINGS) == PUBLIC_RECORDING_NAMES
+    assert [load_arm(name).name for name in PUBLIC_RECORDINGS] == list(PUBLIC_RECORDINGS)
 
 
 def test_an_unknown_public_recording_names_the_nearest(tmp_path: Path) -> None:

@@ -9,13 +9,11 @@ import pandas as pd
 import pytest
 from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, frame
 
+from armlab.recordings.check import check_channels, check_recording
+from armlab.recordings.geometry_check import check_torque_fit, find_turned_zero, thin_runs
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Run
 from problem.robot_file import load_arm
-from recordings.check import check_recording
-from recordings.checks.channels import channel_findings
-from recordings.checks.fit import fit_findings, thin
-from recordings.checks.zeros import turned_zero
-from recordings.load import load_recording
-from recordings.run import Run
 
 
 def run_of(table: pd.DataFrame) -> Run:
@@ -25,7 +23,7 @@ def run_of(table: pd.DataFrame) -> Run:
 
 
 def said(run: Run) -> list[tuple[str, int | None]]:
-    return [(finding.kind, finding.joint) for finding in channel_findings(run, ARM)]
+    return [(finding.kind, finding.joint) for finding in check_channels(run, ARM)]
 
 
 def with_velocity() -> pd.DataFrame:
@@ -37,7 +35,7 @@ def with_velocity() -> pd.DataFrame:
 def test_a_sound_run_gives_no_suspicion() -> None:
     run = run_of(with_velocity())
     assert said(run) == []
-    assert fit_findings([run, run_of(frame(1))], ARM) == ()
+    assert check_torque_fit([run, run_of(frame(1))], ARM) == ()
 
 
 def test_a_dead_torque_channel_is_named() -> None:
@@ -77,7 +75,7 @@ def test_a_velocity_channel_at_odds_with_its_position_is_named(change: dict, wor
     for name, source in change.items():
         original = with_velocity()
         table[name] = original[source] if isinstance(source, str) else source * original[name]
-    assert words in channel_findings(run_of(table), ARM)[0].text
+    assert words in check_channels(run_of(table), ARM)[0].text
 
 
 @pytest.mark.parametrize("signal", ["torque", "position"])
@@ -87,7 +85,7 @@ def test_swapped_channels_are_named(signal: str, pair: tuple[int, int]) -> None:
     order[list(pair)] = pair[::-1]
     runs = [run_of(frame(seed)) for seed in range(2)]
     swapped = [replace(run, **{signal: getattr(run, signal)[:, order]}) for run in runs]
-    (finding,) = fit_findings(swapped, ARM)
+    (finding,) = check_torque_fit(swapped, ARM)
     assert finding.kind == "swapped_channels"
     assert f"channels {pair[0] + 1} and {pair[1] + 1}" in finding.text
     assert signal in finding.text
@@ -106,12 +104,12 @@ def test_a_zero_that_is_turned_by_quarters_is_named(tmp_path: Path, turn: int) -
 
 
 def test_zeros_that_stand_right_are_not_suspected() -> None:
-    assert turned_zero(ARM, thin([run_of(frame(seed)) for seed in range(2)])) is None
+    assert find_turned_zero(ARM, thin_runs([run_of(frame(seed)) for seed in range(2)])) is None
 
 
 def test_links_of_another_robot_are_reported() -> None:
     other = load_arm("kuka-kr300").first(3)
-    findings = fit_findings([run_of(frame(seed)) for seed in range(2)], other)
+    findings = check_torque_fit([run_of(frame(seed)) for seed in range(2)], other)
     assert [finding.kind for finding in findings] == ["another_arm"]
 
 

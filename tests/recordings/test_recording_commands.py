@@ -9,10 +9,10 @@ import pytest
 from click.testing import CliRunner, Result
 from recording_folders import folder_with, frame
 
-from problem.errors import InputError
-from recordings.cli import recording
-from recordings.load import load_recording
-from recordings.public.fetch import LOCAL_COPIES
+from armlab.cli.recordings import recording
+from armlab.common.errors import InputError
+from armlab.recordings.load import load_recording
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE
 
 
 def call(*words: object, answers: str = "") -> Result:
@@ -81,7 +81,7 @@ def test_import_asks_for_what_was_not_said(tmp_path: Path) -> None:
     assert load_recording(tmp_path / "new").arm.name == "irb120-arm"
 
 
-@pytest.mark.skipif(LOCAL_COPIES not in os.environ, reason=f"{LOCAL_COPIES} names no local copies")
+@pytest.mark.skipif(LOCAL_COPIES_VARIABLE not in os.environ, reason=f"{LOCAL_COPIES_VARIABLE} names no local copies")
 def test_fetch_names_source_and_licence(tmp_path: Path) -> None:
     result = call("fetch", "emps", "--out", tmp_path / "emps")
     assert "forgi86/sysid-neural-continuous, licence Apache-2.0" in result.output
@@ -89,7 +89,10 @@ def test_fetch_names_source_and_licence(tmp_path: Path) -> None:
 
 
 def test_the_commands_import_nothing_heavy_before_they_run() -> None:
-    code = "import sys, recordings.cli; print(sorted({'numpy', 'scipy', 'matplotlib', 'pandas'} & set(sys.modules)))"
+    code = (
+        "import sys, armlab.cli.recordings; print(sorted({'numpy', 'scipy', 'matplotlib', 'pandas'} & "
+        "set(sys.modules)))"
+    )
     path = os.pathsep.join(sys.path)
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path}

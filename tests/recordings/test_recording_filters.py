@@ -10,13 +10,12 @@ from numpy.testing import assert_allclose
 from recording_folders import ARM, POSITION, RATE_HZ, TORQUE, frame, motion_at
 from scipy.signal import butter, sosfiltfilt
 
+from armlab.recordings.cutoff import choose_cutoff
+from armlab.recordings.differentiate import differentiate, resample_evenly
+from armlab.recordings.filters import BUTTERWORTH_ORDER, Butterworth, LowPass, SmoothingSpline
+from armlab.recordings.periods import Harmonics, average_periods, find_period
+from armlab.recordings.recording import Run
 from problem.regressor import observation_matrix, rigid_body_torque
-from recordings.cutoff import choose_cutoff
-from recordings.differentiate import differentiate
-from recordings.filters import ORDER, Butterworth, LowPass, SmoothingSpline
-from recordings.periods import Harmonics, average_periods, find_period
-from recordings.resample import evened
-from recordings.run import Run
 
 KINDS = (Butterworth, SmoothingSpline)
 
@@ -118,13 +117,13 @@ def test_a_cut_off_above_half_the_rate_is_refused() -> None:
 
 def test_uneven_samples_become_even_ones_of_the_same_motion() -> None:
     time = frame()["t"].to_numpy() + np.random.default_rng(2).uniform(-0.3, 0.3, len(frame())) / RATE_HZ
-    run = evened(replace(run_of(), time=time, position=motion_at(time).position))
+    run = resample_evenly(replace(run_of(), time=time, position=motion_at(time).position))
     assert run.even
     assert_allclose(run.position, motion_at(run.time).position, atol=2e-6)
 
 
 def test_lost_samples_are_bridged_where_the_run_is_filtered() -> None:
-    run = evened(run_of(frame().drop(index=[100, 300, 301])))
+    run = resample_evenly(run_of(frame().drop(index=[100, 300, 301])))
     assert run.samples == len(frame())
     assert_allclose(run.position, frame()[POSITION], atol=1e-6)
 
@@ -172,6 +171,6 @@ def test_the_scatter_of_the_periods_gives_the_covariance_of_the_averaged_torque(
 @pytest.mark.parametrize("shape", [(900,), (900, 3), (900, 3, 2)])
 def test_butterworth_is_scipys_sosfiltfilt_to_the_bit(shape: tuple[int, ...]) -> None:
     signal = np.random.default_rng(1).normal(size=shape).cumsum(axis=0)
-    sections = butter(ORDER, 20, fs=250, output="sos")
+    sections = butter(BUTTERWORTH_ORDER, 20, fs=250, output="sos")
     theirs = sosfiltfilt(sections, signal, axis=0, padlen=38)
     np.testing.assert_array_equal(Butterworth(250, 20, 900).smooth(signal), theirs)

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from recording_folders import SETTINGS, folder_with, frame
 from refusals import refusal
 
-from recordings.load import load_recording
-from recordings.recording_file import FILE_NAME
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording_file import FILE_NAME
 
 SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "recording.schema.json").read_text())
 

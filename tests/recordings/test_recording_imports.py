@@ -10,11 +10,11 @@ from recording_folders import POSITION, TORQUE, frame
 from refusals import refusal
 from scipy.io import savemat
 
-from recordings.imports.command import import_files
-from recordings.imports.matlab import read_mat
-from recordings.imports.ros import read_bag
-from recordings.imports.text import read_odd_csv
-from recordings.load import load_recording
+from armlab.recordings.imports.files import import_files
+from armlab.recordings.imports.matlab import read_mat
+from armlab.recordings.imports.ros import read_bag
+from armlab.recordings.imports.text import read_odd_csv
+from armlab.recordings.load import load_recording
 
 OPTIONS = {
     "robot": "irb120-arm",

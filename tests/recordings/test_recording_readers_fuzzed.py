@@ -11,11 +11,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recording_folders import POSITION, SETTINGS, TORQUE, folder_with, frame
 
-from problem.errors import InputError
-from recordings.imports.matlab_arrays import numeric_arrays
-from recordings.imports.ros import read_bag
-from recordings.imports.text import read_odd_csv
-from recordings.load import load_recording
+from armlab.common.errors import InputError
+from armlab.recordings.imports.matlab import read_numeric_arrays
+from armlab.recordings.imports.ros import read_bag
+from armlab.recordings.imports.text import read_odd_csv
+from armlab.recordings.load import load_recording
 
 ANY = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 SOUND = frame(seconds=1.0).to_csv(index=False)
@@ -96,7 +96,9 @@ def test_a_sound_run_of_any_size_is_never_changed(
     assert run.findings == ()
 
 
-@pytest.mark.parametrize(("suffix", "reader"), [(".mat", numeric_arrays), (".csv", read_odd_csv), (".mcap", read_bag)])
+@pytest.mark.parametrize(
+    ("suffix", "reader"), [(".mat", read_numeric_arrays), (".csv", read_odd_csv), (".mcap", read_bag)]
+)
 @given(content=st.binary(max_size=400))
 @ANY
 def test_any_bytes_to_import_are_refused_in_one_line_or_read(

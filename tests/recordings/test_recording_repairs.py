@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from recording_folders import POSITION, RATE_HZ, SETTINGS, folder_with, frame, motion_at
 from refusals import refusal
 
-from recordings.load import load_recording
-from recordings.run import Run
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Run
 
 
 def loaded(folder: Path, table: pd.DataFrame | str) -> tuple[Run, ...]:

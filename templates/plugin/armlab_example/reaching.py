@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge
 
+from armlab.common.settings import Settings
 from problem.contract import Evaluation, Problem
-from problem.settings import Settings
 from problem.transforms import Array
 
 

@@ -1,0 +1,169 @@
+"""Commands of the diagnosis: what physics is missing, and which experiment to do next."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from armlab.cli.identification import real as identify_real
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.command("next")
+@click.argument("verdict", type=_FILE)
+@click.option("--robot", required=True, help="A built-in arm, a robot file or a URDF, with the limits of the joints.")
+@click.option("--recording", type=_FILE, help="The recording that was diagnosed: counts what it shows already.")
+@click.option(
+    "--rivals", help="Like viscous_friction@2,time_delay; or library: all that come near [default: of VERDICT]"
+)
+@click.option("--algorithm", default="l-shade", show_default=True, help="Any registered one.")
+@click.option("--evaluations", type=click.IntRange(min=50), default=1000, show_default=True)
+@click.option("--duration", type=click.FloatRange(min=1), default=10.0, show_default=True, help="Of the motion, s.")
+@click.option("--harmonics", type=click.IntRange(min=2), default=8, show_default=True)
+@click.option(
+    "--links",
+    type=click.Choice(["exact", "near", "free"]),
+    help="How well links are known [default: exact where the diagnosis left them, else near; free without].",
+)
+@click.option("--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Hz.")
+@click.option("--out", type=_FILE, default=Path("next"), show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+def next_experiment(
+    verdict: Path,
+    robot: str,
+    recording: Path | None,
+    rivals: str | None,
+    algorithm: str,
+    evaluations: int,
+    duration: float,
+    harmonics: int,
+    links: str | None,
+    rate_hz: float,
+    out: Path,
+    seed: int,
+) -> None:
+    """Design the motion that decides between the rivals of VERDICT: CSV, ROS 2, RAPID, card and picture."""
+    from armlab.cli.next_experiment import write_next_experiment
+    from armlab.diagnosis.next.motion import Budget
+
+    budget = Budget(duration, harmonics, algorithm, evaluations, seed)
+    for line in write_next_experiment(verdict, robot, recording, rivals, budget, links, rate_hz, out):
+        click.echo(line)
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder for verdict, report and model.")
+@click.option(
+    "--baseline",
+    type=click.Choice(["nominal", "refit", "simulated"]),
+    help="What is compared [default: nominal where there is a simulation].",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of random waves in surrogates.")
+@click.option("--compare", "old", type=click.Path(path_type=Path), help="An older recording: say what changed since.")
+@click.option("--without", multiple=True, metavar="GUARD", help="Switch a guard off, to see what it is worth.")
+def diagnose(
+    recording: Path, out: Path, baseline: str | None, seed: int, old: Path | None, without: tuple[str, ...]
+) -> None:
+    """Say where the simulation of RECORDING is wrong, what physics is missing, and how much better it then predicts."""
+    from armlab.diagnosis.compare.report import compare_recordings
+    from armlab.diagnosis.report.write import diagnose_recording
+
+    with ProgressLine() as progress:
+        lines = (
+            diagnose_recording(recording, out, baseline, seed, without, progress.tell)
+            if old is None
+            else compare_recordings(old, recording, out, baseline, seed, progress.tell)
+        )
+        for line in lines:
+            progress.clear()
+            click.echo(line)
+
+
+@click.command("export-model")
+@click.argument("model", type=click.Path(path_type=Path))
+@click.argument("out", type=click.Path(path_type=Path))
+def export_model(model: Path, out: Path) -> None:
+    """Write MODEL, a model.yaml with links, as OUT: a .urdf or an MJCF .xml file."""
+    from armlab.diagnosis.simulator_export import export_model as write
+
+    for line in write(model, out):
+        click.echo(line)
+
+
+def _identify_and_diagnose(results: Path, recordings: Path, only: tuple[str, ...], **others: Any) -> None:
+    from armlab.diagnosis.real_arms import diagnose_public_recordings
+
+    assert identify_real.callback is not None
+    identify_real.callback(results=results, recordings=recordings, only=only, **others)
+    with ProgressLine() as progress:
+        for line in diagnose_public_recordings(results, recordings, only, progress.tell):
+            progress.clear()
+            click.echo(line)
+
+
+real = click.Command(
+    "real",
+    params=identify_real.params,
+    callback=_identify_and_diagnose,
+    help="Identify and diagnose the public recordings of real arms: tables and pages in results/real.",
+)
+
+
+@click.command("real-concealed")
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--only", multiple=True, help="Name of a public recording [default: all].")
+def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> None:
+    """Conceal something in public recordings of real arms, diagnose them, and judge: concealed.md, .csv and .svg."""
+    from armlab.diagnosis.real_concealed.report import conceal_in_recordings
+
+    with ProgressLine() as progress:
+        for line in conceal_in_recordings(results, recordings, only, progress.tell):
+            progress.clear()
+            click.echo(line)
+
+
+@click.command()
+@click.argument("robot")
+@click.argument("trajectory")
+@click.option("--noise", multiple=True, type=float, help="Of the torque, N m: once, or once a joint [default: 1 %].")
+@click.option("--joints", type=click.IntRange(min=1), help="How many of its first joints move [default: all].")
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the card as page, tables and pictures.")
+def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints: int | None, out: Path | None) -> None:
+    """Say which effects TRAJECTORY on ROBOT could not tell apart, before anyone records it.
+
+    ROBOT: a file or a built-in name. TRAJECTORY: a CSV with t, q1, ... in s and rad, a recording folder, or the name
+    of a trajectory in results/best_known.json.
+    """
+    from armlab.diagnosis.confusability.report import write_card
+
+    for line in write_card(robot, trajectory, joints, noise, out):
+        click.echo(line)
+
+
+class ProgressLine:
+    """Tells on the terminal's error stream, in one line, what is being done; nothing where that is no terminal."""
+
+    def __init__(self) -> None:
+        self.seen = sys.stderr.isatty()
+
+    def __enter__(self) -> "ProgressLine":
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leaves a clear line, for the error too that may have ended the work."""
+        self.clear()
+
+    def tell(self, message: str) -> None:
+        """Shows a message in place of the one before."""
+        if self.seen:
+            click.echo(f"\r\033[K{message} ...", nl=False, err=True)
+
+    def clear(self) -> None:
+        """Takes the message away."""
+        if self.seen:
+            click.echo("\r\033[K", nl=False, err=True)

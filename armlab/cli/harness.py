@@ -1,0 +1,278 @@
+"""Commands of the benchmark harness: run experiments, list what there is, report, share, best known."""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import click
+
+
+def trial_bar(total: int, done: int) -> Any:
+    """A bar over trials with the time left; silent where no one watches."""
+    from tqdm import tqdm
+
+    return tqdm(total=total, initial=done, unit="trial", disable=None)  # None: only on a terminal
+
+
+_DEFAULT_STORE = Path(".armlab/runs.sqlite")
+
+
+def _run_options(command: Callable[..., None], results: str = "results") -> Callable[..., None]:
+    options = (
+        click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core]."),
+        click.option(
+            "--store",
+            type=click.Path(path_type=Path),
+            default=_DEFAULT_STORE,
+            show_default=True,
+            help="File that keeps finished trials.",
+        ),
+        click.option(
+            "--results",
+            type=click.Path(path_type=Path),
+            default=Path(results),
+            show_default=True,
+            help="Folder for tables and figures.",
+        ),
+        click.option(
+            "--executor",
+            type=click.Choice(["loky", "dask", "ray"]),
+            help="Engine [default: that of the configuration, else loky: processes on this machine].",
+        ),
+        click.option("--address", help="Of a running Dask or Ray cluster [default: processes on this machine]."),
+        click.option("--dry-run", is_flag=True, help="List the trials and estimate the time; run nothing."),
+        click.option("--fresh", is_flag=True, help="Compute again what is already kept."),
+        click.option("--overwrite", is_flag=True, help="Replace results of another configuration."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("config", type=click.Path(path_type=Path))
+@_run_options
+def run(config: Path, **options: Any) -> None:
+    """Run what is missing of an experiment and write its results."""
+    _run_configs([config], **options)
+
+
+@click.command()
+@_run_options
+def table3(**options: Any) -> None:
+    """Table 3 of the paper: configs/table3.yaml."""
+    _run_configs([Path("configs/table3.yaml")], **options)
+
+
+@click.command()
+@_run_options
+def figure2(**options: Any) -> None:
+    """Figure 2, as published and at equal evaluations: configs/figure2*.yaml."""
+    _run_configs([Path("configs/figure2.yaml"), Path("configs/figure2_equal_evaluations.yaml")], **options)
+
+
+@click.command()
+@_run_options
+def figure3(**options: Any) -> None:
+    """Figure 3 of the paper: configs/figure3.yaml."""
+    _run_configs([Path("configs/figure3.yaml")], **options)
+
+
+@click.command()
+@partial(_run_options, results="results/paper")
+def paper(**options: Any) -> None:
+    """All tables and figures of the paper, and what of it could be reproduced: results/paper/."""
+    from bench.studies.paper.replication import describe_paper, make_paper
+
+    _make_study(make_paper, describe_paper, **options)
+
+
+@click.command()
+@partial(_run_options, results="results/study")
+def study(**options: Any) -> None:
+    """The comparison where the paper stops: six joints, frames, budgets, MuPSO's ingredients: results/study/."""
+    from bench.studies.beyond_paper.study import describe_study, make_study
+
+    _make_study(make_study, describe_study, **options)
+
+
+def _make_study(make: Callable[..., Any], describe: Callable[..., Any], dry_run: bool, **options: Any) -> None:
+    configs, settings = Path("configs"), _read_run_options(**options)
+    records = Path("results/best_known.json")
+    for line in describe(configs, settings) if dry_run else make(configs, settings, records, trial_bar):
+        click.echo(line)
+
+
+def _run_configs(configs: Sequence[Path], dry_run: bool, **options: Any) -> None:
+    from bench.run import describe_run, run_experiment
+
+    settings = _read_run_options(**options)
+    for config in configs:
+        for line in describe_run(config, settings) if dry_run else run_experiment(config, settings, trial_bar):
+            click.echo(line)
+
+
+def _read_run_options(workers: int | None, executor: str | None, address: str | None, **options: Any) -> Any:
+    from joblib import cpu_count
+
+    from armlab.common.settings import validate
+    from bench.executors.contract import ExecutorSettings
+    from bench.run import RunOptions
+
+    if address and not executor:
+        raise click.UsageError("--address should stand beside --executor dask or --executor ray")
+    chosen = validate(ExecutorSettings, {"backend": executor, "address": address}, "--executor") if executor else None
+    return RunOptions(workers=workers or cpu_count(), executor=chosen, **options)
+
+
+@click.command("list")
+def list_names() -> None:
+    """The algorithms, problems and arms that a configuration can name."""
+    from algorithms import registry as algorithms
+    from problem import registry as problems
+    from problem.robot_file import built_in_arms
+    from problem.suite import instances, suites
+
+    click.echo("algorithms: " + ", ".join(algorithms.names()))
+    click.echo("peers (extra `peers`): " + ", ".join(algorithms.peer_names()))
+    click.echo("problems: " + ", ".join(problems.names()))
+    for suite in suites():
+        click.echo(f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first")
+    click.echo("arms: " + ", ".join(built_in_arms()))
+
+
+@click.command()
+@click.argument("robot")
+@click.option("--columns", type=click.Choice(["later_columns", "earlier_columns"]), default="later_columns")
+def base(robot: str, columns: str) -> None:
+    """The base parameters of ROBOT: a built-in arm, a robot file or a URDF."""
+    from problem.base_parameters import base_parameters
+    from problem.robot_file import load_arm
+
+    found = base_parameters(load_arm(robot), columns)
+    click.echo(f"{len(found)} base parameters:\n  " + "\n  ".join(found.sums))
+    click.echo(f"{len(found.alone)} identifiable alone: " + " ".join(found.alone))
+    click.echo(f"{len(found.grouped)} only in sums: " + " ".join(found.grouped))
+    click.echo(f"{len(found.unidentifiable)} without effect: " + " ".join(found.unidentifiable))
+
+
+@click.command()
+@click.argument("algorithm")
+def check(algorithm: str) -> None:
+    """Test whether an algorithm keeps the promises of its contract."""
+    from algorithms.check import BrokenPromiseError, check_algorithm
+    from bench.config import find_algorithm
+
+    try:
+        check_algorithm(find_algorithm(algorithm, "check"))
+    except BrokenPromiseError as error:
+        raise click.ClickException(str(error)) from None
+    click.echo(f"{algorithm} keeps its promises")
+
+
+_PATH = click.Path(path_type=Path)
+_STORE_OPTION = click.option(
+    "--store", type=_PATH, default=Path(".armlab/runs.sqlite"), show_default=True, help="File with finished trials."
+)
+
+
+@click.command()
+@click.argument("results", type=_PATH)
+@_STORE_OPTION
+@click.option("--out", type=_PATH, help="HTML file [default: results/NAME_report.html].")
+def report(results: Path, store: Path, out: Path | None) -> None:
+    """One self-contained HTML page about RESULTS: a configuration file, or a folder that `share` wrote."""
+    from bench.report.page import write_report
+
+    click.echo(write_report(results, store, out))
+
+
+@click.command()
+@click.argument("first", type=_PATH)
+@click.argument("second", type=_PATH)
+@_STORE_OPTION
+@click.option("--out", type=_PATH, help="Folder for comparison.md and .csv [default: print only].")
+def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
+    """What changed from the results FIRST to SECOND, algorithm by algorithm and problem by problem."""
+    from bench.result_sets.compare import compare_results
+
+    click.echo(compare_results(first, second, store, out), nl=False)
+
+
+@click.command()
+@click.argument("results", type=_PATH)
+@_STORE_OPTION
+@click.option("--as", "form", type=click.Choice(["csv", "parquet", "ioh"]), default="csv", show_default=True)
+@click.option("--out", type=_PATH, required=True, help="Folder to write into.")
+def share(results: Path, store: Path, form: str, out: Path) -> None:
+    """Write RESULTS as tidy tables (csv, parquet) or in the format of IOHprofiler (ioh)."""
+    from bench.result_sets.formats import share_results
+
+    for path in share_results(results, store, form, out):
+        click.echo(path)
+
+
+@click.command()
+@click.argument("damaged", type=_PATH)
+@click.option("--out", type=_PATH, required=True, help="File of the new store.")
+def salvage(damaged: Path, out: Path) -> None:
+    """Take what is readable of a DAMAGED run store into a new one; the rest is computed again by the next run."""
+    from bench.store import salvage as save
+
+    click.echo(f"{save(damaged, out)} outcomes of {damaged} are in {out}")
+
+
+@click.command()
+@click.argument("algorithms", nargs=-1)
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+def properties(algorithms: tuple[str, ...], results: Path) -> None:
+    """Translation, scale, noise, bounds and overhead of ALGORITHMS [default: all]: properties.md and .csv."""
+    from bench.studies.properties import write_properties
+
+    for path in write_properties(algorithms, results):
+        click.echo(path)
+
+
+_RESULTS_OPTION = click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+
+
+@click.command("best-known")
+@click.option("--minutes", type=click.FloatRange(min=0), default=10.0, show_default=True)
+@click.option("--problem", help="One of configs/best_known.yaml [default: all in turn].")
+@_RESULTS_OPTION
+def best_known(minutes: float, problem: str | None, results: Path) -> None:
+    """Search on for better trajectories: best_known.json; stop it at any time, it goes on from there."""
+    from bench.studies.best_known.search import improve_best_known
+
+    for line in improve_best_known(results, minutes, problem):
+        click.echo(line)
+
+
+@click.command("does-it-help")
+@click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core].")
+@_RESULTS_OPTION
+def does_it_help(workers: int | None, results: Path) -> None:
+    """Does a small condition number help to identify the arm? Writes paper/does_it_help.*."""
+    from joblib import cpu_count
+
+    from bench.studies.does_it_help.study import make_does_it_help as answer
+
+    for path in answer(results, workers or cpu_count()):
+        click.echo(path)
+
+
+@click.command()
+@click.argument("problem", type=click.Path(path_type=Path))
+@click.option("--record", required=True, help="Name of a record in best_known.json.")
+@click.option("--format", "form", type=click.Choice(["csv", "ros2", "rapid"]), default="csv", show_default=True)
+@click.option("--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Hz.")
+@click.option("--out", type=click.Path(path_type=Path), required=True)
+@_RESULTS_OPTION
+def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> None:
+    """Write the best trajectory known for a robot, if it keeps the limits of PROBLEM at the controller's rate."""
+    from bench.studies.best_known.export import export_record as write
+    from bench.studies.best_known.records import RECORDS_FILE
+
+    write(problem, record, form, out, results / RECORDS_FILE, rate_hz)
+    click.echo(out)

@@ -1,0 +1,126 @@
+"""The commands `identify`, `predict`, `real`, `coverage`, `payload` and `gains`: options only, no logic."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likelihood", "instrumental", "physical")
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="Folder for model.yaml and report.html [default: RECORDING]."
+)
+@click.option("--method", type=click.Choice(METHODS), default="weighted", show_default=True, help="Estimator.")
+@click.option(
+    "--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="Of the low-pass [default: from the data]."
+)
+@click.option(
+    "--tolerance", type=click.FloatRange(min=0, min_open=True), help="Draw links to the robot's own, so far off."
+)
+@click.option("--select", "choose", is_flag=True, help="Choose cut-off, components and prior by cross-validation.")
+def identify(
+    recording: Path, out: Path | None, method: str, cutoff_hz: float | None, tolerance: float | None, choose: bool
+) -> None:
+    """Identify the parameters of the arm of RECORDING, a recording folder."""
+    from armlab.identification.identify import IdentifyOptions, identify_recording
+
+    for line in identify_recording(recording, out or recording, IdentifyOptions(method, cutoff_hz, tolerance, choose)):
+        click.echo(line)
+
+
+@click.command()
+@click.argument("model", type=click.Path(path_type=Path))
+@click.argument("recording", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for the predicted torques, a CSV a run.")
+def predict(model: Path, recording: Path, out: Path | None) -> None:
+    """Compare the torque of MODEL, a model.yaml, with that of RECORDING."""
+    from armlab.identification.identify import predict_recording
+
+    for line in predict_recording(model, recording, out):
+        click.echo(line)
+
+
+@click.command()
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--only", multiple=True, help="Name of a public recording [default: all].")
+@click.option(
+    "--peers", type=click.Path(path_type=Path), help="Python that has figaroh and mujoco[sysid]: adds peers.md."
+)
+def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None) -> None:
+    """Identify the public recordings of real arms: identification.csv and a page with pictures."""
+    from armlab.identification.real.report import identify_public
+
+    for line in identify_public(results, recordings, only, peers):
+        click.echo(line)
+
+
+@click.command()
+@click.option("--experiments", type=click.IntRange(min=10), default=1000, show_default=True)
+@click.option("--seed", type=int, default=0, show_default=True)
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+def coverage(experiments: int, seed: int, results: Path) -> None:
+    """How often 95 % intervals hold the truth, over simulated experiments: coverage.json."""
+    from armlab.identification.coverage import write_coverage
+
+    for line in write_coverage(experiments, seed, results):
+        click.echo(line)
+
+
+def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Options of the commands about loads."""
+    options = (
+        click.option("--link", type=click.IntRange(min=1), help="Link that carries the load [default: the last]."),
+        click.option(
+            "--counterbalance", type=click.IntRange(min=1), help="Joint that has a counterbalance (a spring)."
+        ),
+        click.option("--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="[default: from the data]"),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("loaded", type=click.Path(path_type=Path))
+@click.option("--without", type=click.Path(path_type=Path), help="Recording without the load [default: the CAD links].")
+@click.option("--centre", type=float, nargs=3, help="Where the load sits in the link's frame, m: seek its mass alone.")
+@_add_load_options
+def payload(
+    loaded: Path,
+    without: Path | None,
+    centre: tuple[float, float, float] | None,
+    link: int | None,
+    counterbalance: int | None,
+    cutoff_hz: float | None,
+) -> None:
+    """Identify the load that the arm carries in LOADED, a recording folder."""
+    from armlab.identification.payload import PayloadSetting, Place, payload_lines
+
+    for line in payload_lines(loaded, without, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)):
+        click.echo(line)
+
+
+@click.command()
+@click.argument("loaded", type=click.Path(path_type=Path))
+@click.option("--without", type=click.Path(path_type=Path), required=True, help="Recording without the load.")
+@click.option("--mass", type=click.FloatRange(min=0, min_open=True), required=True, help="Of the load, kg.")
+@click.option("--centre", type=float, nargs=3, required=True, help="Its centre of mass in the link's frame, m.")
+@_add_load_options
+def gains(
+    loaded: Path,
+    without: Path,
+    mass: float,
+    centre: tuple[float, float, float],
+    link: int | None,
+    counterbalance: int | None,
+    cutoff_hz: float | None,
+) -> None:
+    """Find how much each joint's torque reading is too large, from the known load that the arm carries in LOADED."""
+    from armlab.identification.payload import PayloadSetting, Place, gains_lines
+
+    for line in gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)):
+        click.echo(line)

@@ -1,0 +1,61 @@
+"""Commands that check the harness itself: speed, large sweeps, regressions."""
+
+from pathlib import Path
+
+import click
+
+from armlab.cli.harness import trial_bar
+
+
+@click.command()
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+def speed(results: Path) -> None:
+    """How fast, beside Pinocchio, mealpy, pygmo and scipy: speed.json and speed.md (extras `engines`, `peers`)."""
+    from bench.studies.speed.report import write_speed_report
+
+    for path in write_speed_report(results):
+        click.echo(path)
+
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command()
+@click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
+@click.option("--kills", type=click.IntRange(min=1), help="Instead: kill the command, and its workers, so many times.")
+@click.option("--results", type=_PATH, default=Path("results"), show_default=True)
+@click.pass_context
+def scale(context: click.Context, trials: int, kills: int | None, results: Path) -> None:
+    """Memory, overhead and efficiency of large sweeps: scale.md. With --kills: kills.md, exit code 1 after a loss."""
+    from bench.studies.scale.report import write_kills, write_scale
+
+    configs, unharmed = Path("configs"), True
+    if kills:
+        page, unharmed = write_kills(configs, kills, results, _print_progress)
+    else:
+        page = write_scale(configs, trials, results, _print_progress)
+    click.echo(page)
+    context.exit(0 if unharmed else 1)
+
+
+def _print_progress(text: str) -> None:
+    click.echo(text, err=True)
+
+
+@click.command()
+@click.option("--update-baseline", "task", flag_value="update_baseline", help="Accept the present code as it is.")
+@click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power; takes minutes.")
+@click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core].")
+@click.option("--config", type=click.Path(path_type=Path), default=Path("configs/regression.yaml"), show_default=True)
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.pass_context
+def regression(context: click.Context, task: str | None, workers: int | None, config: Path, results: Path) -> None:
+    """Compare a short fixed sweep with the committed baseline; exit code 1 if a condition number changed."""
+    from joblib import cpu_count
+
+    from bench.studies.regression.tasks import RegressionTasks
+
+    report = getattr(RegressionTasks(config, results, workers or cpu_count(), trial_bar), task or "check")()
+    for line in report.lines:
+        click.echo(line)
+    context.exit(report.exit_code)

@@ -1,0 +1,59 @@
+"""Write the next experiment: the designed motion in all forms of `armlab export`, the card and the picture.
+
+Apart from the click commands, since it imports the diagnosis, and `armlab --help` imports all modules of commands.
+"""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_args
+
+from armlab.common.errors import InputError
+from armlab.diagnosis.next.card import card_content, card_lines, draw_card
+from armlab.diagnosis.next.experiment import Experiment, design_experiment
+from armlab.diagnosis.next.motion import Budget
+from armlab.diagnosis.next.prepare import LinkKnowledge
+from bench.files import write_whole
+from bench.trajectory_files import TRAJECTORY_FORMATS, sample_trajectory
+
+MOTION_FILES = {"csv": "next.csv", "ros2": "next.ros2.yaml", "rapid": "next.mod"}
+
+
+def write_next_experiment(
+    verdict: Path,
+    robot: str,
+    recording: Path | None,
+    rivals: str | None,
+    budget: Budget,
+    links: str | None,
+    rate_hz: float,
+    out: Path,
+) -> Iterator[str]:
+    """Designs and writes the next experiment, and tells its card in lines; InputError for what cannot be used."""
+    known: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
+    experiment = design_experiment(verdict, robot, recording, rivals, budget, known)
+    yield from card_lines(experiment)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot write into {out}: {error.strerror}") from None
+    write_whole(out / "next.json", json.dumps(card_content(experiment), indent=1, allow_nan=False) + "\n")
+    yield f"wrote {out / 'next.json'}"
+    yield from _write_motion(experiment, rate_hz, out)
+
+
+def _write_motion(experiment: Experiment, rate_hz: float, out: Path) -> Iterator[str]:
+    """The files of the motion, where one helps; a form that the arm does not have is told and left out."""
+    if experiment.problem is None or experiment.point is None:
+        return
+    trajectory = sample_trajectory(experiment.excitation, experiment.point, rate_hz, "next")
+    for form, name in MOTION_FILES.items():
+        try:
+            text = TRAJECTORY_FORMATS[form](trajectory)
+        except InputError as error:
+            yield f"left out {out / name}: {error}"
+            continue
+        write_whole(out / name, text)
+        yield f"wrote {out / name}"
+    write_whole(out / "next.png", draw_card(experiment))
+    yield f"wrote {out / 'next.png'}"

@@ -1,0 +1,87 @@
+"""Commands `armlab recording ...`: options and messages; heavy imports wait until a command runs."""
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from armlab.common.errors import InputError
+
+PUBLIC_RECORDING_NAMES = ("kuka-kr300", "emps", "staubli-tx40", "unisa-ur10", "unisa-panda")
+ASKED_SIGNALS = ("time", "position", "torque")
+OPTIONAL_SIGNALS = (
+    "velocity",
+    "temperature",
+    "link_position",
+    "reference_position",
+    "simulated_torque",
+    "simulated_position",
+)
+
+
+@click.group()
+def recording() -> None:
+    """Bring in, check and fetch recordings of robot arms."""
+
+
+@recording.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="The page [default: NAME-check.html, here].")
+def check(folder: Path, out: Path | None) -> None:
+    """Say what is wrong with a recording, what was repaired, and draw it (one HTML page)."""
+    from armlab.recordings.check import check_recording
+    from armlab.recordings.check_report import write_check_page
+
+    found = check_recording(folder)
+    page = write_check_page(found, out or Path(f"{found.recording.name}-check.html"))
+    for line in found.lines or ("nothing was repaired and nothing looks wrong",):
+        click.echo(line)
+    click.echo(f"page: {page}")
+    if found.refused:
+        raise InputError(f"{len(found.refused)} of the runs of {folder} cannot be used (see above)")
+
+
+@recording.command()
+@click.argument("name", type=click.Choice(PUBLIC_RECORDING_NAMES))
+@click.option("--out", type=click.Path(path_type=Path), help="New folder [default: NAME, here].")
+def fetch(name: str, out: Path | None) -> None:
+    """Fetch a public recording of a real arm and write it as a recording folder."""
+    from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
+
+    folder = fetch_recording(name, out or Path(name))
+    click.echo(f"{folder}: from {PUBLIC_RECORDINGS[name].source}, licence {PUBLIC_RECORDINGS[name].licence}")
+
+
+def _column_options(command: Callable[..., None]) -> Callable[..., None]:
+    for signal in reversed((*ASKED_SIGNALS, *OPTIONAL_SIGNALS)):
+        flag = f"--{signal.replace('_', '-')}"
+        command = click.option(flag, signal, metavar="NAMES", help=f"Column(s) of {signal.replace('_', ' ')}.")(command)
+    return command
+
+
+@recording.command("import")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--robot", help="Built-in robot, or path of a robot file.")
+@click.option("--out", type=click.Path(path_type=Path), required=True, help="New folder for the recording.")
+@_column_options
+@click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
+@click.option("--gains", metavar="NUMBERS", help="N.m per A or V of each channel, where torque is a current.")
+@click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="A file that validates.")
+@click.option("--separator", help="Between the cells of a text file: , ; or a word (tab, blank).")
+@click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
+@click.option("--topic", help="Topic of the joint states in a bag.")
+@click.option("--ask/--no-ask", default=None, help="Ask for what is missing [default: at a terminal].")
+def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
+    """Bring files of another format into a new recording folder: .mat, ROS bags, MCAP, odd CSV.
+
+    NAMES are column names with commas between them; * and ? stand for any characters.
+    """
+    from armlab.recordings.imports.files import import_files
+
+    asked = sys.stdin.isatty() if ask is None else ask
+    prompt = (lambda text, default: str(click.prompt(text, default=default, err=True))) if asked else None
+    lines = import_files(files, out, options, prompt)
+    for line in lines:
+        click.echo(line)

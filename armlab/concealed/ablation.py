@@ -1,0 +1,105 @@
+"""The value of each guard of the diagnosis: the same concealed cases again with one guard off at a time."""
+
+import json
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from armlab.concealed.prove import FINISHED_MARK, make_development_proof
+from armlab.concealed.score.scoring import compute_score
+from armlab.concealed.sets import MANIFEST_FILE, conceal_set, file_digest
+
+DONE_FOLDER, GUARD_ORDER_FILE = (
+    "done",
+    "guards.txt",
+)  # beside the verdicts: marks of finished cases, and the guards in their order
+REPORT_INTERVAL = 10  # cases: how often it is said how far it is
+SHOWN_MEASURES = (
+    "false claims on nulls",
+    "false claims on decoys",
+    "wrong names among claims",
+    "right name or class of four, above 3 limits",
+    "unknown on effects outside, above 3 limits",
+)
+DiagnoseWithGuards = Callable[[Path], dict[str, dict[str, Any]]]
+
+
+@dataclass(frozen=True)
+class AblationSettings:
+    """A development set."""
+
+    seed: int
+    cases: int
+    nulls: int
+
+
+def ablate(
+    settings: AblationSettings, diagnose: DiagnoseWithGuards, work: Path, results: Path, jobs: int
+) -> Iterator[str]:
+    """Does what is missing, tells how far it is, and writes guards.md and guards.json into `results`.
+
+    diagnose: given a recording folder, verdicts by the name of the guard that is off, the one with all on first.
+    What was interrupted goes on; what was finished is diagnosed anew.
+    """
+    if (work / FINISHED_MARK).is_file():
+        shutil.rmtree(work)
+    proof = make_development_proof(settings.seed, settings.cases, settings.nulls)
+    found: dict[str, dict[str, Any]] = {}
+    for name, each in proof.sets.items():
+        folder, verdicts = work / name, work / "verdicts" / name
+        list(conceal_set(each, folder, jobs))
+        cases = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))["cases"]
+        missing = [case for case in cases if not (verdicts / DONE_FOLDER / case).is_file()]
+        todo = (delayed(_write_verdicts)(diagnose, folder / "observations" / case, verdicts) for case in missing)
+        for number, _ in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(todo), 1):
+            if number % REPORT_INTERVAL == 0:
+                yield f"{name}: diagnosed {number} of {len(missing)}"
+        for guard in (verdicts / GUARD_ORDER_FILE).read_text(encoding="utf-8").splitlines():
+            score = compute_score(folder, verdicts / guard, file_digest(folder / MANIFEST_FILE))[2]
+            found.setdefault(guard, {})[name] = score["tiers"]
+    results.mkdir(parents=True, exist_ok=True)
+    (results / "guards.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    (results / "guards.md").write_text(render_page(settings, found), encoding="utf-8")
+    (work / FINISHED_MARK).touch()
+    yield f"wrote {results / 'guards.md'}"
+
+
+def _write_verdicts(diagnose: DiagnoseWithGuards, observation: Path, verdicts: Path) -> None:
+    """Writes a case's verdicts, a folder a guard; the mark that it is done comes last."""
+    found = diagnose(observation)
+    for guard, verdict in found.items():
+        own = verdicts / guard / observation.name
+        own.mkdir(parents=True, exist_ok=True)
+        (own / "verdict.json").write_text(json.dumps(verdict) + "\n", encoding="utf-8")
+    (verdicts / GUARD_ORDER_FILE).write_text("\n".join(found) + "\n", encoding="utf-8")
+    (verdicts / DONE_FOLDER).mkdir(exist_ok=True)
+    (verdicts / DONE_FOLDER / observation.name).touch()
+
+
+def render_page(settings: AblationSettings, found: dict[str, dict[str, Any]]) -> str:
+    """A table a tier: a row for each guard that was off."""
+    tiers = sorted({tier for sets in found.values() for each in sets.values() for tier in each})
+    about = f"{settings.cases} cases and {settings.nulls} with nothing hidden, of development seed {settings.seed}."
+    parts = ["# What each guard is worth", f"{about} Share, and how often it was counted."]
+    for tier in tiers:
+        rows = [_table_row(guard, found[guard], tier) for guard in found]
+        head = f"| guard off | {' | '.join(SHOWN_MEASURES)} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
+        parts += [f"## {tier} tier", "\n".join([head, *rows])]
+    return "\n\n".join(parts) + "\n"
+
+
+def _table_row(guard: str, sets: dict[str, Any], tier: str) -> str:
+    return f"| {guard.replace('_', ' ')} | {' | '.join(_table_cell(what, sets, tier) for what in SHOWN_MEASURES)} |"
+
+
+def _table_cell(what: str, sets: dict[str, Any], tier: str) -> str:
+    """The measure in the set that counted it most often: nulls in the set of nulls, names in the mixed one."""
+    counted: Sequence[dict[str, Any]] = [
+        each for found in sets.values() for each in found.get(tier, []) if each["name"] == what
+    ]
+    best = max(counted, key=lambda each: int(each["number"]), default=None)
+    return "-" if best is None or best["value"] is None else f"{best['value']:.3g} of {best['number']}"

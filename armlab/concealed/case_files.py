@@ -1,0 +1,180 @@
+"""The files of a case: runs as a drive logs them, the recording that a diagnosis may see, and the answer."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.outside import OutsideEffect
+from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
+from armlab.concealed.sizing import SimulatedCase
+from armlab.recordings.recording import Array, Role
+
+ENCODER_BITS = (20, 24)  # powers of two a joint turn, gear included
+JITTER_S = 2e-5  # of stamps that are late while the samples are even
+
+
+@dataclass(frozen=True, eq=False)
+class LoggedRun:
+    """One run as logged. clean: (samples, joints), N m, what the torque channels would read without noise."""
+
+    role: Role
+    time: Array
+    position: Array
+    torque: Array
+    clean: Array
+
+
+def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
+    """A run of a case, sampled at its rate; without noise, rounding and jitter on request."""
+    plan, track, rng = case.plan, case.tracks[run], case.plan.stream(f"log {run}")
+    stamp, instant = _sample_instants(case, run, rng, noisy)
+    joints, effects = track.joints, case.all_effects
+    centre = np.repeat(instant[:, None], joints, axis=1)
+    lag = np.sum([effect.lag(joints) for effect in effects] or [np.zeros(joints)], axis=0)
+    torque = track.means(track.load + law_torque(effects, track, run), centre - lag, 1 / plan.rate_hz)
+    for effect in effects:
+        torque = effect.read(torque)
+    shift = np.sum([effect.shift(joints) for effect in effects] or [np.zeros(joints)], axis=0)
+    sampled = track.at(instant)
+    position, role = sampled.position + shift, plan.runs[run].role
+    if not noisy:
+        return LoggedRun(role, stamp, position, torque, torque)
+    step = 2 * np.pi / 2.0 ** rng.integers(*ENCODER_BITS, joints)
+    noise = plan.noise.sample(plan.stream(f"noise {run}"), sampled.velocity, instant)
+    read = plan.noise.quantise(torque + noise)
+    return LoggedRun(role, stamp, np.rint(position / step) * step, read, torque)
+
+
+def _sample_instants(case: SimulatedCase, run: int, rng: np.random.Generator, noisy: bool) -> tuple[Array, Array]:
+    """Stamps and true instants: even samples with late stamps, or samples taken unevenly and stamped well."""
+    plan = case.plan
+    even = np.arange(round(plan.runs[run].length_s * plan.rate_hz)) / plan.rate_hz
+    if not noisy:
+        return even, even
+    if plan.stream("clock").random() < 0.3:
+        uneven = even + rng.integers(-1, 2, len(even)) / FINE_HZ
+        return np.maximum(uneven, 0.0), np.maximum(uneven, 0.0)
+    return even + np.abs(rng.normal(0, JITTER_S, len(even))), even
+
+
+EFFECTS_WITH_CONSTANT = ("asymmetric_friction", "cable_stiffness", "gravity_compensator")
+TORQUE_RESOLUTION, TIME_RESOLUTION = 1e-5, 1e-7  # N m and s: what is kept of a number
+
+
+def write_case(case: SimulatedCase, observations: Path, truth: Path) -> None:
+    """Writes the recording folder `observations`, and `truth` (.json) with the clean torque beside it."""
+    runs = [log_run(case, run) for run in range(len(case.plan.runs))]
+    observations.mkdir(parents=True)
+    truth.parent.mkdir(parents=True, exist_ok=True)
+    joints = case.plan.machine.joints
+    for number, run in enumerate(runs, 1):
+        _write_table(observations / f"run-{number}.parquet", run, joints)
+    _write_yaml(observations / "robot.yaml", case.plan.machine.settings())
+    _write_yaml(observations / "recording.yaml", _recording_settings(case, runs))
+    held_out = [run for run in runs if run.role == "validate"]
+    _write_parquet(
+        truth.with_suffix(".parquet"), {f"tau{joint + 1}": held_out[0].clean[:, joint] for joint in range(joints)}
+    )
+    truth.write_text(json.dumps(make_answer(case, runs), indent=1) + "\n", encoding="utf-8")
+
+
+def make_answer(case: SimulatedCase, runs: list[LoggedRun]) -> dict[str, Any]:
+    """The truth about a case; `multiple` counts detection limits."""
+    plan = case.plan
+    sizes = zip(case.hidden, case.sized.targets, case.multiples, strict=True)
+    floor = np.sqrt(np.mean(np.concatenate([run.torque - run.clean for run in runs]) ** 2, axis=0))
+    return {
+        "schema": "truth/1",
+        "case": plan.name,
+        "tier": plan.tier,
+        "kind": plan.kind,
+        "arm": plan.machine.name,
+        "joints": plan.machine.joints,
+        "rate_hz": plan.rate_hz,
+        "motions": [run.family for run in plan.runs],
+        "injected": [
+            {**describe_effect(effect, plan.realistic), "target": target, "multiple": multiple}
+            for effect, target, multiple in sizes
+        ],
+        "passed_over": list(case.sized.passed_over),
+        "background": [
+            describe_effect(effect, _is_mixed_with_friction(effect, case.hidden)) for effect in plan.background
+        ],
+        "cad_errors": [
+            {"effect": "inertial_parameter_error", "joint": link, "relative": error}
+            for link, error in enumerate(plan.cad_errors, 1)
+        ],
+        "absorbed_rotors": [joint + 1 for joint in absorbed_rotors(plan.machine.arm)],
+        "noise": plan.noise.facts(),
+        "noise_floor": floor.tolist(),
+    }
+
+
+def describe_effect(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
+    """An effect in the words of the vocabulary, with the law that made it.
+
+    mixed_up: whether it stands beside friction of its joint that adds to its own.
+    """
+    units, blurred = effect.units(), effect.blurred if mixed_up else ()
+    parameters = {
+        name: {"value": value, "unit": units[name], "comparable": name in effect.comparable and name not in blurred}
+        for name, value in effect.parameters().items()
+    }
+    return {
+        "effect": effect.effect,
+        "joint": effect.place,
+        "joints": list(effect.joints),
+        "outside": isinstance(effect, OutsideEffect),
+        "form": effect.form,
+        "obvious_form": effect.form == effect.forms[0],
+        "equivalent": list(effect.equivalent),
+        "parameters": parameters,
+        "size": effect.size,
+        "shape": effect.shape,
+    }
+
+
+def _is_mixed_with_friction(effect: HiddenEffect, hidden: tuple[HiddenEffect, ...]) -> bool:
+    """True for plain friction and offsets at a joint where a hidden effect holds such terms itself."""
+    here = [other for other in hidden if other.joint == effect.joint]
+    constant = any(other.effect in EFFECTS_WITH_CONSTANT for other in here)
+    return constant if effect.effect == "torque_offset" else any(other.companions for other in here)
+
+
+def _recording_settings(case: SimulatedCase, runs: list[LoggedRun]) -> dict[str, Any]:
+    joints = range(1, case.plan.machine.joints + 1)
+    columns = {
+        "time": "t",
+        "position": [f"q{joint}" for joint in joints],
+        "torque": [f"tau{joint}" for joint in joints],
+    }
+    return {
+        "schema": "recording/1",
+        "robot": "robot.yaml",
+        "sample_rate_hz": float(case.plan.rate_hz),
+        "columns": columns,
+        "units": {"time": "s", "position": "rad", "torque": "N.m"},
+        "runs": [{"file": f"run-{number}.parquet", "role": run.role} for number, run in enumerate(runs, 1)],
+    }
+
+
+def _write_yaml(path: Path, content: dict[str, Any]) -> None:
+    path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110), encoding="utf-8")
+
+
+def _write_table(path: Path, run: LoggedRun, joints: int) -> None:
+    columns = {"t": np.rint(run.time / TIME_RESOLUTION) * TIME_RESOLUTION}
+    columns |= {f"q{joint + 1}": run.position[:, joint] for joint in range(joints)}
+    torque = np.rint(run.torque / TORQUE_RESOLUTION) * TORQUE_RESOLUTION
+    _write_parquet(path, columns | {f"tau{joint + 1}": torque[:, joint] for joint in range(joints)})
+
+
+def _write_parquet(path: Path, columns: dict[str, Array]) -> None:
+    pq.write_table(pa.table(columns), path, compression="zstd")

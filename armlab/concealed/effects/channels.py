@@ -1,0 +1,216 @@
+"""Faults of the measurement: gains, offsets, delays, clipping; and a push from outside."""
+
+from dataclasses import replace
+from typing import Self
+
+import numpy as np
+
+from armlab.concealed.arms import Machine
+from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues, torque_share
+from armlab.concealed.engine import Track
+from armlab.recordings.recording import Array
+
+SATURATION_SHARPNESS = 8  # of saturation: the larger, the sharper
+
+
+class Gain(HiddenEffect):
+    """A torque channel that reads too much or too little; other form: more beyond a knee. size: share."""
+
+    effect, forms = "torque_gain_error", ("factor", "bent")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Of either sign."""
+        shape = {"direction": float(rng.choice([-1, 1])), "knee": float(rng.uniform(-0.2, 0.2)), "peak": 0.0}
+        return cls(joint, 0.06, 0.5, cls.draw_form(rng), shape)
+
+    def with_peak_torque(self, peak: Array) -> Self:
+        """The knee is a share of the largest torque."""
+        return replace(self, shape={**self.shape, "peak": float(peak[self.joint])})
+
+    def parameters(self) -> ParameterValues:
+        """The factor."""
+        return {"gain": 1 + self.shape["direction"] * self.size}
+
+    def read(self, torque: Array) -> Array:
+        """One channel times a factor, or by six tenths of its error below a knee."""
+        read, error = torque.copy(), self.shape["direction"] * self.size
+        own, knee = torque[:, self.joint], self.shape["knee"] * self.shape["peak"]
+        bent = 0.6 * own + 0.4 * (np.maximum(own - knee, 0) - max(-knee, 0.0))
+        read[:, self.joint] += error * (own if self.form == "factor" else bent)
+        return read
+
+
+class Offset(HiddenEffect):
+    """A torque channel whose zero is elsewhere, N m; other form: it creeps by a tenth during a run."""
+
+    effect, forms = "torque_offset", ("constant", "creeping")
+    blurred = ("offset",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Of either sign."""
+        offset = torque_share(0.01, machine, joint)
+        return cls(joint, offset, 10 * offset, cls.draw_form(rng), {"direction": float(rng.choice([-1, 1]))})
+
+    def parameters(self) -> ParameterValues:
+        """The offset."""
+        return {"offset": self.shape["direction"] * self.size}
+
+    def read(self, torque: Array) -> Array:
+        """One channel plus a constant."""
+        read = torque.copy()
+        creep = np.linspace(-0.05, 0.05, len(torque)) if self.form == "creeping" else 0.0
+        read[:, self.joint] += self.shape["direction"] * self.size * (1 + creep)
+        return read
+
+
+class Delay(HiddenEffect):
+    """All torque channels stamped later than the motion, s; other form: not quite the same for each."""
+
+    effect, forms = "time_delay", ("shift", "uneven shift")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Some milliseconds."""
+        return cls(joint, 4e-3, 5e-2, cls.draw_form(rng))
+
+    @property
+    def place(self) -> None:
+        """The whole robot."""
+        return None
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """None in particular."""
+        return ()
+
+    def parameters(self) -> ParameterValues:
+        """The shift."""
+        return {"seconds": self.size}
+
+    def lag(self, joints: int) -> Array:
+        """The same for all, or a tenth more or less from joint to joint."""
+        spread = np.linspace(0.9, 1.1, joints) if self.form == self.forms[1] else np.ones(joints)
+        return np.asarray(self.size * spread)
+
+
+class Skew(HiddenEffect):
+    """One torque channel stamped later, or earlier, than the others, s."""
+
+    effect, forms = "channel_skew", ("shift",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Some milliseconds in either direction."""
+        return cls(joint, 4e-3, 5e-2, cls.draw_form(rng), {"direction": float(rng.choice([-1, 1]))})
+
+    def parameters(self) -> ParameterValues:
+        """The shift."""
+        return {"seconds": self.shape["direction"] * self.size}
+
+    def lag(self, joints: int) -> Array:
+        """At one joint."""
+        lag = np.zeros(joints)
+        lag[self.joint] = self.shape["direction"] * self.size
+        return lag
+
+
+class EncoderOffset(HiddenEffect):
+    """A joint whose zero is elsewhere: the recorded position is the true one plus the offset, rad."""
+
+    effect, forms = "encoder_offset", ("constant",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """A degree or so in either direction."""
+        return cls(joint, 0.02, 0.08, cls.draw_form(rng), {"direction": float(rng.choice([-1, 1]))})
+
+    def parameters(self) -> ParameterValues:
+        """The offset."""
+        return {"offset": self.shape["direction"] * self.size}
+
+    def shift(self, joints: int) -> Array:
+        """At one joint."""
+        shift = np.zeros(joints)
+        shift[self.joint] = self.shape["direction"] * self.size
+        return shift
+
+
+class Saturation(HiddenEffect):
+    """A torque channel that stays below a limit; other form: it bends towards it.
+
+    size: share of the highest torque that is lost.
+    """
+
+    effect, forms = "torque_saturation", ("clip", "bend")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Cuts the highest peaks."""
+        return cls(joint, 0.15, 0.6, cls.draw_form(rng), {"peak": torque_share(1.0, machine, joint)})
+
+    def with_peak_torque(self, peak: Array) -> Self:
+        """The limit lies below the largest torque."""
+        return replace(self, shape={"peak": float(peak[self.joint])})
+
+    def parameters(self) -> ParameterValues:
+        """The limit."""
+        return {"limit": self.limit}
+
+    @property
+    def limit(self) -> float:
+        """What the channel can read at most, N m."""
+        kept = 1 - self.size
+        if self.form == "bend":  # so that the highest torque is read as that share of itself
+            kept = 1 / (kept**-SATURATION_SHARPNESS - 1) ** (1 / SATURATION_SHARPNESS)
+        return self.shape["peak"] * kept
+
+    def read(self, torque: Array) -> Array:
+        """One channel below its limit."""
+        read, limit = torque.copy(), self.limit
+        column = torque[:, self.joint]
+        bent = (
+            column / (1 + (np.abs(column) / limit) ** SATURATION_SHARPNESS) ** (1 / SATURATION_SHARPNESS)
+            if self.form == "bend"
+            else None
+        )
+        read[:, self.joint] = np.clip(column, -limit, limit) if bent is None else bent
+        return read
+
+
+class Contact(HiddenEffect):
+    """A push during one run: half a sine; other forms: a plateau with ramps, a Gauss curve. size: peak, N m."""
+
+    effect, forms = "external_contact", ("half sine", "plateau", "gauss")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Between half a second and two seconds, in the first or second run."""
+        start, length = rng.uniform(1.5, 6.5), rng.uniform(0.5, 2.0)
+        shape = {
+            "start": float(start),
+            "end": float(start + length),
+            "run": float(rng.integers(0, 2)),
+            "direction": float(rng.choice([-1, 1])),
+        }
+        peak = torque_share(0.06, machine, joint)
+        return cls(joint, peak, 5 * peak, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """Start, end and peak."""
+        peak = self.shape["direction"] * self.size
+        return {"start": self.shape["start"], "end": self.shape["end"], "peak": peak}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """During the push, in its run."""
+        if run != int(self.shape["run"]):
+            return np.zeros(len(track.time))
+        share = (track.time - self.shape["start"]) / (self.shape["end"] - self.shape["start"])
+        inside = (share > 0) & (share < 1)
+        bump = {
+            "half sine": np.sin(np.pi * share),
+            "plateau": np.clip(5 * np.minimum(share, 1 - share), 0, 1),
+            "gauss": np.exp(-(((share - 0.5) / 0.17) ** 2)),
+        }[self.form]
+        return np.asarray(self.shape["direction"] * self.size * np.where(inside, bump, 0.0))

@@ -1,0 +1,268 @@
+"""Friction: functions of velocity, position and load, presliding hysteresis, and drift with temperature."""
+
+from typing import Self
+
+import numpy as np
+
+from armlab.concealed.arms import Machine
+from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues, smooth_sign, torque_share
+from armlab.concealed.engine import Track
+from armlab.recordings.recording import Array
+
+
+class Coulomb(HiddenEffect):
+    """Level times the sign of velocity; other form: a soft turn-over (arc tangent)."""
+
+    effect, forms = "coulomb_friction", ("sign", "soft")
+    blurred = ("level",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Up to a fifth of the rating."""
+        shape = {"width": float(rng.uniform(0.01, 0.05))}
+        level = torque_share(0.03, machine, joint)
+        return cls(joint, level, 7 * level, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """The level."""
+        return {"level": self.size}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        velocity = track.velocity[:, self.joint]
+        if self.form == "soft":
+            return np.asarray(self.size * 2 / np.pi * np.arctan(velocity / self.shape["width"]))
+        return self.size * smooth_sign(velocity)
+
+
+class Viscous(HiddenEffect):
+    """Proportional to velocity; other form: uneven over the turn by a tenth."""
+
+    effect, forms = "viscous_friction", ("linear", "uneven")
+    blurred = ("coefficient",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Up to a quarter of the rating at 1 rad/s."""
+        coefficient = torque_share(0.03, machine, joint)
+        return cls(joint, coefficient, 8 * coefficient, cls.draw_form(rng), {"phase": float(rng.uniform(0, 6))})
+
+    def parameters(self) -> ParameterValues:
+        """The coefficient."""
+        return {"coefficient": self.size}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        velocity, position = track.velocity[:, self.joint], track.position[:, self.joint]
+        wave = 0.1 * np.sin(2 * position + self.shape["phase"]) if self.form == "uneven" else 0.0
+        return np.asarray(self.size * velocity * (1 + wave))
+
+
+class NonlinearViscous(HiddenEffect):
+    """A power of velocity; other form: Eyring's inverse hyperbolic sine of thin oil films."""
+
+    effect, forms = "nonlinear_viscous_friction", ("power", "eyring")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Exponents of churning oil (2 to 3) or of boundary films (below 2/3)."""
+        low = bool(rng.random() < 0.4)
+        shape = {"exponent": float(rng.uniform(0.3, 0.65) if low else rng.uniform(1.7, 3.0)), "knee": 0.1}
+        coefficient = torque_share(0.02, machine, joint)
+        return cls(joint, coefficient, 10 * coefficient, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """Coefficient and exponent."""
+        return {"coefficient": self.size, "exponent": self.shape["exponent"]}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        velocity = track.velocity[:, self.joint]
+        if self.form == "eyring":
+            return np.asarray(self.size * np.arcsinh(velocity / self.shape["knee"]))
+        smooth = smooth_sign(velocity) * np.abs(velocity) ** self.shape["exponent"]
+        return np.asarray(self.size * smooth)
+
+
+class Stribeck(HiddenEffect):
+    """Friction that falls with speed: Gaussian; other forms: another exponent, or a rational law (Hess 1990).
+
+    size: static level less Coulomb level, N m.
+    """
+
+    effect, forms = "stribeck_friction", ("gauss", "exponent", "rational")
+    companions, blurred = ("coulomb", "viscous"), ("level", "static_level")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Coulomb level beside it, as in every bearing that has this."""
+        fall = torque_share(0.02, machine, joint)
+        shape = {
+            "level": torque_share(float(rng.uniform(0.01, 0.05)), machine, joint),
+            "velocity": float(np.exp(rng.uniform(np.log(0.025), np.log(0.15)))),
+            "exponent": float(rng.uniform(0.6, 1.2)),
+        }
+        return cls(joint, fall, 8 * fall, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """Levels, velocity, and the exponent of the Gaussian form."""
+        level, exponent = self.shape["level"], self.shape["exponent"] if self.form == "exponent" else 2.0
+        velocity = self.shape["velocity"]
+        return {"level": level, "static_level": level + self.size, "velocity": velocity, "exponent": exponent}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        velocity = track.velocity[:, self.joint]
+        ratio = np.abs(velocity) / self.shape["velocity"]
+        fall = {
+            "gauss": np.exp(-(ratio**2)),
+            "exponent": np.exp(-(ratio ** self.shape["exponent"])),
+            "rational": 1 / (1 + ratio**2),
+        }[self.form]
+        return np.asarray(smooth_sign(velocity) * (self.shape["level"] + self.size * fall))
+
+
+class Asymmetric(HiddenEffect):
+    """Levels that differ by direction; other form: slopes differ too. size: half the difference, N m."""
+
+    effect, forms = "asymmetric_friction", ("levels", "levels and slopes")
+    companions, blurred = ("coulomb", "viscous"), ("positive", "negative")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """About a mean level and slope that are larger than the difference."""
+        half = torque_share(0.012, machine, joint)
+        shape = {"level": float(rng.uniform(1.2, 3)), "slope": float(rng.uniform(1.2, 2))}
+        return cls(joint, half, 8 * half, cls.draw_form(rng), shape)
+
+    @property
+    def equivalent(self) -> tuple[str, ...]:
+        """Levels alone are a mean level and an offset."""
+        return ("coulomb_friction", "torque_offset") if self.form == "levels" else ()
+
+    def parameters(self) -> ParameterValues:
+        """Levels of both directions."""
+        level = self.size * self.shape["level"]
+        return {"positive": level + self.size, "negative": level - self.size}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        velocity = track.velocity[:, self.joint]
+        direction = smooth_sign(velocity)
+        torque = self.size * (self.shape["level"] * direction + np.abs(direction))
+        if self.form == "levels":
+            return np.asarray(torque)
+        return np.asarray(torque + self.size * (self.shape["slope"] * velocity + np.abs(velocity)))
+
+
+class LoadDependent(HiddenEffect):
+    """A share of the transmitted torque; other form: a share that fades in with the load."""
+
+    effect, forms = "load_dependent_friction", ("share", "fading in")
+    companions = ("coulomb", "viscous")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Up to a third of the load, as in worm and screw gears."""
+        shape = {"knee": torque_share(0.03, machine, joint), "width": float(rng.uniform(0.002, 0.01))}
+        return cls(joint, 0.06, 0.35, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """The share."""
+        return {"coefficient": self.size}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        load, knee = track.load[:, self.joint], self.shape["knee"]
+        felt = np.abs(load) if self.form == "share" else load**2 / np.sqrt(load**2 + knee**2)
+        return np.asarray(self.size * felt * smooth_sign(track.velocity[:, self.joint], self.shape["width"]))
+
+
+class Presliding(HiddenEffect):
+    """Dahl's hysteresis; other forms: LuGre with a Stribeck curve, Maxwell slip elements. size: level, N m."""
+
+    effect, forms = "presliding_hysteresis", ("dahl", "lugre", "maxwell slip")
+    companions, blurred = ("coulomb", "viscous"), ("level", "stiffness")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Friction that needs some milliradians to turn over."""
+        shape = {"way": float(np.exp(rng.uniform(np.log(2e-3), np.log(3e-2)))), "rise": float(rng.uniform(0.2, 0.6))}
+        level = torque_share(0.04, machine, joint)
+        return cls(joint, level, 6 * level, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """Level and the stiffness at a reversal."""
+        return {"level": self.size, "stiffness": self.size / self.shape["way"]}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """The state of the contact times its stiffness."""
+        steps = np.diff(track.position[:, self.joint], prepend=track.position[:1, self.joint])
+        if self.form == "maxwell slip":
+            return self.size * _maxwell_slip(steps, self.shape["way"])
+        level = np.ones_like(steps)
+        if self.form == "lugre":
+            level += self.shape["rise"] * np.exp(-((track.velocity[:, self.joint] / 0.05) ** 2))
+        kept = np.exp(-np.abs(steps) / (self.shape["way"] * level))
+        return self.size * recursion(kept, np.sign(steps) * level * (1 - kept))
+
+
+class Drift(HiddenEffect):
+    """Viscous friction that falls as the joint warms: in time; other form: with the heat that it makes.
+
+    size: initial less final coefficient, N m s/rad. Every run starts cold.
+    """
+
+    effect, forms = "friction_drift", ("time", "heat")
+    companions, blurred = ("viscous", "coulomb"), ("initial", "final")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Grease that thins within seconds: a fast stand-in for what takes minutes."""
+        shape = {"final": float(rng.uniform(0.5, 2.0)), "time_constant": float(rng.uniform(3, 8))}
+        fall = torque_share(0.02, machine, joint)
+        return cls(joint, fall, 6 * fall, cls.draw_form(rng), shape)
+
+    def parameters(self) -> ParameterValues:
+        """Both coefficients and the time constant."""
+        final = self.size * self.shape["final"]
+        return {"initial": final + self.size, "final": final, "time_constant": self.shape["time_constant"]}
+
+    def torque(self, track: Track, run: int) -> Array:
+        """Against the motion."""
+        velocity, constant = track.velocity[:, self.joint], self.shape["time_constant"]
+        cold = np.exp(-np.maximum(track.time, 0) / constant)
+        if self.form == "heat":
+            cold = np.exp(-np.cumsum(velocity**2) / np.sum(velocity**2) * (track.time[-1] / constant))
+        return np.asarray(self.size * (self.shape["final"] + cold) * velocity)
+
+
+def recursion(kept: Array, added: Array) -> Array:
+    """States of x[k] = kept[k] x[k-1] + added[k] from rest, (steps,)."""
+    state, states = 0.0, []
+    for share, step in zip(kept.tolist(), added.tolist(), strict=True):
+        state = share * state + step
+        states.append(state)
+    return np.array(states)
+
+
+def _maxwell_slip(steps: Array, way: float) -> Array:
+    """Mean of elements that stick up to a way of their own and then slip; 1 when all slip."""
+    total = np.zeros(len(steps))
+    for most in (0.3 * way, way, 2.5 * way):
+        state, states = 0.0, []
+        for step in steps.tolist():
+            state = min(max(state + step, -most), most)
+            states.append(state)
+        total += np.array(states) / most / 3
+    return total
+
+
+def bouc_wen(steps: Array, power: float = 1.5, beta: float = 0.7, gamma: float = 0.3) -> Array:
+    """Normalised Bouc-Wen hysteresis of a path given by its steps, (steps,); it stays within one."""
+    state, states = 0.0, []
+    for step in steps.tolist():
+        size = abs(state) ** power
+        state += step - (beta * abs(step) * (1 if state > 0 else -1) + gamma * step) * size
+        states.append(state)
+    return np.array(states)

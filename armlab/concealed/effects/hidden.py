@@ -1,0 +1,133 @@
+"""The base class of hidden effects: what an effect may change between the mechanism and the recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from armlab.concealed.arms import Machine
+from armlab.concealed.engine import Parts, Track
+from armlab.recordings.recording import Array
+from armlab.recordings.vocabulary import effect_named
+from problem.arm import Arm
+
+OTHER_FORM_SHARE = 0.4  # share of the effects whose law is not the one that anyone would fit first
+SIGN_WIDTH = 5e-4  # rad/s: a Coulomb friction turns over within this
+ParameterValues = dict[str, float | list[float]]
+
+
+@dataclass(frozen=True)
+class HiddenEffect:
+    """An effect at a joint or link (from 0) with one size and a shape.
+
+    size: what grows until the effect is as visible as wanted; in the unit of its main parameter. most: the
+    size beyond which the effect would be absurd. form: which law. shape: its other numbers. companions: plain
+    friction of the same joint that is free beside it. blurred: parameters that cannot be told from the plain friction
+    of a background.
+    """
+
+    effect: ClassVar[str]
+    forms: ClassVar[tuple[str, ...]]
+    companions: ClassVar[tuple[str, ...]] = ()
+    blurred: ClassVar[tuple[str, ...]] = ()
+    joint: int
+    size: float
+    max_size: float
+    form: str
+    shape: dict[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def places(cls, machine: Machine) -> Sequence[int]:
+        """Joints (links) where the effect makes sense."""
+        return range(machine.joints)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """The effect at a joint with a usual size and random other numbers."""
+        raise NotImplementedError
+
+    @classmethod
+    def draw_form(cls, rng: np.random.Generator) -> str:
+        """The obvious form, or one of the others."""
+        other = len(cls.forms) > 1 and rng.random() < OTHER_FORM_SHARE
+        return str(rng.choice(cls.forms[1:])) if other else cls.forms[0]
+
+    def sized(self, size: float) -> Self:
+        """The same effect, larger or smaller, but not absurd."""
+        return replace(self, size=float(min(size, self.max_size)))
+
+    @property
+    def place(self) -> int | None:
+        """Joint or link from 1; None for an effect of the whole robot."""
+        return self.joint + 1
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Where the torque appears, and where the motion is, from 1."""
+        return (self.joint + 1,)
+
+    @property
+    def comparable(self) -> tuple[str, ...]:
+        """Parameters that mean the same in the fitted law: those of the obvious form."""
+        return tuple(self.parameters()) if self.form == self.forms[0] else ()
+
+    @property
+    def equivalent(self) -> tuple[str, ...]:
+        """Names at the same joint that together say the same, and come first."""
+        return ()
+
+    def parameters(self) -> ParameterValues:
+        """Parameters by their names in the vocabulary, SI units."""
+        return {}
+
+    def units(self) -> dict[str, str]:
+        """Unit of each parameter."""
+        known = effect_named(self.effect)
+        return {name: known.parameter(name).unit_for() for name in self.parameters()}
+
+    def with_peak_torque(self, peak: Array) -> Self:
+        """The effect when the largest torque (joints,) of each joint without it is known, N m."""
+        return self
+
+    def arm(self, arm: Arm) -> Arm:
+        """The arm as it really is."""
+        return arm
+
+    def parts(self) -> Parts:
+        """Parts of the mechanism with degrees of freedom of their own."""
+        return Parts()
+
+    def torque(self, track: Track, run: int) -> Array | None:
+        """Torque that the motor of the effect's joint gives on top, (steps,), N m; None for other effects.
+
+        run: from 0, the identification runs first.
+        """
+        return None
+
+    @property
+    def has_parts(self) -> bool:
+        """True if the effect needs degrees of freedom of its own."""
+        return self.parts() != Parts()
+
+    def lag(self, joints: int) -> Array:
+        """How much later each torque channel is stamped, (joints,), s."""
+        return np.zeros(joints)
+
+    def read(self, torque: Array) -> Array:
+        """Torque channels (samples, joints) as they are read."""
+        return torque
+
+    def shift(self, joints: int) -> Array:
+        """What is added to each position channel, (joints,), rad."""
+        return np.zeros(joints)
+
+
+def smooth_sign(velocity: Array, width: float = SIGN_WIDTH) -> Array:
+    """Sign of a velocity, turned over within a width, rad/s."""
+    return np.asarray(np.tanh(velocity / width))
+
+
+def torque_share(share: float, machine: Machine, joint: int) -> float:
+    """A share of the joint's rated torque, N m."""
+    return float(share * machine.rating[joint])

@@ -1,0 +1,46 @@
+"""The list of all hidden effects that have a name in the vocabulary."""
+
+from armlab.concealed.effects.bodies import Geometry, LinkError, Payload, Tilt
+from armlab.concealed.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
+from armlab.concealed.effects.drives import Backlash, Coupling, Elasticity, Rotor
+from armlab.concealed.effects.friction import (
+    Asymmetric,
+    Coulomb,
+    Drift,
+    LoadDependent,
+    NonlinearViscous,
+    Presliding,
+    Stribeck,
+    Viscous,
+)
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.effects.springs import Cable, Compensator, Ripple
+
+LIBRARY: tuple[type[HiddenEffect], ...] = (
+    Coulomb,
+    Viscous,
+    NonlinearViscous,
+    Stribeck,
+    Asymmetric,
+    LoadDependent,
+    Presliding,
+    Drift,
+    Rotor,
+    Gain,
+    Offset,
+    Ripple,
+    Elasticity,
+    Backlash,
+    Coupling,
+    Compensator,
+    Cable,
+    Payload,
+    LinkError,
+    Tilt,
+    EncoderOffset,
+    Geometry,
+    Delay,
+    Skew,
+    Contact,
+    Saturation,
+)

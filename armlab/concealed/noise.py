@@ -1,0 +1,81 @@
+"""Noise on the torque channels: white and coloured for development, further kinds for judged nulls only."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from armlab.recordings.recording import Array
+
+USUAL_KINDS = ("white", "coloured")
+JUDGED_KINDS = ("heavy_tails", "growing_with_speed", "quantised", "mains_hum")  # never in development sets
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """White noise and noise of first order beside it, the same kind on every joint.
+
+    white, coloured: (joints,), N m, standard deviations of a sample. corner_hz: of the coloured part.
+    """
+
+    kind: str
+    white: Array
+    coloured: Array
+    corner_hz: float
+
+    @property
+    def level(self) -> Array:
+        """Standard deviation of a sample at each joint, (joints,), N m."""
+        return np.asarray(np.hypot(self.white, self.coloured))
+
+    def memory(self, rate_hz: float) -> float:
+        """Correlation of the coloured part from one sample to the next."""
+        return float(np.exp(-2 * np.pi * self.corner_hz / rate_hz))
+
+    def sample(self, rng: np.random.Generator, velocity: Array, time: Array) -> Array:
+        """Noise on a run, (samples, joints), N m. velocity: (samples, joints), rad/s."""
+        samples, joints = velocity.shape
+        memory = self.memory(1 / float(time[1] - time[0]))
+        driven = rng.standard_normal((samples + 200, joints)) * np.sqrt(1 - memory**2)
+        coloured = lfilter([1.0], [1.0, -memory], driven, axis=0)[200:]
+        white = rng.standard_normal((samples, joints))
+        if self.kind == "heavy_tails":
+            white = rng.standard_t(3, (samples, joints)) / np.sqrt(3)
+        noise = self.white * white + self.coloured * coloured
+        if self.kind == "growing_with_speed":
+            speed = np.abs(velocity) / np.maximum(np.abs(velocity).max(axis=0), 1e-9)
+            noise = noise * (0.4 + 1.6 * speed)
+        if self.kind == "mains_hum":
+            phase = rng.uniform(0, 2 * np.pi, (2, joints))
+            for order, angle in zip((1, 3), phase, strict=True):
+                noise = noise + self.white * np.sin(2 * np.pi * 50 * order * time[:, None] + angle) / order
+        return np.asarray(noise)
+
+    def quantise(self, torque: Array) -> Array:
+        """Torque channels (samples, joints) at the resolution of the kind of noise."""
+        return np.rint(torque / (3 * self.white)) * 3 * self.white if self.kind == "quantised" else torque
+
+    def facts(self) -> dict[str, Any]:
+        """For the answers."""
+        return {**asdict(self), "white": self.white.tolist(), "coloured": self.coloured.tolist()}
+
+    def whitened(self, signal: Array, joint: int, rate_hz: float) -> Array:
+        """A signal (samples, ...) of one joint, filtered so that the usual noise would be white with unit variance.
+
+        White noise and noise of first order together are a process of order (1, 1); its moving average's root
+        is found from the two autocovariances of (1 - memory B) noise.
+        """
+        memory = self.memory(rate_hz)
+        white, coloured = self.white[joint] ** 2, self.coloured[joint] ** 2
+        same, next_one = white * (1 + memory**2) + coloured * (1 - memory**2), -memory * white
+        root = (same - np.sqrt(same**2 - 4 * next_one**2)) / (2 * next_one)
+        power = next_one / root
+        return np.asarray(lfilter([1.0, -memory], [1.0, root], signal, axis=0) / np.sqrt(power))
+
+
+def draw_noise(rng: np.random.Generator, kind: str, rating: Array, realistic: bool) -> Noise:
+    """Noise of some tenths of a per cent of the rating; coloured noise is the stronger in the realistic tier."""
+    level = rating * np.exp(rng.uniform(np.log(0.0015), np.log(0.004), len(rating)))
+    share = 0.02 if kind == "white" else rng.uniform(0.5, 0.85) if realistic else rng.uniform(0.3, 0.7)
+    return Noise(kind, level * np.sqrt(1 - share**2), level * share, float(rng.uniform(1.5, 15)))

@@ -1,0 +1,193 @@
+"""The plan of a case: drawn from its seed and number alone, before anything is simulated."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from armlab.concealed.arms import Machine, make_machine, with_stretched_link
+from armlab.concealed.effects.channels import Offset
+from armlab.concealed.effects.friction import Coulomb, Viscous
+from armlab.concealed.effects.hidden import HiddenEffect, torque_share
+from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.motions import FAMILIES
+from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS, Noise, draw_noise
+from armlab.concealed.outside import OUTSIDE
+from problem.arm import Arm
+
+
+def random_stream(*names: str | int) -> np.random.Generator:
+    """A PCG64 generator whose seed is the SHA-256 of the names; other names give an independent stream."""
+    digest = hashlib.sha256(json.dumps(["concealed", *names]).encode()).digest()
+    return np.random.Generator(np.random.PCG64(int.from_bytes(digest, "big")))
+
+
+Tier = Literal["clean", "realistic"]
+CaseKind = Literal["single", "pair", "triple", "outside", "decoy", "null"]
+ARM_SHARES = {"irb120-arm": 0.5, "irb120": 0.2, "panda": 0.15, "scara": 0.15}
+KIND_SHARES: dict[CaseKind, float] = {
+    "single": 0.5,
+    "pair": 0.12,
+    "triple": 0.06,
+    "outside": 0.16,
+    "decoy": 0.08,
+    "null": 0.08,
+}
+EFFECT_COUNTS = {"single": 1, "pair": 2, "triple": 3, "outside": 1, "decoy": 0, "null": 0}
+MIN_MULTIPLE, MAX_MULTIPLE = 0.5, 20.0  # detection limits
+BACKGROUND_EFFECTS = ("coulomb_friction", "viscous_friction", "torque_offset", "inertial_parameter_error", "payload")
+DEVELOPMENT_SEEDS = range(1000, 2000)
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """One run: its family of motions, its length in s, and what it is for."""
+
+    family: str
+    length_s: float
+    role: Literal["identify", "validate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """One case. true_arm: without the hidden effects, but with links that are off. background: friction."""
+
+    seed: int
+    index: int
+    tier: Tier
+    kind: CaseKind
+    machine: Machine
+    runs: tuple[RunPlan, ...]
+    rate_hz: int
+    noise: Noise
+    true_arm: Arm
+    cad_errors: tuple[float, ...]
+    background: tuple[HiddenEffect, ...]
+
+    @property
+    def realistic(self) -> bool:
+        """True in the realistic tier."""
+        return self.tier == "realistic"
+
+    @property
+    def name(self) -> str:
+        """A name that tells nothing."""
+        return random_stream("name", self.seed, self.tier, self.index, self.kind == "null").bytes(6).hex()
+
+    def stream(self, what: str) -> np.random.Generator:
+        """The case's random numbers for one purpose."""
+        return random_stream(what, self.seed, self.tier, self.index)
+
+
+def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: bool) -> Plan:
+    """The plan of a case. development: leaves out the kinds of noise that are kept for judged sets."""
+    rng = random_stream("plan", seed, tier, index, only_nulls)
+    kind: CaseKind = "null" if only_nulls else _choose_kind(index, seed, tier)
+    made = make_machine(str(rng.choice(list(ARM_SHARES), p=list(ARM_SHARES.values()))))
+    realistic = tier == "realistic"
+    noise = draw_noise(rng, _draw_noise_kind(rng, kind, realistic, development), made.rating, realistic)
+    arm, errors = _draw_arm(rng, made, realistic or kind == "decoy", kind)
+    background = _draw_background(rng, made) if realistic else ()
+    rate = int(rng.choice([250, 500, 1000], p=[0.3, 0.5, 0.2]))
+    return Plan(seed, index, tier, kind, made, _draw_runs(rng), rate, noise, arm, errors, background)
+
+
+def draw_effects(plan: Plan, attempt: int) -> tuple[HiddenEffect, ...]:
+    """The effects of a case with their usual sizes; the next attempt where they cannot be seen.
+
+    No two at one joint of one channel: an effect comes once a case, and only one needs parts of its own.
+    """
+    rng = random_stream("effects", plan.seed, plan.tier, plan.index, attempt)
+    library = OUTSIDE if plan.kind == "outside" else _allowed_effects(plan)
+    chosen: list[HiddenEffect] = []
+    first = _cycled_index(plan, attempt, len(library))
+    order = [first, *(int(other) for other in rng.permutation(len(library)) if other != first)]
+    for number in order:
+        if len(chosen) == EFFECT_COUNTS[plan.kind]:
+            break
+        places = list(library[number].places(plan.machine))
+        if not places:
+            continue
+        drawn = library[number].draw(rng, plan.machine, int(rng.choice(places)))
+        if _fits_beside(drawn, chosen):
+            chosen.append(drawn)
+    return tuple(chosen)
+
+
+def target_multiple(plan: Plan, number: int) -> float:
+    """Detection limits aimed at: log-uniform, evenly spread over the cases of a set."""
+    golden = (np.sqrt(5) - 1) / 2
+    start = random_stream("sizes", plan.seed, plan.tier).random()
+    share = (start + golden * plan.index + 0.381966 * number) % 1
+    return float(MIN_MULTIPLE * (MAX_MULTIPLE / MIN_MULTIPLE) ** share)
+
+
+def _allowed_effects(plan: Plan) -> tuple[type[HiddenEffect], ...]:
+    """In the realistic tier without what is in the background anyway."""
+    return tuple(kind for kind in LIBRARY if not plan.realistic or kind.effect not in BACKGROUND_EFFECTS)
+
+
+def _cycled_index(plan: Plan, attempt: int, size: int) -> int:
+    """Each effect comes once before any comes twice."""
+    block, place = divmod(plan.index, size)
+    order = random_stream("order", plan.seed, plan.tier, plan.kind == "outside", block).permutation(size)
+    return int(order[(place + 7 * attempt) % size])
+
+
+def _fits_beside(drawn: HiddenEffect, chosen: list[HiddenEffect]) -> bool:
+    own = [each for each in chosen if each.has_parts]
+    return not (drawn.has_parts and own) and drawn.effect not in {each.effect for each in chosen}
+
+
+def _choose_kind(index: int, seed: int, tier: str) -> CaseKind:
+    """Spread evenly over the cases of a set, so that a small set has some of each."""
+    share = (random_stream("kind", seed, tier).random() + (np.sqrt(2) - 1) * index) % 1
+    for kind, end in zip(KIND_SHARES, np.cumsum(list(KIND_SHARES.values())), strict=True):
+        if share < end:
+            return kind
+    return "null"
+
+
+def _draw_noise_kind(rng: np.random.Generator, kind: CaseKind, realistic: bool, development: bool) -> str:
+    special = bool(rng.random() < 0.5) and kind == "null" and not development
+    usual = "coloured" if realistic else str(rng.choice(USUAL_KINDS))
+    return str(rng.choice(JUDGED_KINDS)) if special else usual
+
+
+def _draw_arm(rng: np.random.Generator, made: Machine, off: bool, kind: CaseKind) -> tuple[Arm, tuple[float, ...]]:
+    """The arm with links that are 3-10 % off (a decoy of the clean tier: up to 20 %), and how much each is."""
+    arm, errors = made.arm, list[float]()
+    most = 0.2 if kind == "decoy" else 0.1
+    for number, link in enumerate(arm.links or ()) if off else ():
+        error = float(rng.uniform(0.03, most))
+        mass, spread = 1 + error * rng.choice([-1, 1]), 1 + error * rng.uniform(-1, 1)
+        reach = float(np.linalg.norm(np.array(link.first_moment))) / link.mass
+        shift = error * max(reach, 0.02) * rng.uniform(-1, 1, 3)
+        arm, errors = with_stretched_link(arm, number, float(mass), shift, float(spread)), [*errors, error]
+    return arm, tuple(errors)
+
+
+def _draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEffect, ...]:
+    """Coulomb and viscous friction on every joint, offsets on half of them."""
+    out: list[HiddenEffect] = []
+    for joint in range(made.joints):
+        level, slope, offset = (
+            torque_share(float(share), made, joint) for share in rng.uniform((0.02, 0.02, 0.002), (0.07, 0.07, 0.01))
+        )
+        out += [
+            Coulomb(joint, level, np.inf, "sign", {"width": 0.0}),
+            Viscous(joint, slope, np.inf, "linear", {"phase": 0.0}),
+        ]
+        if rng.random() < 0.5:
+            out.append(Offset(joint, offset, np.inf, "constant", {"direction": float(rng.choice([-1, 1]))}))
+    return tuple(out)
+
+
+def _draw_runs(rng: np.random.Generator) -> tuple[RunPlan, ...]:
+    """Two or three runs of one or two families, and one of another family to validate."""
+    families = [str(name) for name in rng.permutation(list(FAMILIES))]
+    number = int(rng.integers(2, 4))
+    identify = [RunPlan(families[run % 2], float(rng.uniform(10, 15)), "identify") for run in range(number)]
+    return (*identify, RunPlan(families[2], float(rng.uniform(10, 12)), "validate"))

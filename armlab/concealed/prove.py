@@ -1,0 +1,183 @@
+"""The blind proof: conceal, seal, diagnose each case in a process of its own, score, and log the result.
+
+The diagnosis is reached through the command line only. It is given a copy of one recording folder, in a place from
+which no path leads to the answers.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from joblib import Parallel, delayed
+
+from armlab.common.errors import InputError
+from armlab.concealed.plan import DEVELOPMENT_SEEDS
+from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.scoring import format_lines, score_set
+from armlab.concealed.sets import MANIFEST_FILE, SetKind, SetSettings, conceal_set, file_digest
+
+QUICK_NAME, QUICK_SEED, QUICK_CASES = "quick", 1900, 24
+TIMEOUT_S = 900.0
+LOG_FILE = "log.jsonl"
+FINISHED_MARK = "finished"
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The sets of one proof, and its name. commit: of the source tree, None for one that is not judged."""
+
+    sets: dict[str, SetSettings]
+    name: str
+    commit: str | None = None
+
+
+def choose_proof(quick: bool, development: int | None, cases: int, nulls: int) -> Proof:
+    """The quick proof, one on a development seed, or the judged one."""
+    if quick:
+        return make_quick_proof()
+    return make_judged_proof(cases, nulls) if development is None else make_development_proof(development, cases, nulls)
+
+
+def make_quick_proof() -> Proof:
+    """A small development set, always the same: to see that everything works together."""
+    return Proof({"quick": SetSettings(QUICK_CASES, QUICK_SEED, development=True)}, QUICK_NAME)
+
+
+def make_development_proof(seed: int, cases: int, nulls: int) -> Proof:
+    """Sets to learn from, kept out of the log; InputError for a seed that is not for development."""
+    if seed not in DEVELOPMENT_SEEDS:
+        raise InputError(
+            f"seed {seed} should be one for development, {DEVELOPMENT_SEEDS[0]} to {DEVELOPMENT_SEEDS[-1]}"
+        )
+    sets = {kind: SetSettings(count, seed, kind=kind, development=True) for count, kind in _set_sizes(cases, nulls)}
+    return Proof({name: each for name, each in sets.items() if each.cases}, f"development-{seed}")
+
+
+def make_judged_proof(cases: int, nulls: int) -> Proof:
+    """Sets whose seed follows from the commit: nobody can have tuned on them before it was made."""
+    commit = _run_git("rev-parse", "HEAD")
+    seed = judged_seed(commit)
+    sets = {kind: SetSettings(count, seed, kind=kind) for count, kind in _set_sizes(cases, nulls)}
+    return Proof({name: each for name, each in sets.items() if each.cases}, commit, commit)
+
+
+def _set_sizes(cases: int, nulls: int) -> tuple[tuple[int, SetKind], ...]:
+    return (cases, "mixed"), (nulls, "nulls")
+
+
+def judged_seed(commit: str) -> int:
+    """A seed from a commit's hash; never one of those for development."""
+    return DEVELOPMENT_SEEDS.stop + int(commit[:12], 16)
+
+
+def prove(proof: Proof, work: Path, results: Path, jobs: int) -> Iterator[str]:
+    """Does what is missing of a proof and tells how far it is; scores go to `results`, a folder a set.
+
+    work: sets and verdicts, kept so that a proof that was interrupted goes on; one that is not judged and was finished
+    starts anew, a judged one is only scored again. A judged proof is added to `results`/log.jsonl, once. Raises
+    InputError for a working folder of another proof.
+    """
+    if proof.commit is None and (work / FINISHED_MARK).is_file():
+        shutil.rmtree(work)
+    for name, settings in proof.sets.items():
+        folder, verdicts = work / name / "set", work / name / "verdicts"
+        yield f"{name}: {settings.cases} cases, seed {settings.seed}"
+        yield from _report_progress("concealed", conceal_set(settings, folder, jobs), settings.cases)
+        sealed = file_digest(folder / MANIFEST_FILE)
+        yield f"{name}: manifest SHA-256 {sealed}"
+        cases = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))["cases"]
+        yield from _report_progress("diagnosed", diagnose_all(folder, verdicts, cases, jobs), len(cases))
+        found = score_set(folder, verdicts, sealed, results / name)
+        yield from format_lines(found)
+        if proof.commit is not None and not (work / name / FINISHED_MARK).is_file():
+            _append_to_log(results / LOG_FILE, proof.commit, name, found)
+        (work / name / FINISHED_MARK).touch()
+    (work / FINISHED_MARK).touch()
+
+
+def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int) -> Iterator[str]:
+    """Diagnoses the cases that have no verdict yet, each in its own process; tells their names as they are done."""
+    missing = [
+        case for case in cases if not any((verdicts / case / name).is_file() for name in ("time.json", FAILURE_FILE))
+    ]
+    work = (delayed(_diagnose_case)(folder / "observations" / case, verdicts / case) for case in missing)
+    yield from Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(work)
+
+
+def _diagnose_case(observation: Path, out: Path) -> str:
+    """One diagnosis; the time is written last and says that the verdict is whole."""
+    out.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as desk:
+        copy = shutil.copytree(observation, Path(desk) / observation.name)
+        start = time.monotonic()
+        command = [sys.executable, "-m", "armlab.cli.main", "diagnose", str(copy), "--out", str(out.resolve())]
+        complaint = _run_and_get_error(command)
+        seconds = time.monotonic() - start
+    if complaint is not None:
+        (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
+    else:
+        (out / "time.json").write_text(json.dumps({"seconds": round(seconds, 2)}) + "\n", encoding="utf-8")
+    return observation.name
+
+
+def _run_and_get_error(command: list[str]) -> str | None:
+    """Runs a command; what it said if it failed, None if it did not."""
+    about: dict[str, Any] = {"env": _one_thread_environment(), "cwd": _source_root(), "timeout": TIMEOUT_S}
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, **about)
+    except subprocess.TimeoutExpired:
+        return f"no verdict after {TIMEOUT_S:g} s\n"
+    return done.stderr if done.returncode else None
+
+
+def _one_thread_environment() -> dict[str, str]:
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+def _source_root() -> Path:
+    return Path(__file__).resolve().parents[2]
+
+
+def _report_progress(what: str, done: Iterator[str], total: int) -> Iterator[str]:
+    """A line every tenth of the way."""
+    every = max(total // 10, 1)
+    for number, _ in enumerate(done, 1):
+        if number % every == 0:
+            yield f"  {what} {number} of {total}"
+
+
+def _append_to_log(path: Path, commit: str, name: str, found: dict[str, Any]) -> None:
+    """Adds a judged run, good or bad, once."""
+    entry = {
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+        "commit": commit,
+        "changed_files": bool(
+            _run_git("status", "--porcelain", "--untracked-files=no", ".", ":!results")
+        ),  # of the code
+        "set": name,
+        **{key: found[key] for key in ("seed", "cases", "manifest")},
+        "score": {
+            tier: {each["name"]: [each["value"], each["low"], each["high"], each["number"]] for each in measures}
+            for tier, measures in found["tiers"].items()
+        },
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(entry) + "\n")
+
+
+def _run_git(*arguments: str) -> str:
+    try:
+        done = subprocess.run(["git", *arguments], cwd=_source_root(), capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        raise InputError("the judged seed follows from the commit, and this is no git checkout: use --quick") from None
+    return done.stdout.strip()

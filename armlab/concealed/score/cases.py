@@ -1,0 +1,164 @@
+"""Judged cases: answers and verdicts side by side, and the category of each finding.
+
+A finding is injected, in the background, identical to one of them, misplaced, unknown, or wrong. What counts as
+identical is the table of effects that no motion separates, fixed before any verdict was scored: asymmetric Coulomb
+friction is Coulomb friction and an offset; a rotor is the inertia of its link where no motion separates them; a
+linear spring is a cable; a payload is a change of its link; an equal delay is viscous friction.
+"""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from armlab.common.errors import InputError
+
+FAILURE_FILE = "failed.txt"  # beside where a verdict should be: what a diagnosis that gave none complained of
+VALID_STATUSES = ("mismatch", "none", "inconclusive")
+MISSING_VERDICT: dict[str, Any] = {"status": "invalid", "findings": [], "unexplained": [], "fit": []}
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedCase:
+    """One case: its answer, its verdict (`status` invalid where there is none), and how long the diagnosis took.
+
+    recording, clean: the recording folder, and the file with the held-out torque without noise. folder: where the
+    verdict is.
+    """
+
+    truth: dict[str, Any]
+    verdict: dict[str, Any]
+    recording: Path
+    clean: Path
+    folder: Path
+    seconds: float | None
+
+    @property
+    def name(self) -> str:
+        """The case's name."""
+        return str(self.truth["case"])
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """What was found, most important first."""
+        return list(self.verdict["findings"])
+
+    @property
+    def says_unknown(self) -> bool:
+        """True if the verdict says that something is there that it cannot name."""
+        named = any(finding["effect"] == "unknown" for finding in self.findings)
+        return named or bool(self.verdict["unexplained"])
+
+
+def read_cases(folder: Path, verdicts: Path, names: list[str]) -> list[JudgedCase]:
+    """All cases of a set; a missing or invalid verdict is kept as one that found nothing."""
+    out = []
+    for name in names:
+        answer, own = folder / "truth" / f"{name}.json", verdicts / name
+        truth = json.loads(answer.read_text(encoding="utf-8"))
+        recording, clean = folder / "observations" / name, answer.with_suffix(".parquet")
+        out.append(JudgedCase(truth, _read_verdict(own / "verdict.json"), recording, clean, own, _read_seconds(own)))
+    if all(case.verdict["status"] == "invalid" for case in out):
+        raise InputError(
+            f"{verdicts} holds no valid verdict: one is expected in {verdicts / names[0] / 'verdict.json'}"
+        )
+    return out
+
+
+def _read_verdict(path: Path) -> dict[str, Any]:
+    try:
+        verdict = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return MISSING_VERDICT
+    return verdict if _is_valid_verdict(verdict) else MISSING_VERDICT
+
+
+def _is_valid_verdict(verdict: Any) -> bool:
+    """What the score relies on; a verdict without it counts as none at all."""
+    if not isinstance(verdict, dict) or verdict.get("status") not in VALID_STATUSES:
+        return False
+    lists = (verdict.get(key) for key in ("findings", "unexplained", "fit"))
+    if not all(isinstance(each, list) and all(isinstance(item, dict) for item in each) for each in lists):
+        return False
+    needed = {"effect", "joint", "parameters", "rivals"}
+    return all(
+        needed <= finding.keys()
+        and isinstance(finding["parameters"], dict)
+        and isinstance(finding["rivals"], list)
+        and all(isinstance(rival, dict) and "effect" in rival for rival in finding["rivals"])
+        for finding in verdict["findings"]
+    )
+
+
+def _read_seconds(folder: Path) -> float | None:
+    path = folder / "time.json"
+    return float(json.loads(path.read_text(encoding="utf-8"))["seconds"]) if path.is_file() else None
+
+
+Category = Literal["injected", "background", "identical", "misplaced", "unknown", "wrong"]
+CONTAINED_EFFECTS = {  # what the law of an effect holds as a part
+    "stribeck_friction": ("coulomb_friction", "viscous_friction"),
+    "asymmetric_friction": ("coulomb_friction", "torque_offset", "viscous_friction"),
+    "presliding_hysteresis": ("coulomb_friction",),
+    "friction_drift": ("viscous_friction",),
+    "cable_stiffness": ("gravity_compensator", "torque_offset"),
+    "gravity_compensator": ("cable_stiffness", "torque_offset"),
+    "payload": ("inertial_parameter_error",),
+    "inertial_parameter_error": ("payload",),
+    "rotor_inertia": ("inertial_parameter_error",),
+    "torque_gain_error": ("inertial_parameter_error",),
+    "sticky_patches": ("coulomb_friction",),
+}
+DELAY_LIKE_EFFECTS = ("viscous_friction",)
+
+
+def categorize_finding(case: JudgedCase, finding: dict[str, Any]) -> Category:
+    """Of one finding of a case."""
+    truth, effect = case.truth, finding["effect"]
+    if effect == "unknown":
+        return "injected" if any(each["outside"] for each in truth["injected"]) else "unknown"
+    if any(is_same_effect(finding, each) for each in truth["injected"]):
+        return "injected"
+    if any(is_same_effect(finding, each) for each in (*truth["background"], *truth["cad_errors"])):
+        return "background"
+    if any(
+        _is_indistinguishable(finding, each, truth)
+        for each in (*truth["injected"], *truth["background"], *truth["cad_errors"])
+    ):
+        return "identical"
+    if _is_sum_of_parts(finding, truth):
+        return "identical"
+    return "misplaced" if any(effect == each["effect"] for each in truth["injected"]) else "wrong"
+
+
+def is_same_effect(finding: dict[str, Any], effect: dict[str, Any]) -> bool:
+    """The same name at the same place."""
+    return bool(finding["effect"] == effect["effect"] and finding["joint"] == effect["joint"])
+
+
+def _is_indistinguishable(finding: dict[str, Any], effect: dict[str, Any], truth: dict[str, Any]) -> bool:
+    """One finding that no motion tells from an effect, or that is part of its law."""
+    found, place = finding["effect"], finding["joint"]
+    if effect["effect"] == "time_delay":
+        return found in DELAY_LIKE_EFFECTS
+    if effect["effect"] == "slosh":
+        return found in ("payload", "inertial_parameter_error") and place == truth["joints"]
+    if found == "rotor_inertia" and effect["effect"] == "inertial_parameter_error":
+        return place in truth["absorbed_rotors"]
+    if found not in CONTAINED_EFFECTS.get(effect["effect"], ()) or place is None:
+        return False
+    if found == "payload":
+        return bool(place == truth["joints"] and abs(place - effect["joint"]) <= 1)
+    if found != "inertial_parameter_error":
+        return bool(place == effect["joint"])
+    if effect["effect"] == "payload":
+        return bool(abs(place - effect["joint"]) <= 1)
+    return bool(place >= effect["joint"])
+
+
+def _is_sum_of_parts(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
+    """Asymmetric friction where Coulomb friction and an offset are both there."""
+    if finding["effect"] != "asymmetric_friction":
+        return False
+    there = {each["effect"] for each in (*truth["injected"], *truth["background"]) if each["joint"] == finding["joint"]}
+    return {"coulomb_friction", "torque_offset"} <= there

@@ -1,0 +1,156 @@
+"""Tidy rows of a scored set: one for each effect, each claim, each parameter and each case."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from armlab.concealed.score.cases import JudgedCase, categorize_finding, is_same_effect
+from armlab.concealed.score.held_out import measure_gap_closed
+
+MAX_CLASS_SIZE = 4
+KEY_COLUMNS = ["case", "tier", "kind"]
+GAP_COLUMNS = ["gap_closed", "gap_closed_beyond_friction", "gap_source"]
+CASE_COLUMNS = [*KEY_COLUMNS, "arm", "noise", "status", "false_claims", "false_unknown", *GAP_COLUMNS, "seconds"]
+COPIED_EFFECT_KEYS = ["effect", "form", "obvious_form", "joint", "outside", "multiple"]
+EFFECT_COLUMNS = [
+    *KEY_COLUMNS,
+    "arm",
+    *COPIED_EFFECT_KEYS,
+    "named_first",
+    "named_class",
+    "class_size",
+    "right_joint",
+    "answered",
+]
+CLAIM_COLUMNS = [*KEY_COLUMNS, "effect", "joint", "category", "class_size"]
+COMPARISON_COLUMNS = ["parameter", "truth", "value", "relative_error", "covered"]
+PARAMETER_COLUMNS = ["case", "tier", "effect", "joint", "hidden_as", *COMPARISON_COLUMNS]
+
+
+@dataclass(frozen=True, eq=False)
+class ScoreRows:
+    """Data frames over all cases of a set."""
+
+    cases: pd.DataFrame
+    effects: pd.DataFrame
+    claims: pd.DataFrame
+    parameters: pd.DataFrame
+
+
+def make_rows(cases: list[JudgedCase]) -> ScoreRows:
+    """The rows of judged cases."""
+    frames = (
+        [_case_row(case) for case in cases],
+        [row for case in cases for row in _effect_rows(case)],
+        [row for case in cases for row in _claim_rows(case)],
+        [row for case in cases for row in _parameter_rows(case)],
+    )
+    columns = (CASE_COLUMNS, EFFECT_COLUMNS, CLAIM_COLUMNS, PARAMETER_COLUMNS)
+    return ScoreRows(*(pd.DataFrame(each, columns=names) for each, names in zip(frames, columns, strict=True)))
+
+
+def to_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """The rows of a frame, each by the names of its columns."""
+    return [dict(zip(map(str, frame.columns), row, strict=True)) for row in frame.itertuples(index=False)]
+
+
+def _key_values(case: JudgedCase) -> dict[str, Any]:
+    return {"case": case.name, "tier": case.truth["tier"], "kind": case.truth["kind"]}
+
+
+def _case_row(case: JudgedCase) -> dict[str, Any]:
+    categories = [categorize_finding(case, finding) for finding in case.findings]
+    gap = measure_gap_closed(case)
+    return _key_values(case) | {
+        "arm": case.truth["arm"],
+        "noise": case.truth["noise"]["kind"],
+        "status": case.verdict["status"],
+        "false_claims": sum(each in ("wrong", "misplaced", "unknown") for each in categories),
+        "false_unknown": case.says_unknown and not case.truth["injected"],
+        "gap_closed": gap.closed,
+        "gap_closed_beyond_friction": gap.beyond,
+        "gap_source": gap.source,
+        "seconds": case.seconds,
+    }
+
+
+def _effect_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
+    for effect in case.truth["injected"]:
+        outside = effect["outside"]
+        named = [each for each in case.findings if each["effect"] == effect["effect"]] or _equivalent_findings(
+            case, effect
+        )
+        in_class = [finding for finding in case.findings if _class_holds(finding, effect["effect"])]
+        sizes = [1 + len(finding["rivals"]) for finding in in_class]
+        yield _key_values(case) | {
+            "arm": case.truth["arm"],
+            **{key: effect[key] for key in COPIED_EFFECT_KEYS},
+            "named_first": case.says_unknown if outside else bool(named),
+            "named_class": case.says_unknown if outside else bool(named or in_class),
+            "class_size": min(sizes) if sizes else None,
+            "right_joint": any(each["joint"] == effect["joint"] for each in named) if named and not outside else None,
+            "answered": _given_answer(case, effect),
+        }
+
+
+def _equivalent_findings(case: JudgedCase, effect: dict[str, Any]) -> list[dict[str, Any]]:
+    """The findings at the effect's joint that together say the same, if all of them are there."""
+    parts = [
+        each for each in case.findings if each["joint"] == effect["joint"] and each["effect"] in effect["equivalent"]
+    ]
+    return parts if {each["effect"] for each in parts} == set(effect["equivalent"]) else []
+
+
+def _class_holds(finding: dict[str, Any], effect: str) -> bool:
+    """True for a class of at most four names with the right one among them."""
+    names = [finding["effect"], *(rival["effect"] for rival in finding["rivals"])]
+    return len(names) <= MAX_CLASS_SIZE and effect in names
+
+
+def _given_answer(case: JudgedCase, effect: dict[str, Any]) -> str:
+    """The column of the confusion matrix: the right name if it was said, else what was said instead."""
+    if _equivalent_findings(case, effect) or any(finding["effect"] == effect["effect"] for finding in case.findings):
+        return str(effect["effect"])
+    wrong = [each for each in case.findings if categorize_finding(case, each) in ("wrong", "misplaced", "identical")]
+    at_joint = [finding for finding in wrong if finding["joint"] == effect["joint"]]
+    if at_joint or wrong:
+        return str((at_joint or wrong)[0]["effect"])
+    if case.says_unknown:
+        return "unknown"
+    return "missed" if case.verdict["status"] == "mismatch" else str(case.verdict["status"])
+
+
+def _claim_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
+    for finding in case.findings:
+        known = {"effect": finding["effect"], "joint": finding["joint"], "category": categorize_finding(case, finding)}
+        yield _key_values(case) | known | {"class_size": 1 + len(finding["rivals"])}
+
+
+def _parameter_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
+    about = {key: value for key, value in _key_values(case).items() if key != "kind"}
+    for hidden_as in ("injected", "background"):
+        for effect in case.truth[hidden_as]:
+            for finding in (each for each in case.findings if is_same_effect(each, effect)):
+                for row in _comparison_rows(effect, finding):
+                    yield about | {"effect": effect["effect"], "joint": effect["joint"], "hidden_as": hidden_as} | row
+
+
+def _comparison_rows(effect: dict[str, Any], finding: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    for name, known in effect["parameters"].items():
+        found = finding["parameters"].get(name)
+        if not known["comparable"] or not isinstance(found, dict) or not _is_number(found.get("value")):
+            continue
+        truth, value, interval = known["value"], found["value"], found.get("ci95")
+        covered = bool(interval[0] <= truth <= interval[1]) if interval and _is_interval(interval) else None
+        error = abs(value - truth) / max(abs(truth), 1e-12)
+        yield {"parameter": name, "truth": truth, "value": value, "relative_error": error, "covered": covered}
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_interval(value: Any) -> bool:
+    return isinstance(value, list) and len(value) == 2 and all(_is_number(end) for end in value)

@@ -1,0 +1,83 @@
+"""`armlab score`: from a concealed set and verdicts to score.json, tables, figures, the page and the gallery."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from armlab.concealed.score.cases import JudgedCase, read_cases
+from armlab.concealed.score.figures import draw_figures
+from armlab.concealed.score.gallery import write_gallery
+from armlab.concealed.score.measures import (
+    Measure,
+    compute_measures,
+    confusion_table,
+    detection_table,
+    detection_table_by_effect,
+)
+from armlab.concealed.score.outcomes import list_misses
+from armlab.concealed.score.page import format_measure, render_page
+from armlab.concealed.score.rows import ScoreRows, make_rows
+from armlab.concealed.sets import read_checked_manifest
+
+SCORE_FILE = "score.json"
+
+
+def score_set(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> dict[str, Any]:
+    """Checks the seal, scores every case, writes score.json, CSV tables, score.md, figures and the gallery into `out`.
+
+    sealed: SHA-256 of the manifest as printed. Raises InputError for a set that was changed since, and where there
+    is no verdict at all.
+    """
+    cases, table, result = compute_score(folder, verdicts, sealed)
+    tiers = sorted(result["tiers"])
+    out.mkdir(parents=True, exist_ok=True)
+    (out / SCORE_FILE).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    missed = list_misses(cases, table)
+    missed.to_csv(out / "misses.csv", index=False)
+    _write_tables(table, tiers, out)
+    write_gallery(cases, table, out)
+    drawn = [path.stem for path in draw_figures(table, out)]
+    (out / "score.md").write_text(render_page(table, result, missed, drawn), encoding="utf-8")
+    return result
+
+
+def compute_score(
+    folder: Path, verdicts: Path, sealed: str | None
+) -> tuple[list[JudgedCase], ScoreRows, dict[str, Any]]:
+    """The cases, their rows and what score.json holds; nothing is written. Raises InputError as `score` does."""
+    manifest, found = read_checked_manifest(folder, sealed)
+    cases = read_cases(folder, verdicts, manifest["cases"])
+    table = make_rows(cases)
+    result = {
+        "schema": "score/1",
+        "manifest": found,
+        "seed": manifest["seed"],
+        "kind": manifest["kind"],
+        "development": manifest["development"],
+        "cases": len(table.cases),
+        "tiers": {
+            tier: [asdict(each) for each in compute_measures(table, tier)] for tier in sorted(set(table.cases["tier"]))
+        },
+    }
+    return cases, table, result
+
+
+def format_lines(result: dict[str, Any]) -> list[str]:
+    """The measures, a line each, for the terminal."""
+    out = []
+    for tier, found in result["tiers"].items():
+        out += [
+            f"{tier}:",
+            *(f"  {each['name']}: {format_measure(Measure(**each))}  {each['wanted']}" for each in found),
+        ]
+    return out
+
+
+def _write_tables(table: ScoreRows, tiers: list[str], out: Path) -> None:
+    for name in ("cases", "effects", "claims", "parameters"):
+        getattr(table, name).to_csv(out / f"{name}.csv", index=False)
+    detection_table_by_effect(table).to_csv(out / "detection_by_effect.csv", index=False)
+    for tier in tiers:
+        detection_table(table, tier).to_csv(out / f"detection_{tier}.csv", index=False)
+        confusion_table(table, tier).to_csv(out / f"confusion_{tier}.csv")

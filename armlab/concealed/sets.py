@@ -1,0 +1,128 @@
+"""A concealed set: cases made in parallel, each complete or absent, and the manifest that seals them.
+
+The manifest holds the SHA-256 of every file. Its own SHA-256 is printed before the first diagnosis.
+"""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from joblib import Parallel, delayed
+
+from armlab.common.errors import InputError
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, Tier, draw_plan
+
+MANIFEST_FILE = "manifest.json"
+
+
+def write_manifest(folder: Path, facts: dict[str, Any]) -> str:
+    """Writes the manifest of a concealed set and returns its SHA-256."""
+    parts = (path for part in ("observations", "truth") for path in (folder / part).rglob("*") if path.is_file())
+    files = {path.relative_to(folder).as_posix(): file_digest(path) for path in parts}
+    content = json.dumps({"schema": "manifest/1", **facts, "files": dict(sorted(files.items()))}, indent=1) + "\n"
+    (folder / MANIFEST_FILE).write_text(content, encoding="utf-8")
+    return file_digest(folder / MANIFEST_FILE)
+
+
+def read_checked_manifest(folder: Path, expected: str | None = None) -> tuple[dict[str, Any], str]:
+    """The manifest of a concealed set and its SHA-256, after every file was compared with it.
+
+    expected: the SHA-256 that was printed. Raises InputError if anything differs.
+    """
+    path = folder / MANIFEST_FILE
+    if not path.is_file():
+        raise InputError(f"no {MANIFEST_FILE} in {folder}: it is no finished concealed set")
+    found = file_digest(path)
+    if expected is not None and found != expected:
+        raise InputError(f"{path} has the SHA-256 {found}, not {expected}: it is not the manifest that was sealed")
+    manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    for name, value in manifest["files"].items():
+        file = folder / name
+        if not file.is_file() or file_digest(file) != value:
+            what = "was changed" if file.is_file() else "is missing"
+            raise InputError(f"{file} {what} after {MANIFEST_FILE} was sealed: the set cannot be scored")
+    return manifest, found
+
+
+def file_digest(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+SetKind = Literal["mixed", "nulls"]
+TIERS: tuple[Tier, ...] = ("clean", "realistic")
+SETTINGS_FILE = "settings.json"
+
+
+@dataclass(frozen=True)
+class SetSettings:
+    """What a set holds. development: without the kinds of noise that are kept for judged sets."""
+
+    cases: int
+    seed: int
+    tier: Literal["clean", "realistic", "both"] = "both"
+    kind: SetKind = "mixed"
+    development: bool = False
+
+    def plan(self, number: int) -> Plan:
+        """The plan of one case; `both` takes the tiers in turn."""
+        tiers = TIERS if self.tier == "both" else (self.tier,)
+        index, tier = divmod(number, len(tiers))
+        return draw_plan(self.seed, index, tiers[tier], self.kind == "nulls", self.development)
+
+
+def make_set_settings(cases: int, seed: int, tier: Any, kind: Any, development: bool) -> SetSettings:
+    """The settings of a set; seeds 1000-1999 make development sets, whatever was asked."""
+    return SetSettings(cases, seed, tier, kind, development or seed in DEVELOPMENT_SEEDS)
+
+
+def conceal_set(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
+    """Makes what is missing of a set, tells each case's name as it is done, last the manifest's SHA-256.
+
+    Raises InputError for a folder that holds another set.
+    """
+    _claim_folder(settings, out)
+    names = [settings.plan(number).name for number in range(settings.cases)]
+    missing = [number for number, name in enumerate(names) if not _is_done(out, name)]
+    work = (delayed(_make_case)(settings, number, out) for number in missing)
+    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
+    if missing or not (out / MANIFEST_FILE).is_file():
+        facts = {key: value for key, value in asdict(settings).items() if key != "cases"}
+        write_manifest(out, {**facts, "cases": sorted(names)})
+
+
+def _claim_folder(settings: SetSettings, out: Path) -> None:
+    """Notes what the folder is for, before hours of work."""
+    content = json.dumps(asdict(settings), indent=1) + "\n"
+    note = out / SETTINGS_FILE
+    if note.is_file() and note.read_text(encoding="utf-8") != content:
+        raise InputError(f"{out} holds another concealed set (see {note}): choose another folder")
+    if out.exists() and not note.is_file() and any(out.iterdir()):
+        raise InputError(f"{out} is there already and holds no concealed set: choose another folder")
+    for part in ("observations", "truth"):
+        (out / part).mkdir(parents=True, exist_ok=True)
+    note.write_text(content, encoding="utf-8")
+
+
+def _is_done(out: Path, name: str) -> bool:
+    return (out / "observations" / name).is_dir()
+
+
+def _make_case(settings: SetSettings, number: int, out: Path) -> str:
+    """Makes one case in a draft folder; the observation's renaming comes last, so that a cut leaves no half."""
+    from armlab.concealed.case_files import write_case
+    from armlab.concealed.sizing import simulate_case
+
+    plan = settings.plan(number)
+    draft = out / "drafts" / plan.name
+    shutil.rmtree(draft, ignore_errors=True)
+    write_case(simulate_case(plan), draft / "observation", draft / f"{plan.name}.json")
+    for suffix in (".json", ".parquet"):
+        (draft / f"{plan.name}{suffix}").replace(out / "truth" / f"{plan.name}{suffix}")
+    (draft / "observation").replace(out / "observations" / plan.name)
+    shutil.rmtree(draft)
+    return plan.name

@@ -1,0 +1,314 @@
+"""Sizes of hidden effects: the detection limit, and the search for the size that has a given multiple of it.
+
+The limit is what an oracle with the true form and the true noise finds with 90 % power. The oracle tests one number,
+the size of the effect, after everything free has been projected out of its torque, in whitened rows. The level of the
+test is one per cent over all effects and places that a diagnosis may look at. The *multiple* of an effect is the
+square root of its noncentrality over that of the limit.
+
+Effects are sized on the reference, simulated coarsely, corrected, and then simulated finely. The size of an effect
+with parts of its own (a spring, a play, a base that gives way) shows in simulations only, and not in proportion: it
+is simulated coarsely as often as needed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, ncx2
+
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.engine import Track
+from armlab.concealed.noise import Noise
+from armlab.concealed.plan import Plan, draw_effects, target_multiple
+from armlab.concealed.simulate import (
+    Controller,
+    arm_with_effects,
+    coarse_track,
+    draw_controller,
+    effect_torque,
+    free_columns,
+    law_torque,
+    reference_track,
+    simulate_runs,
+)
+from armlab.recordings.recording import Array
+from armlab.recordings.vocabulary import EFFECTS
+
+ORACLE_HZ = 250.0  # rows a second: means over 4 ms
+FAMILY_WISE_LEVEL, ORACLE_POWER = 0.01, 0.9
+MIN_COLUMN_POWER = 1e-10  # share of a column's power that counts as rounding
+
+
+def candidate_count(joints: int) -> int:
+    """Effects times places in the vocabulary: what a test has to be corrected for."""
+    places = {"joint": joints, "coupling": joints * (joints - 1), "link": joints, "robot": 1}
+    return sum(places[effect.where] for effect in EFFECTS if effect.id != "unknown")
+
+
+@lru_cache(maxsize=32)
+def limit_noncentrality(joints: int) -> float:
+    """Noncentrality of a chi-square of one degree of freedom that is found with 90 % power."""
+    critical = chi2.isf(FAMILY_WISE_LEVEL / candidate_count(joints), 1)
+    return float(brentq(lambda value: ncx2.sf(critical, 1, value) - ORACLE_POWER, 1.0, 200.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Oracle:
+    """Whitens rows by the true noise and projects out what is free.
+
+    noise: of the recording's samples at rate_hz. basis: (rows, columns), orthonormal, of the free columns.
+    """
+
+    noise: Noise
+    rate_hz: float
+    basis: Array | None = None
+
+    def with_free_columns(self, columns: Sequence[Array]) -> "Oracle":
+        """The oracle with free columns, a (samples, joints, columns) each run."""
+        flat = np.vstack([self._rows(run) for run in columns])
+        return Oracle(self.noise, self.rate_hz, _orthonormal_basis(flat))
+
+    def multiple(self, torque: Sequence[Array], beside: Sequence[Array] | None = None) -> float:
+        """How many detection limits an effect is large whose torque is (samples, joints) in each run.
+
+        beside: columns that are free for this effect alone, (samples, joints, columns) each run.
+        """
+        joints = torque[0].shape[1]
+        rows = np.vstack([self._rows(run[..., None]) for run in torque])
+        parts = [] if self.basis is None else [self.basis]
+        if beside is not None:
+            parts.append(_orthonormal_basis(_project_out(np.vstack([self._rows(run) for run in beside]), parts)))
+        return float(np.sqrt(np.sum(_project_out(rows, parts) ** 2) / limit_noncentrality(joints)))
+
+    def _rows(self, columns: Array) -> Array:
+        """Whitened rows (samples * joints, columns)."""
+        thinned = Noise(
+            self.noise.kind,
+            self.noise.white * np.sqrt(min(ORACLE_HZ / self.rate_hz, 1.0)),  # of a mean over several samples
+            self.noise.coloured,
+            self.noise.corner_hz,
+        )
+        out = [thinned.whitened(columns[:, joint], joint, ORACLE_HZ) for joint in range(columns.shape[1])]
+        return np.vstack(out)
+
+
+def _project_out(rows: Array, bases: Sequence[Array]) -> Array:
+    for _ in range(2):
+        for basis in bases:
+            rows = rows - basis @ (basis.T @ rows)
+    return rows
+
+
+def _orthonormal_basis(columns: Array) -> Array:
+    """An orthonormal basis of columns, dependent ones left out."""
+    lengths = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, lengths > 0] / lengths[lengths > 0]
+    power, axes = np.linalg.eigh(scaled.T @ scaled)
+    kept = power > MIN_COLUMN_POWER
+    return np.asarray(scaled @ (axes[:, kept] / np.sqrt(power[kept])))
+
+
+MAX_EFFECT_DRAWS = 6  # draws of effects that cannot be seen on this arm, before one is taken as it is
+MIN_TARGET_SHARE = 0.6  # of the multiple aimed at
+MAX_SIZE_STEPS, MULTIPLE_TOLERANCE = 4, 0.03  # of the search for a size, and when it ends
+SIZE_EXPONENT_RANGE, MAX_SIZE_FACTOR = (0.25, 3.0), 1e3  # of the size that a multiple may follow, and the longest step
+
+
+@dataclass(frozen=True, eq=False)
+class SizedEffects:
+    """Effects with their sizes. targets: multiples aimed at. passed_over: names of draws that could not be seen."""
+
+    hidden: tuple[HiddenEffect, ...]
+    targets: tuple[float, ...]
+    passed_over: tuple[str, ...] = ()
+
+    def with_size(self, number: int, size: float) -> "SizedEffects":
+        """The same with another size of one effect."""
+        changed = self.hidden[number].sized(size)
+        return replace(self, hidden=(*self.hidden[:number], changed, *self.hidden[number + 1 :]))
+
+
+def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
+    """Effects of the sizes aimed at, found on the reference tracks; drawn anew where they could not be seen.
+
+    The last draw is kept whatever it is.
+    """
+    oracle, passed_over = make_oracle(plan, tracks), list[str]()
+    motors = [track.load + law_torque(plan.background, track, 0) for track in _identification_tracks(plan, tracks)]
+    peak = np.max([np.abs(torque).max(axis=0) for torque in motors], axis=0)
+    for attempt in range(MAX_EFFECT_DRAWS):
+        hidden = tuple(effect.with_peak_torque(peak) for effect in draw_effects(plan, attempt))
+        targets = tuple(target_multiple(plan, number) for number in range(len(hidden)))
+        sized, seen = SizedEffects(hidden, targets, tuple(passed_over)), True
+        for number, target in enumerate(targets):
+            sized, found = _scale_to_multiple(plan, oracle, sized, number, tracks, target)
+            seen = seen and found > MIN_TARGET_SHARE * target
+        if seen:
+            break
+        passed_over += [effect.effect for effect in hidden]
+    return sized
+
+
+def resize_effects(plan: Plan, sized: SizedEffects, tracks: Sequence[Track]) -> SizedEffects:
+    """Corrected on simulated tracks: slow motions may do otherwise than thought. What has parts stays as it is."""
+    oracle = make_oracle(plan, tracks)
+    for number, target in enumerate(sized.targets):
+        sized, _ = _scale_to_multiple(plan, oracle, sized, number, tracks, target)
+    return sized
+
+
+def next_size(tried: Sequence[tuple[float, float]], target: float) -> float:
+    """Where a power law through the last two tries (size, multiple) has the multiple aimed at; a line after one."""
+    size, found = tried[-1]
+    power = 1.0
+    if len(tried) > 1 and tried[-2][0] != size:
+        before, then = tried[-2]
+        power = float(np.clip(np.log(found / then) / np.log(size / before), *SIZE_EXPONENT_RANGE))
+    return float(size * np.clip((target / found) ** (1 / power), 1 / MAX_SIZE_FACTOR, MAX_SIZE_FACTOR))
+
+
+def effect_multiples(plan: Plan, hidden: Sequence[HiddenEffect], tracks: Sequence[Track]) -> tuple[float, ...]:
+    """Detection limits of each effect on the tracks of all runs."""
+    oracle = make_oracle(plan, tracks)
+    return tuple(effect_multiple(plan, oracle, hidden, number, tracks) for number in range(len(hidden)))
+
+
+def make_oracle(plan: Plan, tracks: Sequence[Track]) -> Oracle:
+    """Knows the noise; in the realistic tier base parameters and friction of every joint are free."""
+    oracle = Oracle(plan.noise, plan.rate_hz)
+    if not plan.realistic:
+        return oracle
+    return oracle.with_free_columns(
+        [free_columns(plan.true_arm, track, _grid(track)) for track in _identification_tracks(plan, tracks)]
+    )
+
+
+def effect_multiple(
+    plan: Plan, oracle: Oracle, hidden: Sequence[HiddenEffect], number: int, tracks: Sequence[Track]
+) -> float:
+    """Detection limits of one effect among others; in the clean tier its own plain friction is free beside it."""
+    effect, rest = hidden[number], (*hidden[:number], *hidden[number + 1 :])
+    arms, runs = (arm_with_effects(plan, hidden), arm_with_effects(plan, rest)), _identification_tracks(plan, tracks)
+    others = (*plan.background, *rest)
+    shares = [effect_torque(effect, others, arms, track, run, _grid(track)) for run, track in enumerate(runs)]
+    if plan.realistic or not effect.companions:
+        return oracle.multiple(shares)
+    columns = [free_columns(plan.true_arm, track, _grid(track), friction_only=True) for track in runs]
+    chosen = [effect.joint + len(plan.true_arm) * ("coulomb", "viscous").index(name) for name in effect.companions]
+    return oracle.multiple(shares, [each[..., chosen] for each in columns])
+
+
+def _scale_to_multiple(
+    plan: Plan, oracle: Oracle, sized: SizedEffects, number: int, tracks: Sequence[Track], target: float
+) -> tuple[SizedEffects, float]:
+    """One effect brought to a multiple; those with parts of their own need a simulation and stay as they are."""
+    if sized.hidden[number].has_parts:
+        return sized, target
+    found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
+    for _ in range(MAX_SIZE_STEPS):
+        factor = float(np.clip(target / max(found, 1e-9), 1e-3, 1e3))
+        if abs(np.log(factor)) < MULTIPLE_TOLERANCE:
+            break
+        sized = sized.with_size(number, sized.hidden[number].size * factor)
+        found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
+    return sized, found
+
+
+def _identification_tracks(plan: Plan, tracks: Sequence[Track]) -> list[Track]:
+    """The tracks from which a diagnosis may learn."""
+    return [track for track, run in zip(tracks, plan.runs, strict=True) if run.role == "identify"]
+
+
+def _grid(track: Track) -> Array:
+    return np.asarray(np.arange(0.0, track.time[-1] - 0.05, 1 / ORACLE_HZ))
+
+
+MAX_COARSE_PASSES, MAX_HALVINGS = 6, 3
+COARSE_MULTIPLE_TOLERANCE = 0.1  # of the logarithm of the multiple aimed at
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedCase:
+    """A case's runs as they happened, before any channel recorded them. multiples: of each effect's limit."""
+
+    plan: Plan
+    sized: SizedEffects
+    tracks: tuple[Track, ...]
+    multiples: tuple[float, ...]
+
+    @property
+    def hidden(self) -> tuple[HiddenEffect, ...]:
+        """The hidden effects with their final sizes."""
+        return self.sized.hidden
+
+    @property
+    def all_effects(self) -> tuple[HiddenEffect, ...]:
+        """Background and hidden effects."""
+        return (*self.plan.background, *self.hidden)
+
+
+def simulate_case(plan: Plan, given: tuple[HiddenEffect, ...] | None = None) -> SimulatedCase:
+    """Simulates a case, with the effects that its plan draws or with given ones of given sizes."""
+    controller = draw_controller(plan.stream("controller"), plan.machine.arm)
+    wanted = [reference_track(plan, number, run) for number, run in enumerate(plan.runs)]
+    sized = draw_sized_effects(plan, wanted) if given is None else SizedEffects(given, tuple(0.0 for _ in given))
+    coarse = simulate_runs(plan, sized.hidden, controller, wanted, [coarse_track(track) for track in wanted])
+    if given is None:
+        sized, coarse = correct_sizes(plan, sized, controller, wanted, coarse)
+    fine = simulate_runs(plan, sized.hidden, controller, coarse, wanted)
+    return SimulatedCase(plan, sized, fine, effect_multiples(plan, sized.hidden, fine))
+
+
+def correct_sizes(
+    plan: Plan, sized: SizedEffects, controller: Controller, wanted: Sequence[Track], coarse: tuple[Track, ...]
+) -> tuple[SizedEffects, tuple[Track, ...]]:
+    """Sizes as near to the multiples aimed at as coarse tracks show, and the last of these.
+
+    coarse: as played with the sizes so far.
+    """
+    number = next((number for number, effect in enumerate(sized.hidden) if effect.has_parts), None)
+    if number is not None:
+        sized, coarse = _search_size(plan, sized, number, controller, wanted, coarse)
+    return resize_effects(plan, sized, coarse), coarse
+
+
+def _search_size(
+    plan: Plan,
+    sized: SizedEffects,
+    number: int,
+    controller: Controller,
+    wanted: Sequence[Track],
+    coarse: tuple[Track, ...],
+) -> tuple[SizedEffects, tuple[Track, ...]]:
+    """The effect with parts at the size that comes nearest, and the tracks that it leads to."""
+    target, tried = sized.targets[number], list[tuple[float, float]]()
+    best = (np.inf, sized, coarse)
+    for more in reversed(range(MAX_COARSE_PASSES)):
+        found = max(effect_multiple(plan, make_oracle(plan, coarse), sized.hidden, number, coarse), 1e-9)
+        tried.append((sized.hidden[number].size, found))
+        best = min(best, (abs(float(np.log(found / target))), sized, coarse), key=lambda each: each[0])
+        aimed = sized.with_size(number, next_size(tried, target))
+        if not more or best[0] < COARSE_MULTIPLE_TOLERANCE or aimed.hidden[number].size == tried[-1][0]:
+            break
+        played = _simulate_toward_size(plan, sized, aimed, number, controller, wanted)
+        if played is None:
+            break
+        sized, coarse = played
+    return best[1], best[2]
+
+
+def _simulate_toward_size(
+    plan: Plan, sized: SizedEffects, aimed: SizedEffects, number: int, controller: Controller, wanted: Sequence[Track]
+) -> tuple[SizedEffects, tuple[Track, ...]] | None:
+    """Coarse tracks at the size aimed at, or on the way to it where the engine's step cannot follow that."""
+    for _ in range(MAX_HALVINGS):
+        try:
+            return aimed, simulate_runs(
+                plan, aimed.hidden, controller, wanted, [coarse_track(track) for track in wanted]
+            )
+        except FloatingPointError:
+            middle = float(np.sqrt(sized.hidden[number].size * aimed.hidden[number].size))
+            aimed = aimed.with_size(number, middle)
+    return None

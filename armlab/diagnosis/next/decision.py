@@ -1,0 +1,186 @@
+"""The probability that a run decides a question: in closed form for the search of a motion, and by simulated runs
+for the card.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+from scipy.stats import norm
+
+from armlab.diagnosis.claims import MAX_DEFICIT
+from armlab.diagnosis.next.moments import Index, draw_coefficients, solve_least_squares
+from armlab.diagnosis.next.prepare import PreparedQuestions
+from armlab.diagnosis.next.question import Law, Question, Rival
+from armlab.diagnosis.search import SPECIAL_FRICTION
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.solver import USUAL_EFFECTS
+from armlab.recordings.recording import Array
+
+MIN_SEPARATION = 1e-9  # standard errors
+
+
+def decision_strength(questions: tuple[Question, ...], gram: Array, rows: float) -> float:
+    """How well a run decides all questions: the distance d of two rivals that are confused as often, exp(-d^2 / 8).
+
+    gram: of everything that is fitted to both recordings. rows: that count, of all joints.
+    """
+    doubts = [log_doubt(each, gram, rows) for each in questions if each.pairs]
+    return float(np.sqrt(max(-8 * (logsumexp(doubts) - np.log(len(doubts))), 0.0)))
+
+
+def log_doubt(question: Question, gram: Array, rows: float) -> float:
+    """Logarithm of the mean chance that a wrong rival stays, over the right one, its shapes and its sizes.
+
+    Where one is right, its log likelihood leads another's by a normal number of mean d^2 / 2 and standard deviation d,
+    d^2 the noncentrality. The other stays where the lead is below what the rule of the diagnosis needs.
+    """
+    rests = [
+        [unexplained_gram(gram, np.append(question.found, law.columns)) for law in rival.laws]
+        for rival in question.rivals
+    ]
+    weights = np.array([each.weight for each in question.rivals])
+    out = []
+    for one, right in enumerate(question.rivals):
+        for other, rival in enumerate(question.rivals):
+            if one != other and not question.inseparable[one, other]:
+                doubt = _log_pair_doubt(right, rival, rests[other], question.extras, rows)
+                out.append(doubt + np.log(weights[one] / weights.sum() / (len(weights) - 1)))
+    return float(logsumexp(out)) if out else 0.0
+
+
+def _log_pair_doubt(right: Rival, other: Rival, rests: list[Array], extras: Index, rows: float) -> float:
+    """Log chance that another rival stays where one is right, over the sizes that it may have."""
+    out = []
+    for law, sizes in right.possible_sizes:
+        squared = [_noncentrality(law.columns, sizes, each, extras, rows) for each in rests]
+        closest = np.argmin(squared, axis=0)
+        needs = np.array([required_lead(law, each, rows) for each in other.laws])[closest]
+        square = np.maximum(np.min(squared, axis=0), MIN_SEPARATION**2)
+        out += norm.logsf((square / 2 - needs) / np.sqrt(square)).tolist()
+    return float(logsumexp(out) - np.log(len(out)))
+
+
+def _noncentrality(own: Index, sizes: Array, left: Array, extras: Index, rows: float) -> Array:
+    """What the fitted columns leave of a law with some sizes (draws, columns), one usual term more at its price."""
+    products = left[:, own] @ sizes.T
+    squared = np.sum(products[own] * sizes.T, axis=0)
+    return np.asarray(squared - 2 * usual_friction_gain(products, left, extras, rows))
+
+
+def usual_friction_gain(products: Array, left: Array, extras: Index, rows: float) -> Array:
+    """Log likelihood less price that the best term of usual friction adds, (draws,).
+
+    products: (columns, draws), of the columns with what is not explained. left: (columns, columns), as `rest` tells.
+    """
+    if not len(extras):
+        return np.zeros(products.shape[1])
+    lengths = np.maximum(np.diag(left)[extras], 1e-12)
+    gains = products[extras] ** 2 / lengths[:, None] / 2
+    return np.asarray(np.maximum(np.max(gains, axis=0) - 0.5 * np.log(max(rows, 2)), 0.0))
+
+
+def required_lead(right: Law, other: Law, rows: float) -> float:
+    """By how much the likelihood of the right law has to lead that of another, in its logarithm."""
+    return max(MAX_DEFICIT + right.price(rows) - other.price(rows), required_held_out_gain(right, other, rows))
+
+
+def required_held_out_gain(right: Law, other: Law, rows: float) -> float:
+    """What a special law of friction has to gain on usual friction: a share of the held-out error at its joint."""
+    if right.candidate.effect in SPECIAL_FRICTION and other.candidate.effect in USUAL_EFFECTS:
+        return 0.5 * Settings().least_gain * rows * right.share
+    return -np.inf
+
+
+def unexplained_gram(gram: Array, fitted: Index) -> Array:
+    """What fitted columns leave of the products of all columns."""
+    return np.asarray(gram - gram[:, fitted] @ solve_least_squares(gram, fitted, gram))
+
+
+SIMULATED_RUNS = 400
+
+
+@dataclass(frozen=True)
+class Chances:
+    """Shares of simulated runs. right: one name is left, the right one. wrong: one name, another. open: several."""
+
+    right: float
+    wrong: float
+    open: float
+
+
+def decision_chances(
+    prepared: PreparedQuestions, question: Question, new: Array, rows: float, rng: np.random.Generator
+) -> Chances:
+    """What becomes of a question after a run with moments `new` (columns, columns).
+
+    Each rival is right as often as it fits the first recording beside the others. rows: of both recordings, all joints.
+    """
+    weights = np.array([each.weight for each in question.rivals])
+    found = [chances_if_right(prepared, question, right, new, rows, rng) for right in range(len(weights))]
+    shares = np.array([[each.right, each.wrong, each.open] for each in found])
+    return Chances(*(weights @ shares / weights.sum()).tolist())
+
+
+def chances_if_right(
+    prepared: PreparedQuestions, question: Question, right: int, new: Array, rows: float, rng: np.random.Generator
+) -> Chances:
+    """What becomes of it where one rival is the right one, with shapes and sizes that fit the first recording."""
+    gram = prepared.together(new)
+    values = _draw_coefficients(prepared, question, right, rng)
+    noise = _matrix_root(new) @ rng.normal(size=values.shape)
+    vectors = prepared.before.vector[:, None] + new @ values + noise
+    explained = [_log_likelihoods(question, each, gram, vectors, rows) for each in range(len(question.rivals))]
+    return judge_draws(question, explained, right, rows)
+
+
+def judge_draws(question: Question, explained: list[Array], right: int, rows: float) -> Chances:
+    """How draws end under the rule of the diagnosis. explained: for each rival log likelihoods, (laws, draws)."""
+    laws = [each.laws for each in question.rivals]
+    prices = [np.array([[law.price(rows)] for law in each]) for each in laws]
+    scores = np.array([np.max(found - price, axis=0) for found, price in zip(explained, prices, strict=True)])
+    best, ordered = np.argmax(scores, axis=0), np.sort(scores, axis=0)
+    clear = ordered[-1] - ordered[-2] > MAX_DEFICIT
+    whole = np.array([np.max(found, axis=0) for found in explained])
+    for one, special in enumerate(laws):
+        for other, usual in enumerate(laws):
+            least = required_held_out_gain(special[0], usual[0], rows)
+            clear &= (best != one) | (other == one) | (whole[one] - whole[other] > least)
+    return Chances(*(float(np.mean(each)) for each in (clear & (best == right), clear & (best != right), ~clear)))
+
+
+def _draw_coefficients(prepared: PreparedQuestions, question: Question, right: int, rng: np.random.Generator) -> Array:
+    """Coefficients of all columns as the first recording leaves them where one rival is right, (columns, draws)."""
+    rival = question.rivals[right]
+    out = []
+    shares = np.array([len(sizes) for _, sizes in rival.possible_sizes], dtype=np.float64)
+    for (law, sizes), share in zip(rival.possible_sizes, shares / shares.sum(), strict=True):
+        count = max(round(SIMULATED_RUNS * share), 1)
+        drawn = np.zeros((len(prepared.layout.prior), count))
+        drawn[law.columns] = sizes[rng.integers(len(sizes), size=count)].T
+        if prepared.first is not None:
+            chosen, found = draw_coefficients(
+                prepared.known_moments, question.found, law.columns, law.candidate, count, rng
+            )
+            if found.shape[1]:
+                drawn = np.zeros((len(drawn), found.shape[1]))
+                drawn[chosen] = found
+        out.append(drawn)
+    return np.concatenate(out, axis=1)
+
+
+def _log_likelihoods(question: Question, number: int, gram: Array, vectors: Array, rows: float) -> Array:
+    """Log likelihood of each of a rival's laws, (laws, draws), less the price of a usual term that helps."""
+    out = []
+    for law in question.rivals[number].laws:
+        chosen = np.append(question.found, law.columns)
+        values = solve_least_squares(gram, chosen, vectors)
+        left = vectors - gram[:, chosen] @ values
+        more = usual_friction_gain(left, unexplained_gram(gram, chosen), question.extras, rows)
+        out.append(0.5 * np.sum(values * vectors[chosen], axis=0) + more)
+    return np.array(out)
+
+
+def _matrix_root(gram: Array) -> Array:
+    values, axes = np.linalg.eigh(gram)
+    return np.asarray(axes * np.sqrt(np.maximum(values, 0)))

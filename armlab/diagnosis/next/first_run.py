@@ -1,0 +1,135 @@
+"""The present model (links and effects found) in any motion, and what the first recording shows: its noise, and the
+moments of all columns.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armlab.diagnosis.data import (
+    CREEP_RATIO,
+    HIGH_SPEED_QUANTILE,
+    POSITION_CUTOFF_RATIO,
+    STANDSTILL_SIGMAS,
+    Observed,
+    observe,
+)
+from armlab.diagnosis.next.moments import Index, Moments
+from armlab.diagnosis.next.question import Layout
+from armlab.diagnosis.next.sampling import Sampling, Whitening, kept_columns
+from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.settings import Settings
+from armlab.effects.contract import Candidate, Scene
+from armlab.recordings.cutoff import acceleration_spectrum, noise_level
+from armlab.recordings.recording import Array, Recording, Role
+from problem.arm import Arm
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
+
+FoundEffect = tuple[Candidate, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class PresentModel:
+    """inertial: (10 * joints,) of the links. parts: effects with their coefficients."""
+
+    arm: Arm
+    inertial: Array
+    parts: tuple[FoundEffect, ...] = ()
+
+    def scene(self, motion: Motion, time: Array, run: str = "designed") -> Scene:
+        """A run as effects see it; time: (samples,), s, from the first sample."""
+        torque = rigid_body_torque(self.arm, motion, self.inertial)
+        if self.arm.rotor_inertia:
+            torque = torque + np.asarray(self.arm.rotor_inertia) * motion.acceleration
+        scene = Scene(run, time, motion, self.arm, self.inertial, torque)
+        scene = self._add_effects(scene, lambda candidate: not candidate.follows_model)
+        return self._add_effects(scene, lambda candidate: candidate.follows_model)
+
+    def _add_effects(self, scene: Scene, wanted: Callable[[Candidate], bool]) -> Scene:
+        torque = scene.torque.copy()
+        for candidate, values in self.parts:
+            if wanted(candidate):
+                torque[:, list(candidate.rows)] += candidate.columns(scene) @ values
+        return replace(scene, torque=torque)
+
+
+@dataclass(frozen=True, eq=False)
+class FirstRun:
+    """observed: the runs. scenes: one a run. torque: (rows, joints), N m, what the links do not explain."""
+
+    observed: Observed
+    scenes: tuple[Scene, ...]
+    torque: Array
+
+    @property
+    def rows(self) -> int:
+        """Kept rows of all joints from which a diagnosis learns."""
+        return sum(each.stop - each.start for each in self.observed.of_role("identify")) * self.observed.joints
+
+    @property
+    def learned_share(self) -> float:
+        """Share of one more run from which a diagnosis will learn: where no run validates, stretches of all do."""
+        return 2 / 3 if self.observed.held_out_blocks else 1.0
+
+    def columns(self, layout: Layout) -> Array:
+        """All columns at the kept rows, (rows, joints, columns)."""
+        pairs = zip(self.scenes, self.observed.signals, strict=True)
+        return np.concatenate(
+            [kept_columns(layout.base, layout.candidates, scene, signals.filter) for scene, signals in pairs]
+        )
+
+    def sampling(self, columns: Array, fitted: Index) -> Sampling:
+        """The filter and the noise that is left when the fitted columns are taken out."""
+        noise = fit_noise(self._fit_residual(columns[:, :, fitted]), self.observed, len(fitted) / self.observed.joints)
+        whitening = Whitening(noise.taps, noise.scales)
+        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, whitening, self._standing_speeds())
+
+    def _standing_speeds(self) -> tuple[float, ...]:
+        """Speed of each joint (joints,) below which a diagnosis takes it as standing still, rad/s (m/s)."""
+        speed = np.quantile(np.abs(self.observed.motion.velocity), HIGH_SPEED_QUANTILE, axis=0)
+        highest = POSITION_CUTOFF_RATIO * self.observed.cutoff_hz
+        noise = []
+        for signals in self.observed.signals:
+            run = signals.run
+            frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
+            density = noise_level(frequency, spectrum, shape, run.rate_hz)
+            noise.append(2 * np.pi * np.sqrt(density * highest**3 / 3))
+        slow: list[float] = np.maximum(STANDSTILL_SIGMAS * np.max(noise, axis=0), CREEP_RATIO * speed).tolist()
+        return tuple(slow)
+
+    def moments(self, columns: Array, noise: Whitening, role: Role) -> Moments:
+        """Of the rows of a role in which a joint moves."""
+        size = columns.shape[2]
+        whole = np.concatenate([columns, self.torque[:, :, None]], axis=2)
+        gram = np.zeros((size + 1, size + 1))
+        for joint in range(self.observed.joints):
+            for part in self.observed.of_role(role, joint):
+                rows = noise(whole[part.start : part.stop, joint], joint)
+                gram += rows.T @ rows
+        return Moments(gram[:size, :size], gram[:size, size])
+
+    def _fit_residual(self, columns: Array) -> Array:
+        flat, torque = columns.reshape(-1, columns.shape[2]), self.torque.reshape(-1)
+        lengths = np.linalg.norm(flat, axis=0)
+        scaled = flat / np.where(lengths > 0, lengths, 1.0)
+        values = np.linalg.lstsq(scaled, torque, rcond=1e-9)[0]
+        return np.asarray((torque - scaled @ values).reshape(self.torque.shape))
+
+
+def observe_first_run(recording: Recording, present: PresentModel) -> FirstRun:
+    """Filters and thins the runs as a diagnosis does."""
+    observed = observe(recording.runs, present.arm, present.inertial, Settings())
+    scenes, torques = [], []
+    for signals in observed.signals:
+        time = signals.run.time - signals.run.time[0]
+        scenes.append(present.scene(signals.motion, time, signals.run.name))
+        torques.append(signals.torque - signals.filter(_link_torque(present, scenes[-1])))
+    return FirstRun(observed, tuple(scenes), np.concatenate(torques))
+
+
+def _link_torque(present: PresentModel, scene: Scene) -> Array:
+    torque = rigid_body_torque(present.arm, scene.motion, present.inertial)
+    rotors = np.asarray(present.arm.rotor_inertia) if present.arm.rotor_inertia else np.zeros(len(present.arm))
+    return np.asarray(torque + rotors * scene.motion.acceleration)

@@ -1,0 +1,94 @@
+"""Sufficient statistics of a fit: Gram matrices of whitened columns that add from run to run, least squares from
+them, and draws from the posterior of the coefficients.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.effects.contract import Candidate
+from armlab.effects.plausible import prior_scale, reason_implausible
+from armlab.recordings.recording import Array
+
+RELATIVE_RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
+ROUNDING_SHARE = 1e-6  # of a squared length: what less of it is left is not seen
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """gram: (columns, columns), of whitened rows. vector: (columns,), with the whitened torque."""
+
+    gram: Array
+    vector: Array
+
+    def __add__(self, other: "Moments") -> "Moments":
+        """Both, with one set of coefficients."""
+        return Moments(self.gram + other.gram, self.vector + other.vector)
+
+
+def empty_moments(columns: int) -> Moments:
+    """Nothing recorded."""
+    return Moments(np.zeros((columns, columns)), np.zeros(columns))
+
+
+def solve_least_squares(gram: Array, chosen: Index, right: Array) -> Array:
+    """Coefficients of the chosen columns for right-hand sides (columns, ...): least squares, slightly damped.
+
+    What a motion never shows, torque below zero say, has none: its column is zero.
+    """
+    part = gram[np.ix_(chosen, chosen)]
+    lengths = np.sqrt(np.where(np.diag(part) > 0, np.diag(part), np.inf))
+    scaled = part / np.outer(lengths, lengths) + RELATIVE_RIDGE * np.eye(len(chosen))
+    turned = right[chosen] / (lengths if right.ndim == 1 else lengths[:, None])
+    values = np.linalg.solve(scaled, turned)
+    return np.asarray(values / (lengths if right.ndim == 1 else lengths[:, None]))
+
+
+def unexplained_power(gram: Array, own: Index, values: Array, fitted: Index) -> float:
+    """Squared length of own columns times values that the fitted columns cannot explain, in standard errors squared."""
+    if not len(fitted):
+        return float(values @ gram[np.ix_(own, own)] @ values)
+    signal = gram[:, own] @ values
+    best = solve_least_squares(gram, fitted, signal)
+    return max(float(values @ signal[own] - best @ signal[fitted]), 0.0)
+
+
+def count_independent(gram: Array, own: Index, fitted: Index) -> int:
+    """How many of the own columns add something that the fitted ones do not hold."""
+    lengths = np.sqrt(np.maximum(np.diag(gram)[own], 1e-300))
+    part = gram[np.ix_(own, own)]
+    if len(fitted):
+        part = part - gram[np.ix_(own, fitted)] @ solve_least_squares(gram, fitted, gram[:, own])
+    return int(np.sum(np.linalg.eigvalsh(part / np.outer(lengths, lengths)) > ROUNDING_SHARE))
+
+
+MIN_RELATIVE_EIGENVALUE = 1e-6  # of the largest eigenvalue: directions that are known less well are left as they are
+DRAWS_PER_SAMPLE = 20  # draws for each one that is wanted
+
+
+def draw_coefficients(
+    seen: Moments, free: Index, own: Index, candidate: Candidate, count: int, rng: np.random.Generator
+) -> tuple[Index, Array]:
+    """Places of the free columns and a law's own, and draws of their coefficients, (places, at most count).
+
+    seen: of the recording, with what is known beforehand. No draws where physics refuses nearly all of them.
+    """
+    chosen = np.append(free, own)
+    gram = seen.gram.copy()
+    gram[own, own] += 1 / prior_scale(candidate, None) ** 2
+    mean = solve_least_squares(gram, chosen, seen.vector)
+    part = gram[np.ix_(chosen, chosen)]
+    lengths = np.sqrt(np.maximum(np.diag(part), 1e-300))
+    values, axes = np.linalg.eigh(part / np.outer(lengths, lengths))
+    spread = np.where(values > MIN_RELATIVE_EIGENVALUE * values[-1], 1 / np.sqrt(np.maximum(values, 1e-300)), 0.0)
+    drawn = (
+        mean[:, None] + (axes * spread) @ rng.normal(size=(len(chosen), DRAWS_PER_SAMPLE * count)) / lengths[:, None]
+    )
+    allowed = [each for each in drawn.T if _is_possible(candidate, each[len(free) :])][:count]
+    return chosen, np.array(allowed).T if allowed else np.empty((len(chosen), 0))
+
+
+def _is_possible(candidate: Candidate, values: Array) -> bool:
+    return candidate.objection(values) is None and reason_implausible(candidate, values) is None

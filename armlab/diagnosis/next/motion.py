@@ -1,0 +1,216 @@
+"""The motions of a design: limits in force, Fourier series within these limits, and the search with any registered
+algorithm.
+"""
+
+import zlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from algorithms.contract import Box, uniform_points
+from algorithms.driver import minimise
+from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
+from armlab.common.errors import InputError
+from armlab.recordings.differentiate import differentiate
+from armlab.recordings.recording import Recording, Run
+from problem.arm import Arm, Limits
+from problem.base_parameters import base_parameters
+from problem.contract import Problem
+from problem.excitation import ExcitationProblem, FeasibilityRules
+from problem.fitness import Criterion
+from problem.limits import Constraints, peaks
+from problem.motion import Motion
+from problem.trajectories import Excitation, JointFourier, sample_instants
+from problem.transforms import Array
+
+USED_LIMIT_SHARE = 0.995  # of each limit is used: peaks may lie between the instants at which they are looked for
+CENTRE_RANGE_SHARE = 0.97  # of the range: where q0 may be, so that there is room for a swing
+PEAK_INSTANTS = 801  # instants
+
+
+@dataclass(frozen=True, eq=False)
+class WithinLimits:
+    """A series whose swing about q0 shrinks, joint by joint, until position, speed and acceleration are allowed.
+
+    A point whose swing is small stays small: slow motions are worth finding, too.
+    """
+
+    series: JointFourier
+    limits: tuple[Limits, ...]
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, (dimension,)."""
+        return self.series.lower
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, (dimension,)."""
+        return self.series.upper
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the series' numbers."""
+        return self.series.names
+
+    def motions(self, points: Array, times: Array) -> Excitation:
+        """Motions (points, samples, joints) of points (points, dimension) at `times` (samples,), s."""
+        rest = self._centres(points)[:, None]
+        scale = self._scale(points, rest)
+        found = self.series.motions(points, times).motion
+        moved = Motion(rest + scale * (found.position - rest), scale * found.velocity, scale * found.acceleration)
+        return Excitation(moved, np.zeros(len(points)))
+
+    def _centres(self, points: Array) -> Array:
+        """q0 of each joint, (points, joints), inside the limits."""
+        low, high = self._range
+        every = points.reshape(len(points), len(self.limits), -1)[:, :, -1]
+        room = (1 - CENTRE_RANGE_SHARE) * (high - low) / 2
+        return np.asarray(np.clip(every, low + room, high - room))
+
+    @property
+    def _range(self) -> tuple[Array, Array]:
+        """Lowest and highest position that are used, (joints,) each."""
+        low, high = (np.array(side) for side in zip(*(each.position for each in self.limits), strict=True))
+        spared = (1 - USED_LIMIT_SHARE) * (high - low) / 2
+        return low + spared, high - spared
+
+    def _scale(self, points: Array, rest: Array) -> Array:
+        """Share of the swing that the limits allow, (points, 1, joints)."""
+        motion = self.series.motions(points, self._instants).motion
+        swing = motion.position - points.reshape(len(points), len(self.limits), -1)[:, None, :, -1]
+        shares = [np.ones(rest.shape)]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for each, room in self._used_and_allowed(swing, motion, rest):
+                shares.append(np.where(each > 0, room / each, np.inf))
+        return np.asarray(np.min(shares, axis=0))
+
+    def _used_and_allowed(self, swing: Array, motion: Motion, rest: Array) -> list[tuple[Array, Array]]:
+        """What is used of each limit at a swing of one, and what there is of it: (points, 1, joints)."""
+        low, high = self._range
+        speed, acceleration = (
+            USED_LIMIT_SHARE * np.array([getattr(each, name) for each in self.limits])
+            for name in ("velocity", "acceleration")
+        )
+        return [
+            (swing.max(axis=1, keepdims=True), high - rest),
+            (-swing.min(axis=1, keepdims=True), rest - low),
+            (np.abs(motion.velocity).max(axis=1, keepdims=True), np.broadcast_to(speed, rest.shape)),
+            (np.abs(motion.acceleration).max(axis=1, keepdims=True), np.broadcast_to(acceleration, rest.shape)),
+        ]
+
+    @cached_property
+    def _instants(self) -> Array:
+        return sample_instants(self.series.duration, PEAK_INSTANTS)
+
+
+def fourier_within_limits(limits: tuple[Limits, ...], duration: float, harmonics: int) -> WithinLimits:
+    """The series of an arm with these limits, from rest to rest; ValueError where a speed or a range is not limited."""
+    low, high = (np.array(side) for side in zip(*(each.position for each in limits), strict=True))
+    speed = np.array([each.velocity for each in limits])
+    if not np.all(np.isfinite([low, high, speed])):
+        raise ValueError("a motion can only be designed for joints with limits of position and speed")
+    coefficients = speed / np.sqrt(harmonics)
+    return WithinLimits(
+        JointFourier(duration, harmonics, (low + high) / 2, (high - low) / 2, coefficients, True), limits
+    )
+
+
+POPULATION_SIZE = 25
+LIMIT_CHECK_HZ = 100.0  # instants at which limits of torque are checked
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How long the motion is and how it is searched for."""
+
+    duration: float = 10.0
+    harmonics: int = 8
+    algorithm: str = "l-shade"
+    evaluations: int = 1000
+    seed: int = 0
+
+
+def limits_in_force(arm: Arm, recording: Recording | None) -> tuple[Limits, ...]:
+    """Limits of each joint; what the robot file leaves open is what the recording has shown the joint can do.
+
+    Raises InputError where neither tells a range, a speed and an acceleration.
+    """
+    shown = None if recording is None else _limits_shown(recording)
+    out = []
+    for number, joint in enumerate(arm.joints):
+        known = joint.limits
+        seen = Limits() if shown is None else shown[number]
+        low, high = known.position if np.all(np.isfinite(known.position)) else seen.position
+        speed = known.velocity if np.isfinite(known.velocity) else seen.velocity
+        acceleration = known.acceleration if np.isfinite(known.acceleration) else seen.acceleration
+        if not np.all(np.isfinite([low, high, speed, acceleration])):
+            raise InputError(
+                f"{arm.name}, {joint.name}: give position_limits, velocity_limit and acceleration_limit in the robot "
+                "file, or --recording, whose motion shows what the joint can do"
+            )
+        out.append(Limits((low, high), speed, acceleration, known.torque))
+    return tuple(out)
+
+
+def build_excitation_problem(arm: Arm, limits: tuple[Limits, ...], budget: Budget) -> ExcitationProblem:
+    """The problem of the smallest condition number for the same motions and limits."""
+    if any(np.isfinite(limit.torque) for limit in limits) and arm.links is None:
+        limits = tuple(replace(limit, torque=np.inf) for limit in limits)
+    trajectory = fourier_within_limits(limits, budget.duration, budget.harmonics)
+    samples = round(budget.duration * LIMIT_CHECK_HZ) + 1
+    constraints, rules = Constraints(arm, limits), FeasibilityRules()
+    return ExcitationProblem(
+        "condition", arm, base_parameters(arm), trajectory, budget.duration, samples, constraints, Criterion(), rules
+    )
+
+
+def search_motion(problem: Problem, budget: Budget) -> Array:
+    """The best point (dimension,) that the algorithm finds; InputError where none keeps the limits."""
+    try:
+        algorithm = load(budget.algorithm)
+    except (UnknownAlgorithmError, BrokenAlgorithmError) as error:
+        raise InputError(f"--algorithm: {error}") from None
+    box = Box(problem.lower, problem.upper)
+    rng = random_generator(problem.name, budget)
+    population = uniform_points(POPULATION_SIZE, box, rng)
+
+    def objective(points: Array) -> Array:
+        return problem.evaluate(points).fitness
+
+    with np.errstate(over="ignore"):
+        found = minimise(algorithm, algorithm.Params(), objective, box, population, budget.evaluations, rng)
+    if problem.evaluate(found.best_x[None]).violation[0] > 0:
+        raise InputError(f"{problem.name}: {budget.evaluations} evaluations found no motion within all limits")
+    return found.best_x
+
+
+def random_point(problem: Problem, budget: Budget, tries: int = 200) -> Array:
+    """A random point (dimension,) whose motion keeps the limits."""
+    rng = random_generator("random motion", budget)
+    for _ in range(tries):
+        point = uniform_points(1, Box(problem.lower, problem.upper), rng)
+        if problem.evaluate(point).violation[0] == 0:
+            return np.asarray(point[0])
+    raise InputError(f"{tries} random motions all break a limit")
+
+
+def random_generator(purpose: str, budget: Budget) -> np.random.Generator:
+    """The stream of random numbers for one purpose."""
+    return np.random.default_rng([budget.seed, zlib.crc32(purpose.encode())])
+
+
+def _limits_shown(recording: Recording) -> list[Limits]:
+    """What each joint did in a recording."""
+    found = np.stack([_motion_peaks(run) for run in recording.runs])
+    low, high = found[..., 0].min(axis=0), found[..., 1].max(axis=0)
+    rows = np.column_stack([low, high, found[..., 2].max(axis=0), found[..., 3].max(axis=0)]).tolist()
+    return [Limits((row[0], row[1]), row[2], row[3]) for row in rows]
+
+
+def _motion_peaks(run: Run) -> Array:
+    """Lowest and highest position, largest speed and acceleration, (joints, 4)."""
+    motion = differentiate(run).motion
+    alone = Motion(motion.position[None], motion.velocity[None], motion.acceleration[None])
+    return np.asarray(peaks(alone)[0])

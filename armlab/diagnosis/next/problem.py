@@ -1,0 +1,158 @@
+"""The search for a discriminating motion as a problem of the benchmark, and the preset `tell-apart` that names it in
+a configuration.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from annotated_types import Ge, Gt
+from pydantic import Field
+
+from armlab.common.errors import InputError
+from armlab.common.settings import Settings
+from armlab.diagnosis.next.decision import decision_strength
+from armlab.diagnosis.next.moments import Moments
+from armlab.diagnosis.next.motion import Budget, build_excitation_problem
+from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
+from armlab.diagnosis.next.question import Name
+from armlab.diagnosis.next.verdict_file import Finding, VerdictFile
+from armlab.recordings.vocabulary import EFFECT_IDS
+from problem.arm import Arm
+from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
+from problem.motion import Motion
+from problem.presets import LimitSettings, PerJoint, Positive, per_joint_values
+from problem.robot_file import load_arm
+from problem.transforms import Array
+
+MIN_STRENGTH = 1e-6  # standard errors: less is none
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TellApartProblem(ExcitationProblem):
+    """Find the motion that decides best between rivals, together with what was recorded before.
+
+    A point's value is one over its strength, in standard errors.
+    """
+
+    prepared: PreparedQuestions
+
+    @property
+    def spectral(self) -> bool:
+        """Its value is no condition number."""
+        return False
+
+    def strength(self, point: Array) -> float:
+        """How well the motion of a point (dimension,) decides, standard errors."""
+        motion = self.trajectory.motions(point[None], self.times).motion
+        return self._strength(motion.select(np.intp(0)))
+
+    @property
+    def rows(self) -> float:
+        """Rows of both recordings from which a diagnosis learns, all joints."""
+        return self.prepared.rows_with(self.samples)
+
+    def moments(self, point: Array) -> Moments:
+        """What the motion of a point (dimension,) would say."""
+        motion = self.trajectory.motions(point[None], self.times).motion.select(np.intp(0))
+        return self.prepared.moments(self.prepared.present.scene(motion, self.times))
+
+    def _judge(self, motion: Motion) -> tuple[Array, Array]:
+        """Value of motions (points, samples, joints), (points,), twice: it is also what is minimised."""
+        found = np.array([self._strength(motion.select(np.intp(number))) for number in range(len(motion.position))])
+        value = 1 / np.maximum(found, MIN_STRENGTH)
+        return value, value
+
+    def _strength(self, motion: Motion) -> float:
+        found = self.prepared.moments(self.prepared.present.scene(motion, self.times))
+        return decision_strength(self.prepared.questions, self.prepared.together(found.gram), self.rows)
+
+
+def tell_apart_problem(
+    prepared: PreparedQuestions, excitation: ExcitationProblem, name: str = "tell-apart"
+) -> TellApartProblem:
+    """The problem for the trajectories and limits of another one; ValueError where no motion separates anything."""
+    if not any(question.pairs for question in prepared.questions):
+        raise ValueError("no motion separates these rivals")
+    samples = len(prepared.sampling.times(excitation.duration))
+    return TellApartProblem(
+        name=name,
+        arm=excitation.arm,
+        base=excitation.base,
+        trajectory=excitation.trajectory,
+        duration=(samples - 1) / prepared.sampling.rate_hz,
+        samples=samples,
+        constraints=excitation.constraints,
+        criterion=excitation.criterion,
+        penalty=excitation.penalty,
+        prepared=prepared,
+    )
+
+
+class RivalSettings(Settings):
+    """A name that may be right; joint from 1, left out for an effect of the whole robot.
+
+    parameters: [name, value] of the vocabulary, SI units; of the first rival, which the others imitate.
+    """
+
+    effect: Literal[EFFECT_IDS]  # type: ignore[valid-type]
+    joint: Annotated[int, Ge(1)] | None = None
+    parameters: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
+
+
+class MotionLimitSettings(LimitSettings):
+    """Limits of a moderate motion: 2 rad/s and 10 rad/s2; null leaves the robot file's."""
+
+    velocity: PerJoint | None = 2.0
+    acceleration: PerJoint | None = 10.0
+
+
+DEFAULT_RIVALS = (
+    RivalSettings(effect="viscous_friction", joint=2, parameters=(("coefficient", 0.3),)),
+    RivalSettings(effect="time_delay"),
+)
+
+
+class TellApartSettings(Settings):
+    """Find the motion, from rest to rest within all limits, on which rivals differ most.
+
+    arm: a built-in name or a file. noise: N m, of the torque below cutoff_hz. links: how well they are known: exactly,
+    nearly (8 % off), or not at all. frame_seed: search in randomly shifted coordinates.
+    """
+
+    preset: Literal["tell-apart"] = "tell-apart"
+    arm: str = "irb120-arm"
+    joints: Annotated[int, Ge(1)] | None = None
+    rivals: Annotated[tuple[RivalSettings, ...], Field(min_length=2)] = DEFAULT_RIVALS
+    duration: Positive = 10.0
+    harmonics: Annotated[int, Ge(2)] = 8
+    noise: PerJoint = 0.05
+    cutoff_hz: Annotated[float, Gt(0)] = 20.0
+    links: LinkKnowledge = "near"
+    limits: MotionLimitSettings = MotionLimitSettings()
+    frame_seed: Annotated[int, Ge(0)] | None = None
+
+    def build(self) -> TellApartProblem | ShiftedProblem:
+        """The problem. Raises InputError where the settings do not fit the arm or no motion separates the rivals."""
+        whole = load_arm(self.arm)
+        arm = whole.first(min(self.joints or len(whole), len(whole)))
+        verdict = self._verdict(arm)
+        budget = Budget(duration=self.duration, harmonics=self.harmonics)
+        try:
+            plain = build_excitation_problem(arm, self.limits.of(arm), budget)
+            groups = (tuple(Name(each.effect, each.joint) for each in self.rivals),)
+            prepared = prepare_questions(verdict, groups, arm, plain.trajectory, self.duration, None, self.links)
+            problem = tell_apart_problem(prepared, plain)
+        except ValueError as error:
+            raise InputError(f"tell-apart: {error}") from None
+        return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
+
+    def _verdict(self, arm: Arm) -> VerdictFile:
+        """What a diagnosis would have said."""
+        first, *others = (Name(each.effect, each.joint) for each in self.rivals)
+        parameters: dict[str, Any] = dict(self.rivals[0].parameters)
+        finding = Finding(first, () if first.joint is None else (first.joint,), parameters, tuple(others))
+        noise = np.array(per_joint_values("noise", self.noise, arm))
+        model = {"provenance": {"cutoff_hz": self.cutoff_hz}}
+        return VerdictFile(Path("tell-apart"), (finding,), noise, model)

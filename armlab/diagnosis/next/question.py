@@ -1,0 +1,195 @@
+"""The question of a design: rival laws, the columns that each adds, the columns that are free beside them, and which
+rivals no motion separates.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armlab.diagnosis.next.moments import ROUNDING_SHARE, Index, Moments, unexplained_power
+from armlab.diagnosis.next.sampling import Sampling, kept_columns
+from armlab.effects.contract import Candidate, Scene
+from armlab.recordings.filters import Filter
+from armlab.recordings.recording import Array
+from problem.base_parameters import BaseParameters
+
+LINK_PARAMETER_ERROR = "inertial_parameter_error"  # is in the links of a model, not beside them
+
+
+@dataclass(frozen=True)
+class Name:
+    """An effect and its joint or link, from 1; None for the whole robot."""
+
+    effect: str
+    joint: int | None
+
+    def __str__(self) -> str:
+        """`viscous friction at joint 2`."""
+        return self.effect.replace("_", " ") + ("" if self.joint is None else f" at joint {self.joint}")
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A rival in one shape. columns: its places among all columns. freedom: how many parameters it adds to what is free
+    anyway. looks: among how many alternatives it was picked. share: of all joints, those whose torque it changes.
+    """
+
+    candidate: Candidate
+    columns: Index
+    freedom: int
+    looks: int
+    share: float
+
+    def price(self, rows: float) -> float:
+        """Its price in units of log likelihood, as the search of a diagnosis counts it; nothing new costs nothing.
+
+        rows: of all joints.
+        """
+        if not self.freedom:
+            return 0.0
+        return float(0.5 * self.freedom * np.log(max(rows * self.share, 2)) + np.log(self.looks))
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A name that may be right, and the law that it then is: laws[0] with these values. The others are its shapes.
+
+    weight: how well it fits what was recorded, beside the others. sizes: for each law the coefficients that it may have
+    after what was recorded, (draws, columns); none where nothing was.
+    """
+
+    name: Name
+    laws: tuple[Law, ...]
+    values: Array
+    weight: float = 1.0
+    sizes: tuple[Array, ...] = ()
+
+    @property
+    def possible_sizes(self) -> list[tuple[Law, Array]]:
+        """Laws and coefficients (draws, columns) that it may have."""
+        found = [(law, sizes) for law, sizes in zip(self.laws, self.sizes, strict=False) if len(sizes)]
+        return found or [(self.laws[0], self.values[None])]
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """Rivals of which one is right. free: columns that may be fitted beside any of them; found: those that surely are.
+
+    The rest of what is free, usual friction that no diagnosis has found yet, costs a price.
+    blind: (rivals, rivals), true where no motion shows, were the first right, that it is not the second.
+    """
+
+    rivals: tuple[Rival, ...]
+    free: Index
+    found: Index
+    inseparable: Array
+
+    def with_columns(self, kept: Index) -> "Question":
+        """The same where only the `kept` columns, ascending, are left."""
+        rivals = tuple(
+            replace(each, laws=tuple(replace(law, columns=np.searchsorted(kept, law.columns)) for law in each.laws))
+            for each in self.rivals
+        )
+        return Question(rivals, np.searchsorted(kept, self.free), np.searchsorted(kept, self.found), self.inseparable)
+
+    @property
+    def extras(self) -> Index:
+        """Columns that may be fitted at a price."""
+        return np.setdiff1d(self.free, self.found)
+
+    @property
+    def pairs(self) -> list[tuple[int, int]]:
+        """Pairs that some motion separates."""
+        every = [(one, other) for other in range(len(self.rivals)) for one in range(other)]
+        return [
+            (one, other) for one, other in every if not (self.inseparable[one, other] and self.inseparable[other, one])
+        ]
+
+    @property
+    def hopeless(self) -> list[tuple[int, int]]:
+        """Pairs that no motion separates."""
+        every = [(one, other) for other in range(len(self.rivals)) for one in range(other)]
+        return [pair for pair in every if pair not in self.pairs]
+
+    def noncentrality(self, gram: Array, one: int, other: int) -> float:
+        """What the best of the other's laws cannot explain where one is right, in standard errors squared."""
+        right = self.rivals[one]
+        return min(
+            unexplained_power(gram, right.laws[0].columns, right.values, np.append(self.free, law.columns))
+            for law in self.rivals[other].laws
+        )
+
+    def separation(self, gram: Array, one: int, other: int) -> float:
+        """Standard errors between two rivals, whichever is right.
+
+        Where one law contains the other, it explains whatever the other explains; then the simpler name is told
+        unless the larger one is needed, and only that direction can be measured.
+        """
+        ways = [(one, other), (other, one)]
+        seen = [self.noncentrality(gram, *way) for way in ways if not self.inseparable[way]]
+        return float(np.sqrt(min(seen))) if seen else 0.0
+
+    def separations(self, gram: Array) -> list[float]:
+        """Separations of all pairs that a motion can separate."""
+        return [self.separation(gram, *pair) for pair in self.pairs]
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """All columns that matter: base parameters, then candidates. prior: precision that is known beforehand."""
+
+    base: BaseParameters
+    candidates: tuple[Candidate, ...]
+    places: tuple[Index, ...]
+    prior: Array
+
+    @property
+    def size(self) -> int:
+        """Number of columns."""
+        return len(self.prior)
+
+    def of(self, candidate: Candidate) -> Index:
+        """Places of a candidate's columns."""
+        return self.places[self.candidates.index(candidate)]
+
+    def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> Moments:
+        """What a motion without any torque recorded yet would say."""
+        columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
+        rows = sampling.whitened(columns, scene.motion.velocity)
+        return Moments(rows.T @ rows, np.zeros(self.size))
+
+
+def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene, prior: Array) -> Layout:
+    """Places of all candidates, each once. prior: (base, base), precision of the base parameters."""
+    unique = list(dict.fromkeys(candidates))
+    places, at = [], len(base)
+    for candidate in unique:
+        count = candidate.columns(scene).shape[2]
+        places.append(np.arange(at, at + count))
+        at += count
+    whole = np.zeros((at, at))
+    whole[: len(base), : len(base)] = prior
+    return Layout(base, tuple(unique), tuple(places), whole)
+
+
+def is_in_free_links(name: Name, free: Index) -> bool:
+    """Whether a name is part of what is free anyway: a link that is off, where the links are not known exactly."""
+    return name.effect == LINK_PARAMETER_ERROR and 0 in free
+
+
+def inseparable_rivals(rivals: tuple[Rival, ...], free: Index, gram: Array) -> Array:
+    """Which rivals a rich motion's moments cannot tell from which, (rivals, rivals).
+
+    Links that may be off anyway explain nothing that speaks against another name.
+    """
+    count = len(rivals)
+    out = np.zeros((count, count), dtype=bool)
+    question = Question(rivals, free, free, out)
+    for one, right in enumerate(rivals):
+        own = right.laws[0].columns
+        whole = float(right.values @ gram[np.ix_(own, own)] @ right.values)
+        for other in range(count):
+            if one != other:
+                left = question.noncentrality(gram, one, other)
+                out[one, other] = is_in_free_links(right.name, free) or left <= ROUNDING_SHARE * max(whole, 1e-300)
+    return out

@@ -1,0 +1,140 @@
+"""What else would separate rivals that no motion separates, or hardly: a known load, a tilted base, a data sheet, a
+second encoder.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from armlab.diagnosis.next.first_run import PresentModel
+from armlab.diagnosis.next.moments import Index
+from armlab.diagnosis.next.prepare import PreparedQuestions
+from armlab.diagnosis.next.question import Layout, Question, Rival, build_layout, inseparable_rivals
+from armlab.recordings.recording import Array
+from problem.arm import Arm
+from problem.base_parameters import base_parameters
+from problem.motion import Motion
+from problem.transforms import rotation_x
+
+LOAD_KG = 1.0
+LOAD_POSITION = (0.0, 0.0, 0.05)  # m, in the last link's frame
+TILT_DEG = 10.0
+DECISIVE_SEPARATION = 4.0  # standard errors that decide
+ENCODER_NOISE = 2e-5  # rad (m): noise of a second encoder
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """What would help. separation: in standard errors, infinite where nothing is left to doubt."""
+
+    what: str
+    separation: float
+
+
+def find_remedies(
+    prepared: PreparedQuestions, question: Question, pair: tuple[int, int], motion: Motion, times: Array
+) -> list[Remedy]:
+    """Remedies for a pair that help, the best first; each beside a run of this motion."""
+    rivals = tuple(question.rivals[number] for number in pair)
+    every = [
+        *_remedy_by_load(prepared, question, rivals, motion, times),
+        *_remedy_by_tilt(prepared, question, rivals, motion, times),
+        *_remedy_by_removal(prepared, question, rivals, motion, times),
+        *_remedy_by_data_sheet(rivals),
+        *_remedy_by_encoder(prepared, rivals, motion, times),
+    ]
+    return sorted((each for each in every if each.separation > 1), key=lambda each: -each.separation)
+
+
+def _remedy_by_load(
+    prepared: PreparedQuestions, question: Question, rivals: tuple[Rival, ...], motion: Motion, times: Array
+) -> Iterator[Remedy]:
+    """The same motion with and without a load that is known."""
+    x, y, z = LOAD_POSITION
+    moments = [1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
+    body = np.zeros(len(prepared.present.inertial))
+    body[-10:] = LOAD_KG * np.array(moments)
+    loaded = replace(prepared.present, inertial=prepared.present.inertial + body)
+    grams = [prepared.moments(each.scene(motion, times)).gram for each in (prepared.present, loaded)]
+    found = _pair_separation(rivals, question.free, prepared.layout.prior + grams[0] + grams[1])
+    yield Remedy(f"the motion with and without a known load of {LOAD_KG:g} kg at the flange", found)
+
+
+def _remedy_by_tilt(
+    prepared: PreparedQuestions, question: Question, rivals: tuple[Rival, ...], motion: Motion, times: Array
+) -> Iterator[Remedy]:
+    """The same motion on the level and on a base that is tilted by a known angle."""
+    arm = _tilt_base(prepared.present.arm)
+    base, layout = base_parameters(arm), prepared.layout
+    prior = np.zeros((len(base), len(base)))
+    present = prepared.present
+    other = build_layout(base, list(layout.candidates), present.scene(motion, times), prior)
+    free = [each for each, at in zip(layout.candidates, layout.places, strict=True) if at[0] in question.free]
+    index = np.concatenate([np.arange(len(base)), *(other.of(each) for each in free)]).astype(np.intp)
+    keep, sampling = prepared.sampling.filter(len(times)), prepared.sampling
+    tilted = PresentModel(arm, present.inertial, present.parts)
+    grams = [other.moments(each.scene(motion, times), keep, sampling).gram for each in (present, tilted)]
+    found = _pair_separation(tuple(_rival_in_layout(each, other) for each in rivals), index, grams[0] + grams[1])
+    yield Remedy(f"the motion on the level and with the base tilted by {TILT_DEG:g} degrees", found)
+
+
+def _tilt_base(arm: Arm) -> Arm:
+    x, y, z = (rotation_x(np.deg2rad(TILT_DEG))[:3, :3].T @ np.array(arm.gravity)).tolist()
+    return replace(arm, gravity=(x, y, z))
+
+
+def _rival_in_layout(rival: Rival, layout: Layout) -> Rival:
+    return replace(rival, laws=tuple(replace(law, columns=layout.of(law.candidate)) for law in rival.laws))
+
+
+def _pair_separation(rivals: tuple[Rival, ...], free: Index, gram: Array) -> float:
+    question = Question(rivals, free, free, inseparable_rivals(rivals, free, gram))
+    return question.separation(gram, 0, 1)
+
+
+def _remedy_by_removal(
+    prepared: PreparedQuestions, question: Question, rivals: tuple[Rival, ...], motion: Motion, times: Array
+) -> Iterator[Remedy]:
+    """The same motion with and without what a link carries: a load is gone then, a wrong link is still wrong."""
+    for rival in rivals:
+        if rival.name.effect == "payload":
+            with_it = prepared.moments(prepared.present.scene(motion, times)).gram
+            without = with_it.copy()
+            for law in rival.laws:
+                without[law.columns] = 0
+                without[:, law.columns] = 0
+            found = _pair_separation(rivals, question.free, prepared.layout.prior + with_it + without)
+            yield Remedy(f"the motion with and without the load on link {rival.name.joint}", found)
+
+
+def _remedy_by_data_sheet(rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
+    """A value that the maker states."""
+    for rival in rivals:
+        if rival.name.effect == "rotor_inertia":
+            size = abs(float(rival.values[0]))
+            told = (
+                f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to "
+                f"{size / DECISIVE_SEPARATION:.3g} kg m2"
+            )
+            yield Remedy(told, DECISIVE_SEPARATION)
+
+
+def _remedy_by_encoder(
+    prepared: PreparedQuestions, rivals: tuple[Rival, ...], motion: Motion, times: Array
+) -> Iterator[Remedy]:
+    """An encoder behind the gear sees what the drive train gives."""
+    for rival in rivals:
+        named = rival.laws[0].candidate.parameters(rival.values)
+        joint = (rival.name.joint or 1) - 1
+        torque = prepared.present.scene(motion, times).torque[:, joint]
+        given: Array | None = None
+        if rival.name.effect == "joint_elasticity" and float(np.asarray(named["stiffness"])) > 0:
+            given = torque / float(np.asarray(named["stiffness"]))
+        elif rival.name.effect == "backlash":
+            given = np.sign(torque) * abs(float(np.asarray(named["gap"]))) / 2
+        if given is not None:
+            seen = float(np.sqrt(np.sum((given - given.mean()) ** 2))) / ENCODER_NOISE
+            yield Remedy(
+                f"a second encoder behind the gear of joint {joint + 1} with {ENCODER_NOISE:g} rad of noise", seen
+            )

@@ -1,0 +1,132 @@
+"""How a run is sampled for a design: rate, shared filter of torque and columns, whitening of the noise, and weights
+of the kept rows.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+from scipy.signal import lfilter
+
+from armlab.diagnosis.data import STANDSTILL_MARGIN, Segment, rows_in, split_segment
+from armlab.effects.contract import Candidate, Scene
+from armlab.recordings.filters import Butterworth, Filter
+from armlab.recordings.recording import Array
+from problem.base_parameters import BaseParameters
+from problem.regressor import observation_matrix
+
+IMPULSE_ROWS = 2000  # rows after which noise has forgotten
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Per joint the prediction-error filter (order + 1,), first tap one, and the innovations' standard deviation."""
+
+    taps: tuple[Array, ...]
+    scales: tuple[float, ...]
+
+    def __call__(self, rows: Array, joint: int) -> Array:
+        """Consecutive rows (rows, columns) of a joint at unit variance; the first ones, without a past, are lost."""
+        taps = self.taps[joint]
+        return np.asarray(lfilter(taps, [1.0], rows, axis=0)[len(taps) - 1 :] / self.scales[joint])
+
+    @property
+    def level(self) -> Array:
+        """Standard deviation of a row's noise at each joint, (joints,), N m."""
+        impulse = np.zeros(IMPULSE_ROWS)
+        impulse[0] = 1.0
+        pairs = zip(self.taps, self.scales, strict=True)
+        return np.array([scale * np.sqrt(np.sum(lfilter([1.0], taps, impulse) ** 2)) for taps, scale in pairs])
+
+
+SHORT_STRETCH_WORTH = (
+    0.5  # of what a row is worth is left in a stretch between standstills that is too short for a diagnosis
+)
+SAMPLES_PER_ROW = 2  # samples of a designed motion for each kept row
+ROWS_PER_CUTOFF = 3.0  # as a diagnosis keeps them
+INDEPENDENT_PER_HERTZ = 2.0  # numbers a second that a low-pass leaves independent, for each hertz of its cut-off
+
+
+@dataclass(frozen=True, eq=False)
+class Sampling:
+    """kept_hz: rows a second after the filter. noise: of those rows. standing: (joints,), slower is standing
+    still, where friction takes any value: such rows tell no law, and short stretches between them less of it. Zero
+    for a joint without such friction; none where nothing was recorded.
+    """
+
+    kept_hz: float
+    cutoff_hz: float
+    noise: Whitening
+    standing: tuple[float, ...] = ()
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second of a designed motion."""
+        return SAMPLES_PER_ROW * self.kept_hz
+
+    def times(self, duration: float) -> Array:
+        """Instants of a designed motion, s."""
+        return np.asarray(np.arange(round(duration * self.rate_hz) + 1) / self.rate_hz)
+
+    def filter(self, samples: int) -> Filter:
+        """The filter of a designed motion."""
+        return Butterworth(self.rate_hz, self.cutoff_hz, samples, SAMPLES_PER_ROW)
+
+    def whitened(self, columns: Array, velocity: Array) -> Array:
+        """Whitened rows of kept columns (rows, joints, columns), as much as they count: (rows of all joints, columns).
+
+        velocity: (samples, joints), of the whole motion.
+        """
+        moves = self._moving_samples(velocity)[::SAMPLES_PER_ROW]
+        kept = []
+        for joint in range(columns.shape[1]):
+            rows = self.noise(columns[:, joint], joint)
+            kept.append(rows * _row_weights(moves[:, joint])[len(moves) - len(rows) :, None])
+        return np.concatenate(kept)
+
+    def _moving_samples(self, velocity: Array) -> NDArray[np.bool_]:
+        """Instants (samples, joints) that are far enough from standing still for the filter."""
+        if not self.standing:
+            return np.ones(velocity.shape, dtype=bool)
+        still = np.abs(velocity) < np.array(self.standing)
+        reach = round(STANDSTILL_MARGIN / self.cutoff_hz * self.rate_hz)
+        return np.asarray(~binary_dilation(still, structure=np.ones((2 * reach + 1, 1))))
+
+
+def _row_weights(moves: NDArray[np.bool_]) -> Array:
+    """What rows count, (rows,): nothing near a standstill, less in stretches too short for a diagnosis."""
+    whole = Segment(0, "identify", 0, len(moves))
+    long = rows_in(split_segment(whole, moves), len(moves)) if not moves.all() else moves
+    return np.asarray(np.where(long, 1.0, np.where(moves, np.sqrt(SHORT_STRETCH_WORTH), 0.0)))
+
+
+def white_noise_sampling(levels: Array, cutoff_hz: float) -> Sampling:
+    """White noise below the cut-off. levels: (joints,), standard deviation of the filtered torque, N m."""
+    kept_hz = ROWS_PER_CUTOFF * cutoff_hz
+    scales = np.asarray(levels) * np.sqrt(
+        kept_hz / (INDEPENDENT_PER_HERTZ * cutoff_hz)
+    )  # rows that share their noise count less
+    return Sampling(kept_hz, cutoff_hz, Whitening(tuple(np.ones(1) for _ in levels), tuple(scales.tolist())))
+
+
+def kept_columns(
+    base: BaseParameters, candidates: tuple[Candidate, ...], scene: Scene, keep: Filter, smooth: bool = False
+) -> Array:
+    """Base parameters' columns, then the candidates', at the kept rows: (rows, joints, columns).
+
+    smooth: the motion is far below the cut-off, so that the filter would leave the rigid columns as they are.
+    """
+    joints = len(scene.arm)
+    rigid = observation_matrix(scene.arm, scene.motion)[:, base.columns].reshape(len(scene.time), joints, -1)
+    out = [rigid[keep.rows] if smooth else keep(rigid)]
+    own = [candidate.columns(scene) for candidate in candidates]
+    flat = keep(np.concatenate([each.reshape(len(each), -1) for each in own], axis=1)) if own else np.empty((0, 0))
+    at = 0
+    for candidate, each in zip(candidates, own, strict=True):
+        count = each.shape[1] * each.shape[2]
+        full = np.zeros((len(flat), joints, each.shape[2]))
+        full[:, list(candidate.rows)] = flat[:, at : at + count].reshape(-1, each.shape[1], each.shape[2])
+        out.append(full)
+        at += count
+    return np.concatenate(out, axis=2)

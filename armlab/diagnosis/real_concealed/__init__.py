@@ -1,0 +1,1 @@
+"""Real recordings with a known effect concealed: withheld from the simulation, or added to the torque."""

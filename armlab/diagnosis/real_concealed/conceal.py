@@ -1,0 +1,224 @@
+"""How something is concealed in a real recording: the reference model that is identified first, parts withheld from
+it, known disturbances added to the recorded torque, and what a diagnosis should name.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from armlab.diagnosis.real_concealed.plan import Disturbance, Piece, PieceKind
+from armlab.identification.components import Component
+from armlab.identification.identifier import Identifier
+from armlab.identification.real.study import Recipe
+from armlab.identification.selection import Groups, components_of, describe_choice, select_structure
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.differentiate import differentiate, resample_evenly
+from armlab.recordings.recording import Array, Recording, Run
+from problem.arm import Arm
+from problem.inertia import link_from_centre_of_mass
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
+
+MIXED_LAWS = ("direction", "cube root", "square", "load")
+"""Laws of the same velocity or load that predict a little better in sums, and of which none means anything alone: a
+law that is to be named has to stand for something."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A recording and its complete model. told: how that was chosen, in a line."""
+
+    recording: Recording
+    model: TorqueModel
+    told: str
+
+
+def identify_reference(recording: Recording, recipe: Recipe) -> Reference:
+    """Components, filters and prior by blocked cross-validation; links are bodies that can exist.
+
+    A diagnosis weighs how far links may be off in the metric of their pseudo-inertias, so it wants links, not base
+    parameters.
+    """
+    arm, runs = recording.arm, recording.with_role("identify")
+    groups: Groups = {name: parts for name, parts in recipe.groups(arm).items() if name not in MIXED_LAWS}
+    choice = select_structure(arm, runs, groups, recipe.pulls(arm), recipe.starts).choice
+    filters = choice.cutoff_hz, recording.robot, choice.position_factor
+    components = components_of(groups, choice.groups)
+    model = Identifier(arm, components, "physical", choice.pull, *filters).fit(runs).model_
+    return Reference(recording, model, describe_choice(choice))
+
+
+LAWS_BY_KIND: dict[PieceKind, tuple[str, ...]] = {
+    "friction": ("coulomb_friction", "viscous_friction", "nonlinear_viscous_friction"),
+    "wrist coupling": ("joint_coupling",),
+    "counterbalance": ("gravity_compensator",),
+    "payload": (),
+}
+FRICTION_LAWS = (
+    *LAWS_BY_KIND["friction"],
+    "stribeck_friction",
+    "asymmetric_friction",
+    "load_dependent_friction",
+    "presliding_hysteresis",
+    "friction_drift",
+)
+INSEPARABLE_EFFECTS = {  # what no motion separates, or what goes by either name
+    "payload": ("inertial_parameter_error",),
+    "gravity_compensator": ("cable_stiffness",),
+    "cable_stiffness": ("gravity_compensator",),
+}
+KnownNumber = tuple[float, tuple[float, float] | None]
+
+
+@dataclass(frozen=True)
+class SoughtEffect:
+    """What should be named. effects: any of these; joints: (joint,), (link,), a coupling's pair, or () for the arm.
+
+    numbers: by effect and parameter the true or the reference's value, and the reference's 95 % interval. identical:
+    other effects that these data cannot tell from it. laws: other effects of the same kind.
+    """
+
+    label: str
+    effects: tuple[str, ...]
+    joints: tuple[int, ...]
+    numbers: dict[str, dict[str, KnownNumber]]
+    identical: tuple[str, ...] = ()
+    laws: tuple[str, ...] = ()
+
+
+def withhold_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> TorqueModel:
+    """The model without the pieces; ValueError where it has no such part."""
+    for piece in pieces:
+        if piece.kind != "payload" and not _part_indices(model, piece):
+            raise ValueError(f"the reference model of {model.robot} has no {piece}")
+    lost = {index for piece in pieces for index in _part_indices(model, piece)}
+    parts, places = model.structure.components, model.structure.slices
+    stay = [index for index in range(len(parts)) if index not in lost]
+    base = len(model.structure.base)
+    kept = np.concatenate([np.arange(base), *(np.arange(places[each].start, places[each].stop) for each in stay)])
+    covariance = None if model.covariance is None else model.covariance[np.ix_(kept, kept)]
+    structure = model.structure.with_components(tuple(parts[each] for each in stay))
+    less = replace(model, structure=structure, values=model.values[kept], covariance=covariance)
+    return _without_load(less) if any(piece.kind == "payload" for piece in pieces) else less
+
+
+def _without_load(model: TorqueModel) -> TorqueModel:
+    """The model with its last link as its maker drew it."""
+    inertial = _model_links(model)
+    inertial[-10:] = model.arm.parameters[-10:]
+    values = model.values.copy()
+    values[: len(model.structure.base)] = model.structure.base.values(inertial)
+    return replace(model, inertial=inertial, values=values)
+
+
+def sought_of_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> tuple[SoughtEffect, ...]:
+    """One for each joint (link, pair) that loses something."""
+    return tuple(
+        each
+        for piece in pieces
+        for each in (_sought_load(model) if piece.kind == "payload" else _sought_laws(model, piece))
+    )
+
+
+def _sought_laws(model: TorqueModel, piece: Piece) -> tuple[SoughtEffect, ...]:
+    parts = model.structure.components
+    found: dict[tuple[int, ...], dict[str, dict[str, KnownNumber]]] = {}
+    for index in _part_indices(model, piece):
+        told = {each.name: (each.value, each.interval) for each in model.component_parameters(index)}
+        found.setdefault(parts[index].joints, {})[parts[index].effect] = told
+    return tuple(_build_sought(_piece_label(piece, joints), joints, told) for joints, told in found.items())
+
+
+def _build_sought(label: str, joints: tuple[int, ...], told: dict[str, dict[str, KnownNumber]]) -> SoughtEffect:
+    """numbers of a spring hold under either of its names."""
+    same = tuple(other for effect in told for other in INSEPARABLE_EFFECTS.get(effect, ()))
+    numbers = told | {other: told[effect] for effect in told for other in INSEPARABLE_EFFECTS.get(effect, ())}
+    laws = tuple(each for each in FRICTION_LAWS if each not in told) if set(told) <= set(FRICTION_LAWS) else ()
+    return SoughtEffect(label, tuple(told), joints, numbers, same, laws)
+
+
+def _piece_label(piece: Piece, joints: tuple[int, ...]) -> str:
+    return f"{piece.kind}, joint {joints[0]}" + (f" from {joints[1]}" if len(joints) > 1 else "")
+
+
+def _sought_load(model: TorqueModel) -> tuple[SoughtEffect, ...]:
+    """The load is what the last link has more than its maker's; its interval that of the base parameter it is in."""
+    more = _model_links(model)[-10:] - model.arm.parameters[-10:]
+    link, base = len(model.arm), model.structure.base
+    place = int(np.flatnonzero(base.grouping[:, -10])[0])
+    half = np.nan if model.covariance is None else model.factor * float(np.sqrt(model.covariance[place, place]))
+    mass = float(more[0])
+    told: dict[str, dict[str, KnownNumber]] = {"payload": {"mass": (mass, (mass - half, mass + half))}}
+    return (_build_sought(f"payload, link {link}", (link,), told),)
+
+
+def _model_links(model: TorqueModel) -> Array:
+    if model.inertial is None:
+        raise ValueError(f"the reference model of {model.robot} has no links")
+    return model.inertial.copy()
+
+
+def _part_indices(model: TorqueModel, piece: Piece) -> list[int]:
+    def lost(part: Component) -> bool:
+        return part.effect in LAWS_BY_KIND[piece.kind] and piece.joint in (None, part.joint)
+
+    return [index for index, part in enumerate(model.structure.components) if lost(part)]
+
+
+MAIN_PARAMETER = {
+    "payload": "mass",
+    "cable_stiffness": "stiffness",
+    "time_delay": "seconds",
+    "viscous_friction": "coefficient",
+}
+
+
+def add_disturbance(run: Run, arm: Arm, what: Disturbance) -> tuple[Run, Array]:
+    """The run, even in time, with the disturbance, and what that adds to its torque, (samples, joints), N m (N).
+
+    The motion is smoothed at the cut-off of least error of the acceleration, which is not that of the diagnosis. A
+    delay reads the recorded torque, noise and all, that much earlier by cubic splines; the first samples, before
+    which nothing was recorded, are left out.
+    """
+    even = resample_evenly(run)
+    if what.effect == "time_delay":
+        kept = even.time - what.size >= even.time[0]
+        late = np.asarray(make_interp_spline(even.time, even.torque, k=3)(even.time[kept] - what.size))
+        return replace(even.rows(kept), torque=late), late - even.torque[kept]
+    added = _disturbance_torque(what, arm, differentiate(even).motion)
+    return replace(even, torque=even.torque + added), added
+
+
+def sought_of_disturbance(what: Disturbance, joints: int) -> SoughtEffect:
+    """What should be named. joints: of the arm; a single one cannot tell its own skew from a delay of all, nor a load
+    from a rotor.
+    """
+    size: dict[str, KnownNumber] = {MAIN_PARAMETER[what.effect]: (what.size, None)}
+    numbers: dict[str, dict[str, KnownNumber]] = {what.effect: size}
+    place = () if what.joint is None else (what.joint,)
+    same: tuple[str, ...] = INSEPARABLE_EFFECTS.get(what.effect, ())
+    numbers |= dict.fromkeys(same, size)
+    if joints == 1 and what.effect == "time_delay":
+        same, numbers["channel_skew"] = ("channel_skew",), size
+    if joints == 1 and what.effect == "payload":
+        same, numbers["rotor_inertia"] = (*same, "rotor_inertia"), {"inertia": (what.size, None)}
+    return SoughtEffect(str(what), (what.effect,), place, numbers, same)
+
+
+def _disturbance_torque(what: Disturbance, arm: Arm, motion: Motion) -> Array:
+    out = np.zeros(motion.position.shape)
+    if what.joint is None:
+        raise ValueError(f"{what.effect} needs a joint")
+    joint = what.joint - 1
+    if what.effect == "payload":
+        ball = 0.4 * what.size * what.radius**2 * np.eye(3)
+        phi = np.zeros(10 * len(arm))
+        ten = slice(10 * joint, 10 * joint + 10)
+        phi[ten] = link_from_centre_of_mass(what.size, np.array(what.centre), ball).parameters
+        return rigid_body_torque(arm, motion, phi)
+    if what.effect == "cable_stiffness":
+        out[:, joint] = what.size * (motion.position[:, joint] - what.rest)
+    else:
+        out[:, joint] = what.size * motion.velocity[:, joint]
+    return out

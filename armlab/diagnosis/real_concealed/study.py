@@ -1,0 +1,71 @@
+"""All cases of one public recording: each look at validation runs is logged first, then the case is examined or read
+from the stored outcomes, and judged.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from armlab.diagnosis.real_concealed.conceal import Reference, identify_reference
+from armlab.diagnosis.real_concealed.examine import Outcome, OutcomeStore, examine_case, sought_in_case
+from armlab.diagnosis.real_concealed.judge import CaseVerdict, judge_case
+from armlab.diagnosis.real_concealed.plan import Case, cases_of
+from armlab.identification.real.looks import Looks
+from armlab.identification.real.study import RECIPES
+from armlab.recordings.load import load_recording
+from armlab.recordings.public import fetch_recording
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class ConcealedStudy:
+    """control: what is said of the reference model itself. verdicts: of every case with something concealed."""
+
+    reference: Reference
+    control: Outcome
+    verdicts: tuple[CaseVerdict, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the recording."""
+        return self.reference.recording.name
+
+
+def study_recording(
+    name: str, recordings: Path, kept: OutcomeStore, looks: Looks, progress: Progress
+) -> ConcealedStudy:
+    """Conceals, diagnoses and judges. recordings: where the recording is, or will be fetched to."""
+    place = recordings / name
+    progress(f"{name}: the reference model")
+    recording = load_recording(place if place.is_dir() else fetch_recording(name, place))
+    recipe = next(each for each in RECIPES if each.name == name)
+    return study_cases(identify_reference(recording, recipe), cases_of(name), kept, looks, progress)
+
+
+def study_cases(
+    reference: Reference, cases: tuple[Case, ...], kept: OutcomeStore, looks: Looks, progress: Progress
+) -> ConcealedStudy:
+    """The cases of a recording, the control first."""
+    kept.folder.mkdir(parents=True, exist_ok=True)
+    path = kept.folder / f"{reference.recording.name}.yaml"
+    outcomes = []
+    for number, case in enumerate(cases, 1):
+        told = f"{case.recording}, {number} of {len(cases)}: {case.name}"
+        progress(told)
+        outcome = kept.read(case, reference.recording)
+        if outcome is None:
+            for run in reference.recording.with_role("validate"):
+                looks.note(reference.recording.arm.name, run.name, f"concealed: {case.name}")
+            outcome = examine_case(reference, case, path, _progress_under(told, progress))
+            kept.write(case, reference.recording, outcome)
+        outcomes.append(outcome)
+    control = next(each for case, each in zip(cases, outcomes, strict=True) if case.control)
+    pairs = [(case, each) for case, each in zip(cases, outcomes, strict=True) if not case.control]
+    verdicts = tuple(judge_case(case, each, sought_in_case(reference, case), control) for case, each in pairs)
+    return ConcealedStudy(reference, control, verdicts)
+
+
+def _progress_under(told: str, progress: Progress) -> Progress:
+    """Tells what is being done under a heading."""
+    return lambda message: progress(f"{told}: {message}")

@@ -1,0 +1,97 @@
+"""All pictures of a diagnosis, drawn once for the page and for the files beside it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.diagnosis.report.arm_picture import JointMark, clearest_posture, draw_arm
+from armlab.diagnosis.report.motion_pictures import draw_motion, draw_motion_differences
+from armlab.diagnosis.report.residuals import ShownResiduals, space_rows
+from armlab.diagnosis.report.torque_pictures import (
+    draw_errors,
+    draw_errors_by_joint,
+    draw_evidence,
+    draw_located_errors,
+    draw_torques,
+)
+from armlab.diagnosis.report.words import LINK_EFFECTS, effect_in_words
+from armlab.diagnosis.result import Claim, Diagnosis
+
+MAX_POSTURES = 100  # recorded ones, of which the most telling is drawn
+MAX_LOCATED_JOINTS = 4  # joints whose error is drawn against every variable
+
+
+@dataclass(frozen=True, eq=False)
+class Gallery:
+    """SVG texts. motions: simulated anew; differences: from a reference; their texts say what they show, or why not."""
+
+    data: ShownResiduals
+    arm: str
+    errors_by_joint: str
+    torques: list[str]
+    errors: list[str]
+    evidence: list[tuple[Claim, str]]
+    located: list[tuple[int, list[str]]]
+    motions: list[str]
+    motion_text: str
+    differences: list[str]
+    difference_text: str
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Names of the files and their content."""
+        out = {"arm.svg": self.arm, "errors.svg": self.errors_by_joint}
+        out |= {f"torque_joint{number}.svg": each for number, each in enumerate(self.torques, 1)}
+        out |= {f"error_joint{number}.svg": each for number, each in enumerate(self.errors, 1)}
+        for number, (claim, each) in enumerate(self.evidence, 1):
+            out[f"finding{number}_{_file_name(claim.effect)}.svg"] = each
+        for joint, pictures in self.located:
+            out |= {f"where_joint{joint}_{number}.svg": each for number, each in enumerate(pictures, 1)}
+        out |= {f"motion{number}.svg": each for number, each in enumerate(self.motions, 1)}
+        return out | {f"difference_joint{number}.svg": each for number, each in enumerate(self.differences, 1)}
+
+
+def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
+    """Draws everything."""
+    arm = diagnosis.simulation.arm
+    postures = data.observed.kept("position")[space_rows(np.arange(data.observed.rows), MAX_POSTURES)]
+    position = clearest_posture(arm, postures)
+    whole = [effect_in_words(claim.effect) for claim in diagnosis.claims if claim.joint is None]
+    worst = [each.joint for each in diagnosis.located[:MAX_LOCATED_JOINTS]]
+    located = [(joint, draw_located_errors(diagnosis, data, joint - 1)) for joint in worst]
+    return Gallery(
+        data,
+        draw_arm(arm, position, joint_marks(diagnosis), whole),
+        draw_errors_by_joint(diagnosis, data),
+        draw_torques(diagnosis, data),
+        draw_errors(diagnosis, data),
+        [(claim, draw_evidence(diagnosis, data, claim)) for claim in diagnosis.claims],
+        located,
+        *draw_motion(diagnosis),
+        *draw_motion_differences(diagnosis),
+    )
+
+
+def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
+    """What is said of each joint in the picture of the arm."""
+    texts: dict[int, list[str]] = {}
+    unknown: dict[int, bool] = {}
+    for claim in diagnosis.claims:
+        if claim.joint is not None:
+            name = (
+                f"{effect_in_words(claim.effect)} (link)"
+                if claim.effect in LINK_EFFECTS
+                else effect_in_words(claim.effect)
+            )
+            texts.setdefault(claim.joint, []).append(name)
+            unknown[claim.joint] = unknown.get(claim.joint, True) and claim.effect == "unknown"
+    return {joint: JointMark(_short_mark(found), unknown[joint]) for joint, found in texts.items()}
+
+
+def _short_mark(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{names[0]} + {len(names) - 1}"
+
+
+def _file_name(effect: str) -> str:
+    """An effect's id as part of a file name: a user's own may hold anything."""
+    return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in effect)

@@ -1,0 +1,272 @@
+"""Pictures of torques and errors: error of each joint, torques over time, the evidence for each finding, and where
+the error is.
+"""
+
+import numpy as np
+
+from armlab.diagnosis.report.charts import (
+    CHART_WIDTH,
+    FITTED_ROWS_LOOK,
+    FLOOR_LOOK,
+    FOUND_LOOK,
+    GIVEN_LOOK,
+    HELD_OUT_ROWS_LOOK,
+    LAW_LOOK,
+    LEFT_MARGIN,
+    MEASURED_LOOK,
+    PALE_COLOR,
+    REFITTED_LOOK,
+    RIGHT_MARGIN,
+    SURROGATE_LOOK,
+    Axis,
+    Layer,
+    Level,
+    Line,
+    Look,
+    Points,
+    draw_chart,
+    fit_axis,
+    svg_element,
+    svg_picture,
+    svg_text,
+    text_width,
+)
+from armlab.diagnosis.report.residuals import ShownResiduals, bin_means, clearest_stretch, residual_without, space_rows
+from armlab.diagnosis.report.words import effect_in_words, format_number, joint_unit, shorten_name
+from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.recordings.recording import Array
+
+STRETCH_SECONDS = 4.0
+JOINT_ROW_HEIGHT = 26.0
+Series = list[tuple[Look, Array]]
+
+
+def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> str:
+    """Held-out error of each joint on a logarithmic axis: as given, refitted, with what was found, noise floor."""
+    series: Series = [(REFITTED_LOOK, data.held_out_rms(data.refit)), (FOUND_LOOK, data.held_out_rms(data.final))]
+    if data.given is not None:
+        series.insert(0, (GIVEN_LOOK, data.held_out_rms(data.given)))
+    floors = np.array([each.noise_floor for each in diagnosis.fit])
+    kinds = {joint_unit(diagnosis.simulation.arm, joint) for joint in range(len(floors))}
+    axis = fit_axis(f"rms error, {' or '.join(sorted(kinds))}", *(each for _, each in series), floors, log=True)
+    top = 62.0
+    height = top + JOINT_ROW_HEIGHT * len(floors) + 42
+    content = svg_text("Error on data that took no part", 6, 14, 12, font_weight="600") + _draw_marks_legend(series)
+    content += _draw_grid(axis, top, height)
+    for joint in range(len(floors)):
+        content += _draw_joint_row(axis, top + JOINT_ROW_HEIGHT * (joint + 0.5), joint, series, float(floors[joint]))
+    told = "; ".join(
+        f"joint {joint + 1}: {', '.join(f'{look.name} {format_number(float(each[joint]))}' for look, each in series)}"
+        for joint in range(len(floors))
+    )
+    return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {told}")
+
+
+def _draw_marks_legend(series: Series) -> str:
+    at, baseline, out = 6.0, 31.0, ""
+    for look, _ in [*series, (FLOOR_LOOK, np.empty(0))]:
+        width = text_width(look.name, 10.5) + 28
+        if at > 6 and at + width > CHART_WIDTH:
+            at, baseline = 6.0, baseline + 15
+        out += _draw_mark(at + 7, baseline - 4, look) + svg_text(look.name, at + 17, baseline, 10.5)
+        at += width
+    return out
+
+
+def _draw_grid(axis: Axis, top: float, height: float) -> str:
+    out = ""
+    for value, text in axis.ticks(6):
+        x = _axis_position(axis, value)
+        out += svg_element("line", x1=x, x2=x, y1=top, y2=height - 40, stroke="#e6e9ed")
+        out += svg_text(text, x, height - 25, 10.5, "middle", fill=PALE_COLOR)
+    return out + svg_text(
+        f"{axis.label} (logarithmic)", (LEFT_MARGIN + CHART_WIDTH - RIGHT_MARGIN) / 2, height - 8, 11, "middle"
+    )
+
+
+def _draw_joint_row(axis: Axis, y: float, joint: int, series: Series, floor: float) -> str:
+    places = [_axis_position(axis, float(each[joint])) for _, each in series]
+    out = svg_text(f"joint {joint + 1}", 6, y + 4, 11)
+    out += svg_element("line", x1=min(places), x2=max(places), y1=y, y2=y, stroke="#c4cad1", stroke_width=2)
+    out += _draw_mark(_axis_position(axis, floor), y, FLOOR_LOOK)
+    return out + "".join(_draw_mark(x, y, look) for x, (look, _) in zip(places, series, strict=True))
+
+
+def _axis_position(axis: Axis, value: float) -> float:
+    return float(LEFT_MARGIN + 4 + (CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN - 8) * np.clip(axis.at(value), 0, 1))
+
+
+def _draw_mark(x: float, y: float, look: Look) -> str:
+    """A shape of its own for each series: square, ring, disc, bar."""
+    if look is GIVEN_LOOK:
+        return svg_element("rect", x=x - 4.5, y=y - 4.5, width=9, height=9, fill=look.color)
+    if look is REFITTED_LOOK:
+        return svg_element("circle", cx=x, cy=y, r=4.6, fill="#fff", stroke=look.color, stroke_width=2.2)
+    if look is FOUND_LOOK:
+        return svg_element("circle", cx=x, cy=y, r=5, fill=look.color)
+    return svg_element("path", d=f"M{x:.1f} {y - 9:.1f}v18", stroke=look.color, stroke_width=2.4)
+
+
+def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
+    """One a joint: measured torque and the models' over the most telling stretch of held-out time."""
+    segment, rows = clearest_stretch(data, STRETCH_SECONDS)
+    time, torque = data.observed.time[rows], data.observed.torque
+    run = data.observed.names[segment.run]
+    models: Series = [(REFITTED_LOOK, data.refit), (FOUND_LOOK, data.final)]
+    if data.given is not None:
+        models.insert(0, (GIVEN_LOOK, data.given))
+    out = []
+    for joint in range(torque.shape[1]):
+        measured = torque[rows, joint]
+        lines: list[Layer] = [Line(time, measured, MEASURED_LOOK)]
+        lines += [Line(time, measured - left[rows, joint], look) for look, left in models]
+        size = joint_unit(diagnosis.simulation.arm, joint)
+        values = [each.y for each in lines if isinstance(each, Line)]
+        y = fit_axis(f"{'torque' if size == 'N m' else 'force'}, {size}", *values)
+        x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
+        out.append(draw_chart(f"Joint {joint + 1}: measured and predicted", x, y, lines))
+    return out
+
+
+def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
+    """One a joint: what each model leaves over a whole held-out run, with the noise floor."""
+    segment, _ = clearest_stretch(data, STRETCH_SECONDS)
+    rows = slice(segment.start, segment.stop)
+    time, run = data.observed.time[rows], data.observed.names[segment.run]
+    models: Series = [(REFITTED_LOOK, data.refit), (FOUND_LOOK, data.final)]
+    if data.given is not None:
+        models.insert(0, (GIVEN_LOOK, data.given))
+    out = []
+    for joint, fit in enumerate(diagnosis.fit):
+        size = joint_unit(diagnosis.simulation.arm, joint)
+        lines: list[Layer] = [Line(time, left[rows, joint], look) for look, left in models]
+        lines += [Level(sign * fit.noise_floor, FLOOR_LOOK) for sign in (1, -1)]
+        y = fit_axis(f"measured − predicted, {size}", *(left[rows, joint] for _, left in models), zero=True)
+        x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
+        title = f"Joint {joint + 1}: error"
+        out.append(draw_chart(title, x, y, lines, f"{title} over {run}, measured less predicted, with the noise floor"))
+    return out
+
+
+MAX_DOTS = 700
+LAW_BINS = 48
+MAX_LAW_SCATTER = 0.2  # of the law's own range: a law that scatters less about its mean in a bin is drawn as a line
+FULL_TURN = 2 * np.pi
+VELOCITY_EFFECTS = (
+    "coulomb_friction",
+    "viscous_friction",
+    "nonlinear_viscous_friction",
+    "stribeck_friction",
+    "asymmetric_friction",
+    "presliding_hysteresis",
+    "joint_coupling",
+)
+POSITION_EFFECTS = ("gravity_compensator", "cable_stiffness", "backlash")
+TIME_EFFECTS = ("torque_offset", "external_contact", "friction_drift")
+MOTION_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "acceleration": ("rad/s²", "m/s²")}
+
+
+def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> str:
+    """Dots: measured torque that is left without the finding. Line: what the finding says of it."""
+    joint = claim.evidence.joint
+    label, x = evidence_variable(diagnosis, data, claim)
+    left, law = residual_without(diagnosis, claim, joint), claim.prediction[:, joint]
+    used, held = data.used(joint), data.held_out(joint)
+    layers: list[Layer] = []
+    for rows, look in ((used[~held[used]], FITTED_ROWS_LOOK), (used[held[used]], HELD_OUT_ROWS_LOOK)):
+        chosen = space_rows(rows, MAX_DOTS // 2)
+        layers.append(Points(x[chosen], left[chosen], look))
+    layers += _law_layers(x[used], law[used], LAW_LOOK if claim.candidate else SURROGATE_LOOK)
+    size = joint_unit(diagnosis.simulation.arm, joint)
+    y = fit_axis(f"left without it, {size}", np.quantile(left[used], [0.002, 0.998]), law[used])
+    title = f"{effect_in_words(claim.effect).capitalize()}, joint {joint + 1}"
+    return draw_chart(
+        title, fit_axis(label, x[used]), y, layers, f"{title}: torque left without it against {label}, and its law"
+    )
+
+
+def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> tuple[str, Array]:
+    """Label and values (rows,) of what the finding depends on; its own torque where no single variable tells it."""
+    arm, observed = diagnosis.simulation.arm, data.observed
+    joint = claim.evidence.joint
+    moving = (claim.joints[1] if len(claim.joints) > 1 else claim.joint or 0) - 1
+    if claim.effect in VELOCITY_EFFECTS and moving >= 0:
+        return _motion_variable(diagnosis, data, "velocity", moving)
+    if claim.effect in POSITION_EFFECTS and moving >= 0:
+        return _motion_variable(diagnosis, data, "position", moving)
+    if claim.effect == "rotor_inertia" and moving >= 0:
+        return _motion_variable(diagnosis, data, "acceleration", moving)
+    if claim.effect == "torque_ripple" and moving >= 0:
+        return _ripple_variable(data, claim, moving)
+    if claim.effect in TIME_EFFECTS:
+        return "time from the start of the run, s", observed.time
+    if claim.depends_on[:1] == ("time",):
+        return "time from the start of the run, s", observed.time
+    for name in claim.depends_on:
+        kind, _, which = name.rpartition("_")
+        if kind in MOTION_UNITS and which.isdigit():
+            return _motion_variable(diagnosis, data, kind, int(which) - 1)
+        if kind == "torque" and which.isdigit():
+            return _load_variable(diagnosis, data, claim, int(which) - 1)
+    return f"torque that it predicts, {joint_unit(arm, joint)}", claim.prediction[:, joint]
+
+
+def _motion_variable(diagnosis: Diagnosis, data: ShownResiduals, kind: str, joint: int) -> tuple[str, Array]:
+    units = MOTION_UNITS[kind]
+    unit = units[0] if diagnosis.simulation.arm.joints[joint].kind == "revolute" else units[1]
+    return f"{kind} of joint {joint + 1}, {unit}", data.observed.kept(kind)[:, joint]
+
+
+def _load_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
+    """Torque of the model without the finding."""
+    torque = data.observed.torque[:, joint] - data.final[:, joint] - claim.prediction[:, joint]
+    return f"torque of the model at joint {joint + 1}, {joint_unit(diagnosis.simulation.arm, joint)}", torque
+
+
+def _ripple_variable(data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
+    """Position within one wave of a ripple."""
+    order = next((each.value for each in claim.parameters if each.name == "order"), 1.0)
+    waves = float(order) if isinstance(order, float) and order else 1.0
+    position = data.observed.kept("position")[:, joint]
+    return f"position of joint {joint + 1} within a wave of 1/{waves:.4g} turn, share", (
+        position * waves / FULL_TURN
+    ) % 1.0
+
+
+def _law_layers(x: Array, law: Array, look: Look) -> list[Layer]:
+    """A line where the law is a function of this variable, dots where it is not."""
+    across, height, scatter = bin_means(x, law, LAW_BINS)
+    if np.ptp(law) > 0 and np.median(scatter) < MAX_LAW_SCATTER * np.std(law):
+        return [Line(across, height, look)]
+    chosen = space_rows(np.arange(len(x)), MAX_DOTS // 2)
+    return [Points(x[chosen], law[chosen], look)]
+
+
+LOCATED_BINS = 24
+LOCATED_HEIGHT = 205.0
+
+
+def draw_located_errors(diagnosis: Diagnosis, data: ShownResiduals, joint: int) -> list[str]:
+    """rms error of a joint (from 0) against its position, velocity, acceleration, and time."""
+    arm = diagnosis.simulation.arm
+    turns = arm.joints[joint].kind == "revolute"
+    pictures = []
+    for kind, (angle, length) in MOTION_UNITS.items():
+        label = f"{kind} of joint {joint + 1}, {angle if turns else length}"
+        pictures.append(_draw_error_against(diagnosis, data, joint, label, data.observed.kept(kind)[:, joint]))
+    over_time = _draw_error_against(diagnosis, data, joint, "time from the start of the run, s", data.observed.time)
+    return [*pictures, over_time]
+
+
+def _draw_error_against(diagnosis: Diagnosis, data: ShownResiduals, joint: int, label: str, x: Array) -> str:
+    start = REFITTED_LOOK if data.given is None else GIVEN_LOOK
+    used, layers = data.used(joint), []
+    for look, residual in ((start, data.before), (FOUND_LOOK, data.final)):
+        across, power, _ = bin_means(x[used], residual[used, joint] ** 2, LOCATED_BINS)
+        layers.append(Line(across, np.sqrt(power), look))
+    floor = diagnosis.fit[joint].noise_floor
+    size = joint_unit(diagnosis.simulation.arm, joint)
+    y = fit_axis(f"rms error, {size}", *(layer.y for layer in layers), np.array([floor]), zero=True)
+    quantity = label.split(",")[0].replace(f" of joint {joint + 1}", "")
+    title = f"Joint {joint + 1}: error by {'time' if quantity.startswith('time') else quantity}"
+    return draw_chart(title, fit_axis(label, x[used]), y, [*layers, Level(floor, FLOOR_LOOK)], height=LOCATED_HEIGHT)

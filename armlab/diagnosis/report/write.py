@@ -1,0 +1,106 @@
+"""Diagnoses a recording and writes the verdict, the model, the report page and the pictures into a folder."""
+
+import resource
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import get_args
+
+from armlab.common.errors import InputError
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.report import sections
+from armlab.diagnosis.report.gallery import Gallery, draw_gallery
+from armlab.diagnosis.report.html import html_document
+from armlab.diagnosis.report.residuals import select_residuals
+from armlab.diagnosis.report.sections import findings_section
+from armlab.diagnosis.report.words import verdict_lines
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import Baseline, Settings, guards_without
+from armlab.diagnosis.verdict_files import (
+    PREDICTED_FOLDER,
+    check_output_folder,
+    predicted_texts,
+    verdict_texts,
+    write_texts,
+)
+from armlab.recordings.load import load_recording
+
+
+def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:
+    """HTML text. gallery: None where nothing was fitted."""
+    parts = [sections.verdict_section(diagnosis)]
+    if gallery is not None:
+        parts += [
+            sections.before_after_section(diagnosis, gallery),
+            findings_section(diagnosis, gallery),
+            sections.location_section(diagnosis, gallery),
+            sections.motion_section(gallery),
+            sections.next_steps_section(diagnosis),
+            sections.method_section(diagnosis, gallery.data.observed.held_out_blocks),
+        ]
+    parts.append(sections.origin_section(diagnosis, command))
+    return html_document(f"Diagnosis of {diagnosis.recording.name}", parts)
+
+
+REPORT_PAGE, FIGURES_FOLDER = "report.html", "figures"
+
+
+def report_texts(diagnosis: Diagnosis, command: str = "") -> dict[str, str]:
+    """Names and content of the page and the pictures. command: that repeats it."""
+    data = select_residuals(diagnosis)
+    drawn: Gallery | None = None if data is None else draw_gallery(diagnosis, data)
+    texts = {REPORT_PAGE: report_page(diagnosis, drawn, command)}
+    if drawn is not None:
+        texts |= {f"{FIGURES_FOLDER}/{name}": text + "\n" for name, text in drawn.files.items()}
+    return texts
+
+
+def write_report(diagnosis: Diagnosis, folder: Path, command: str = "") -> Path:
+    """Writes report.html and figures/ into a folder and returns the page; InputError where that cannot be done."""
+    write_texts(report_texts(diagnosis, command), folder)
+    return folder / REPORT_PAGE
+
+
+def diagnose_recording(
+    folder: Path,
+    out: Path,
+    baseline: str | None,
+    seed: int,
+    without: tuple[str, ...] = (),
+    progress: Callable[[str], None] = lambda message: None,
+) -> Iterator[str]:
+    """Diagnoses, writes verdict.json, report.html, model.yaml and figures into `out`, all or none; tells it in lines.
+
+    without: guards that are switched off. progress: is told what is being done. Raises InputError, in one line, for a
+    recording that cannot be used, and for a guard that there is not.
+    """
+    chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
+    recording = load_recording(folder)
+    check_output_folder(out, recording)
+    try:
+        found = diagnose(recording, chosen, seed, Settings(guards=guards_without(without)), progress)
+    except ValueError as error:
+        raise InputError(f"{folder}: {error}") from None
+    progress("writing the report")
+    options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
+    options += [word for guard in without for word in ("--without", guard)]
+    command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
+    texts = verdict_texts(found, out) | report_texts(found, command) | predicted_texts(found)
+    write_texts(texts, out)
+    yield from verdict_lines(found)
+    pictures = sum(name.startswith(FIGURES_FOLDER) for name in texts)
+    files = ", ".join(name for name in texts if not name.startswith((FIGURES_FOLDER, PREDICTED_FOLDER)))
+    more = f", {pictures} pictures in {FIGURES_FOLDER}" if pictures else ""
+    more += (
+        f", predicted torque in {PREDICTED_FOLDER}" if any(name.startswith(PREDICTED_FOLDER) for name in texts) else ""
+    )
+    yield f"wrote {out}: {files}{more}"
+    if found.seconds:
+        yield f"diagnosed in {found.seconds:.1f} s once read; {_peak_memory_gb():.2f} GB of memory at most"
+
+
+def _peak_memory_gb() -> float:
+    """Of this process, GB."""
+    unit = 1 if sys.platform == "darwin" else 1024  # bytes in what the system counts in
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9

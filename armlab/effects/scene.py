@@ -1,0 +1,57 @@
+"""A run as effects see it that are more than linear terms of a motion."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from armlab.recordings.recording import Array, Run
+from problem.arm import Arm
+from problem.motion import Motion
+from problem.regressor import inertia_column, rigid_body_torque
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One run as effects see it: even in time, not yet passed through the torque's filter.
+
+    Nothing of the measured torque is in it: its noise would leak into the candidates.
+    time: (samples,), s, from the first sample of the run. inertial: (10 * joints,), the links of the present
+    model. torque: (samples, joints), what the present model predicts, friction included, faults of the torque's
+    channel left out, N m (N). temperature: (samples, sensors), degrees Celsius; link_position: (samples, joints),
+    rad (m); None where the run has none.
+    """
+
+    run: str
+    time: Array
+    motion: Motion
+    arm: Arm
+    inertial: Array
+    torque: Array
+    temperature: Array | None = None
+    link_position: Array | None = None
+
+    @cached_property
+    def rigid_torque(self) -> Array:
+        """What the links of the present model need, without friction: (samples, joints), N m (N)."""
+        return rigid_body_torque(self.arm, self.motion, self.inertial)
+
+    @cached_property
+    def own_inertia(self) -> Array:
+        """Inertia that each joint feels of the links of the present model, its rotor left out: (samples, joints),
+        kg m2 (kg).
+        """
+        arm, position = self.arm, self.motion.position
+        columns = (inertia_column(arm, position, joint, self.inertial)[:, joint] for joint in range(len(arm)))
+        return np.column_stack(list(columns))
+
+    @property
+    def step(self) -> float:
+        """Time from sample to sample, s."""
+        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+
+
+def scene_of(run: Run, motion: Motion, arm: Arm) -> Scene:
+    """The scene of a run that is even in time and of its motion, before any model: links and torque are zeros."""
+    zero, time = np.zeros(motion.position.shape), run.time - run.time[0]
+    return Scene(run.name, time, motion, arm, np.zeros(10 * len(arm)), zero, run.temperature, run.link_position)

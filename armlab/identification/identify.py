@@ -1,0 +1,136 @@
+"""What `armlab identify` and `armlab predict` do: from a recording folder to lines, a model file and a page."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from html import escape
+from importlib.metadata import version
+from pathlib import Path
+
+import pandas as pd
+
+from armlab.common.errors import InputError
+from armlab.identification.identifier import Identifier
+from armlab.identification.model import Model
+from armlab.identification.pictures import png_data_url
+from armlab.identification.priors import NO_PULL, Pull
+from armlab.identification.selection import (
+    candidate_groups,
+    candidate_pulls,
+    components_of,
+    describe_choice,
+    select_structure,
+)
+from armlab.identification.validation import RunError, error_table, run_error
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Recording, Run
+
+PAGE_STYLE = "body{font:15px/1.45 system-ui,sans-serif;max-width:1060px;margin:2em auto;color:#222}img{max-width:100%}"
+
+
+def write_identification_page(
+    recording: Recording, identifier: Identifier, errors: tuple[RunError, ...], path: Path
+) -> Path:
+    """Writes the page and returns its path; InputError where it cannot be written."""
+    model = identifier.model_
+    parts = [
+        f"<h1>{escape(recording.name)}</h1><p>Cut-off {model.cutoff_hz:.4g} Hz; condition number "
+        f"{identifier.condition_number_:.4g} (columns at unit length); 95 % intervals for correlated errors.</p>",
+        f"<h2>Errors</h2><pre>{escape(error_table(errors))}</pre>",
+        f"<h2>Parameters</h2><pre>{escape(str(model))}</pre><h2>Residuals</h2>",
+        *(f'<img alt="{escape(run.name)}" src="{png_data_url(model.plot(run))}">' for run in recording.runs),
+    ]
+    head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(recording.name)}</title>'
+    try:
+        path.write_text(
+            f"{head}<style>{PAGE_STYLE}</style></head><body>{''.join(parts)}</body></html>\n", encoding="utf-8"
+        )
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    return path
+
+
+NO_VALIDATION_WARNING = "no run validates: judged on the identification runs themselves, so the errors are too small"
+
+
+@dataclass(frozen=True)
+class IdentifyOptions:
+    """method: one of METHODS. tolerance: of a prior about the robot's own links. choose: by cross-validation."""
+
+    method: str = "weighted"
+    cutoff_hz: float | None = None
+    tolerance: float | None = None
+    choose: bool = False
+
+
+def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Iterator[str]:
+    """Identifies, writes model.yaml and report.html into `out`, and tells parameters and errors in lines.
+
+    Raises InputError, in one line, for a recording that cannot be used and options that do not fit it.
+    """
+    recording = load_recording(folder)
+    runs = recording.with_role("identify")
+    if not runs:
+        raise InputError(f"{folder} has no run to identify from: give one of its runs the role identify")
+    if options.tolerance and recording.arm.links is None:
+        raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
+    identifier, how = _build_identifier(recording, options)
+    try:
+        identifier.fit(runs)
+    except ValueError as error:
+        raise InputError(f"{folder}: {error}") from None
+    model = identifier.model_
+    model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
+    errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
+    yield from how
+    yield str(model)
+    yield from (f"{part.label}: no motion tells it from the links, left out" for part in identifier.absorbed_)
+    yield f"condition number: {identifier.condition_number_:.4g} (columns at unit length)"
+    yield error_table(errors)
+    if not recording.with_role("validate"):
+        yield NO_VALIDATION_WARNING
+    out.mkdir(parents=True, exist_ok=True)
+    yield f"model: {model.save(out / 'model.yaml')}"
+    yield f"page: {write_identification_page(recording, identifier, errors, out / 'report.html')}"
+
+
+def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[Identifier, list[str]]:
+    arm, robot = recording.arm, _robot_path(recording)
+    pull = Pull("nominal", options.tolerance) if options.tolerance else NO_PULL
+    if not options.choose:
+        return Identifier(arm, None, options.method, pull, options.cutoff_hz, robot), []
+    groups = candidate_groups(len(arm))
+    candidates = (pull,) if options.tolerance else candidate_pulls(arm)
+    choice = select_structure(arm, recording.with_role("identify"), groups, candidates).choice
+    line = f"chosen: {describe_choice(choice)}; held-out error {100 * choice.held_out:.2f} % of the torque"
+    method = "alike" if options.method == "weighted" and not choice.by_joint else options.method
+    components = components_of(groups, choice.groups)
+    filters = choice.cutoff_hz, robot, choice.position_factor
+    return Identifier(arm, components, method, choice.pull, *filters), [line]
+
+
+def _robot_path(recording: Recording) -> str:
+    """The robot as it can be found from the working folder."""
+    beside = recording.folder / recording.robot
+    return str(beside) if beside.is_file() else recording.robot
+
+
+def predict_recording(path: Path, folder: Path, out: Path | None) -> Iterator[str]:
+    """Errors of a model on each run of a recording, in lines; predicted torques as CSV files into `out`."""
+    model, recording = Model.load(path), load_recording(folder)
+    if len(model.arm) != len(recording.arm):
+        raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
+    yield error_table(tuple(run_error(model, model.signals(run)) for run in recording.runs))
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        yield from (str(_write_torque(model, run, out)) for run in recording.runs)
+
+
+def _write_torque(model: Model, run: Run, out: Path) -> Path:
+    """Writes the predicted torque of a run with its times as a CSV file."""
+    signals = model.signals(run)
+    names = [f"tau{joint + 1}" for joint in range(len(model.arm))]
+    file = out / f"{run.name.replace('/', '-')}.predicted.csv"
+    table = pd.DataFrame(model.torque(signals.motion, signals.run), columns=names)
+    table.insert(0, "t", signals.run.time)
+    table.to_csv(file, index=False)
+    return file

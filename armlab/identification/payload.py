@@ -1,0 +1,304 @@
+"""A load that some runs carry: its inertial parameters, or, where they are known, the torque gains.
+
+Links and friction are the same in all runs; only what differs between them tells about the load (Khalil, Gautier
+and Lemoine 2007). A known load shows the gain of each joint's torque reading (Gautier and Briot 2014).
+
+The load is a body that can exist: its pseudo-inertia is positive semidefinite. `payload_lines` and `gains_lines` go
+from recordings with and without the load to the lines of `armlab payload` and `armlab gains`.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from armlab.common.errors import InputError
+from armlab.identification.components import usual_components
+from armlab.identification.covariance import uncertainty
+from armlab.identification.estimators.least_squares import WeightedLeastSquares, joint_weights
+from armlab.identification.estimators.physical import TYPICAL_BODY, load_cvxpy
+from armlab.identification.priors import point_mass
+from armlab.identification.regression import Regression, regression, signals_of, suggested_cutoff
+from armlab.identification.selection import counterbalance_groups
+from armlab.identification.structure import Structure
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Array, Recording, Run
+from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
+from problem.inertia import link_from_centre_of_mass
+from problem.motion import Motion
+from problem.pseudo_inertia import link_of, pseudo_inertias
+from problem.regressor import observation_matrix, rigid_body_torque
+
+EIGENVALUE_TOLERANCE = 1e-12  # of a body: a point mass has eigenvalues of zero
+
+
+def nearest_physical_load(data: Regression, free: Array, basis: Array) -> Array:
+    """The load's numbers (sought,), which are the last columns of weighted data; the others stay free.
+
+    free: the numbers without the condition, returned where they are physical. basis: (10, sought), parameters of
+    each number. Raises InputError without CVXPY, RuntimeError where the solver finds no solution.
+    """
+    units = pseudo_inertias(basis.T.ravel())
+    shapes = units / np.outer(TYPICAL_BODY, TYPICAL_BODY)  # near the unit matrix for a load of a usual size
+    eigenvalues = np.linalg.eigvalsh(np.tensordot(free, shapes, 1))
+    if eigenvalues[0] >= -EIGENVALUE_TOLERANCE * np.abs(eigenvalues).max():
+        return free
+    cp = load_cvxpy()
+    triangle = np.linalg.qr(np.column_stack([data.matrix, data.torque]))[1]
+    own = slice(data.matrix.shape[1] - len(free), data.matrix.shape[1])
+    block, target = triangle[own, own], triangle[own, -1]
+    lengths = np.linalg.norm(block, axis=0)
+    scaled = cp.Variable(len(free))
+    body = sum(scaled[index] * shapes[index] / lengths[index] for index in range(len(free)))
+    size = max(float(np.linalg.norm(target)), 1e-300)
+    error = cp.sum_squares((block / lengths) @ scaled - target / size)
+    task = cp.Problem(cp.Minimize(error), [body >> 0])
+    task.solve(solver=cp.CLARABEL)
+    if task.status not in (cp.OPTIMAL, cp.OPTIMAL_INACCURATE):
+        raise RuntimeError(f"no load that can exist was found: the solver says '{task.status}'")
+    return np.asarray(size * scaled.value / lengths)
+
+
+MIN_SINGULAR_VALUE_SHARE = 1e-8  # of the largest singular value of the load's columns at unit length
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a load sits: on a link, counted from 1 (None: the last); as a point of its frame, m, if that is known.
+
+    Of a load at a known point only the mass is sought.
+    """
+
+    link: int | None = None
+    centre: tuple[float, float, float] | None = None
+
+    @property
+    def basis(self) -> Array:
+        """Ten parameters for each number that is sought, (10, sought)."""
+        return np.eye(10) if self.centre is None else point_mass(1, self.centre)[:, None]
+
+    def columns(self, structure: Structure, signals: Signals) -> Array:
+        """Filtered columns of the load, (kept * joints, sought)."""
+        last = 10 * (self.link or len(structure.arm))
+        own = observation_matrix(structure.arm, signals.motion)[:, last - 10 : last]
+        return signals.columns(own @ self.basis)
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A load: parameters (10,) about its link's frame, of a body that can exist; covariance (10, 10).
+
+    factor: from a standard error to half of a 95 % interval. The covariance is that of a fit without the condition
+    that the body can exist: on the safe side where the condition matters.
+    """
+
+    parameters: Array
+    covariance: Array
+    factor: float
+
+    @property
+    def link(self) -> Link:
+        """The load as a body."""
+        return link_of(self.parameters)
+
+    @property
+    def half_widths(self) -> Array:
+        """Half widths of the 95 % intervals of the parameters, (10,)."""
+        return np.asarray(self.factor * np.sqrt(np.maximum(np.diag(self.covariance), 0)))
+
+    @property
+    def centre(self) -> Array:
+        """Centre of mass, (3,), m in its link's frame."""
+        return np.asarray(self.parameters[1:4] / self.parameters[0])
+
+    @property
+    def centre_half_widths(self) -> Array:
+        """Half widths of the 95 % intervals of the centre of mass, (3,), m."""
+        slopes = np.column_stack([-self.centre, np.eye(3)]) / self.parameters[0]
+        spread = np.diag(slopes @ self.covariance[:4, :4] @ slopes.T)
+        return np.asarray(self.factor * np.sqrt(np.maximum(spread, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueGains:
+    """How much each joint's torque reading is too large (1.09: 9 %), with half widths of 95 % intervals; (joints,)."""
+
+    gains: Array
+    half_widths: Array
+
+
+def identify_payload(
+    structure: Structure, without: Sequence[Signals], loaded: Sequence[Signals], place: Place | None = None
+) -> Payload:
+    """The load that some runs carry, as the body that can exist and explains them best.
+
+    without: runs without it; if there are none, the arm's own links stand for them. Raises ValueError where no
+    run is loaded, or where these motions do not tell the load's parameters apart.
+    """
+    place = place or Place()
+    if not loaded:
+        raise ValueError("runs with the load are needed")
+    columns = np.vstack([place.columns(structure, each) for each in loaded])
+    data = _append_columns(_unloaded_regression(structure, without, loaded), columns)
+    _check_load_columns(data.matrix, columns.shape[1])
+    estimate = WeightedLeastSquares()(data)
+    found = uncertainty(data, estimate)
+    weighted = data.weighted(joint_weights(data, estimate.values))
+    sought = slice(len(estimate.values) - columns.shape[1], None)
+    values = nearest_physical_load(weighted, estimate.values[sought], place.basis)
+    return Payload(place.basis @ values, place.basis @ found.covariance[sought, sought] @ place.basis.T, found.factor)
+
+
+def torque_gains(
+    structure: Structure, without: Sequence[Signals], loaded: Sequence[Signals], payload: Link, link: int | None = None
+) -> TorqueGains:
+    """Gains from a load that is known, such as a weighed disc; ValueError as for `identify_payload`."""
+    joints = len(structure.arm)
+    if not without or not loaded:
+        raise ValueError("runs with the load and runs without it are needed")
+    blocks = []
+    for each in loaded:
+        torque = (Place(link).columns(structure, each) @ payload.parameters).reshape(-1, joints)
+        blocks.append((torque[:, :, None] * np.eye(joints)).reshape(-1, joints))
+    columns = np.vstack(blocks)
+    moved = np.linalg.norm(columns, axis=0) > 0  # a joint that the load never loads tells nothing of its gain
+    data = _append_columns(regression(structure, [*without, *loaded]), columns[:, moved])
+    _check_load_columns(data.matrix, int(moved.sum()))
+    estimate = WeightedLeastSquares()(data)
+    found = uncertainty(data, estimate)
+    gains, half = np.full((2, joints), np.nan)
+    gains[moved], half[moved] = estimate.values[-moved.sum() :], (found.factor * found.standard_errors)[-moved.sum() :]
+    return TorqueGains(gains, half)
+
+
+def _unloaded_regression(structure: Structure, without: Sequence[Signals], loaded: Sequence[Signals]) -> Regression:
+    """The regression of the unloaded arm over all runs: free links, or nominal ones whose torque is known."""
+    data = regression(structure, [*without, *loaded])
+    if without:
+        return data
+    known = [each.filter(_nominal_torque(structure, each.motion)).ravel() for each in loaded]
+    own = slice(len(structure.base), None)
+    return replace(data.columns(own), torque=data.torque - np.concatenate(known))
+
+
+def _nominal_torque(structure: Structure, motion: Motion) -> Array:
+    """Torque of the arm's own links, and of its rotors where the structure does not seek them."""
+    arm = structure.arm
+    sought = any(part.effect == "rotor_inertia" for part in structure.components)
+    rotors = np.zeros(len(arm)) if sought or not arm.rotor_inertia else np.array(arm.rotor_inertia)
+    return rigid_body_torque(arm, motion, arm.parameters) + motion.acceleration * rotors
+
+
+def _append_columns(data: Regression, columns: Array) -> Regression:
+    padded = np.vstack([np.zeros((len(data.torque) - len(columns), columns.shape[1])), columns])
+    return replace(data, matrix=np.hstack([data.matrix, padded]))
+
+
+def _check_load_columns(matrix: Array, count: int) -> None:
+    """Raises ValueError where the last columns depend on each other or on the others."""
+    lengths = np.linalg.norm(matrix, axis=0)
+    values = np.linalg.svd(
+        np.linalg.qr(matrix / np.where(lengths > 0, lengths, 1))[1][-count:, -count:], compute_uv=False
+    )
+    if values[-1] < MIN_SINGULAR_VALUE_SHARE:
+        raise ValueError("these motions do not tell the load's parameters apart: move more joints, and faster")
+
+
+CENTRE_NAMES = ("centre x", "centre y", "centre z")
+LOAD_POSITION_FACTOR = 2.0  # columns then lose nothing to the torque, and loads move arms slowly enough for it
+
+
+@dataclass(frozen=True)
+class PayloadSetting:
+    """What a person says of the load and the arm: see the options of the commands.
+
+    counterbalanced: the joint with a counterbalance, which a spring stands for; cutoff_hz: from the data if None.
+    """
+
+    place: Place
+    counterbalanced: int | None = None
+    cutoff_hz: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class _PayloadTask:
+    structure: Structure
+    loaded: Sequence[Signals]
+    without: Sequence[Signals]
+
+    @staticmethod
+    def of(loaded: Path, without: Path | None, setting: PayloadSetting) -> "_PayloadTask":
+        """Reads the recordings; the runs that identify take part, by one cut-off."""
+        carrying = load_recording(loaded)
+        bare = load_recording(without) if without else None
+        arm = carrying.arm
+        if bare is not None and len(bare.arm) != len(arm):
+            raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(arm)}")
+        if bare is None and arm.links is None:
+            raise InputError(f"--without is needed: the robot {arm.name} has no nominal `links` to stand for it")
+        for what, joint in (("--link", setting.place.link), ("--counterbalance", setting.counterbalanced)):
+            if joint is not None and joint > len(arm):
+                raise InputError(f"{what} {joint} should be one from 1 to {len(arm)}")
+        runs = _identification_runs(carrying), _identification_runs(bare) if bare else ()
+        cutoff = setting.cutoff_hz or max(map(suggested_cutoff, (*runs[0], *runs[1])))
+        signals = ([signals_of(run, cutoff, LOAD_POSITION_FACTOR) for run in each] for each in runs)
+        return _PayloadTask(_payload_structure(arm, setting, nominal=bare is None), *signals)
+
+
+def _identification_runs(recording: Recording) -> tuple[Run, ...]:
+    runs = recording.with_role("identify")
+    if not runs:
+        raise InputError(f"{recording.folder} has no run to identify from: give one of its runs the role identify")
+    return runs
+
+
+def _payload_structure(arm: Arm, setting: PayloadSetting, nominal: bool) -> Structure:
+    """The usual components; rotors that the nominal arm names are not sought beside its links."""
+    known = nominal and arm.rotor_inertia
+    usual = tuple(part for part in usual_components(len(arm)) if not (known and part.effect == "rotor_inertia"))
+    spring = counterbalance_groups(setting.counterbalanced)["spring"] if setting.counterbalanced else ()
+    sprung = [part.joint for part in spring]  # the spring's rest angle takes the offset in
+    taken = tuple(part for part in usual if part.effect != "torque_offset" or part.joint not in sprung)
+    return Structure(arm, (*taken, *spring)).separable()[0]
+
+
+def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -> Iterator[str]:
+    """The load of a recording, with intervals; InputError, in one line, where the recordings do not tell it."""
+    task = _PayloadTask.of(loaded, without, setting)
+    try:
+        found = identify_payload(task.structure, task.without, task.loaded, setting.place)
+    except ValueError as error:
+        raise InputError(f"{loaded}: {error}") from None
+    yield from _payload_table(found, mass_alone=setting.place.centre is not None)
+
+
+def _payload_table(found: Payload, mass_alone: bool) -> Iterator[str]:
+    rows = list(zip(PARAMETER_NAMES, found.parameters, found.half_widths, PARAMETER_UNITS, strict=True))
+    yield from (_interval_line(*row) for row in rows[: 1 if mass_alone else 10])
+    if not mass_alone and found.parameters[0] > 0:
+        yield from (
+            _interval_line(*row, "m") for row in zip(CENTRE_NAMES, found.centre, found.centre_half_widths, strict=True)
+        )
+
+
+def _interval_line(name: str, value: float, half: float, unit: str) -> str:
+    return f"{name} = {value:.4g} [{value - half:.4g}, {value + half:.4g}] {unit}"
+
+
+def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSetting) -> Iterator[str]:
+    """The gain of each joint's torque reading from a load of known mass at a known point."""
+    task = _PayloadTask.of(loaded, without, setting)
+    load = link_from_centre_of_mass(mass, np.array(setting.place.centre or (0.0, 0.0, 0.0)), np.zeros((3, 3)))
+    try:
+        found = torque_gains(task.structure, task.without, task.loaded, load, setting.place.link)
+    except ValueError as error:
+        raise InputError(f"{loaded}: {error}") from None
+    yield from _gains_table(found)
+
+
+def _gains_table(found: TorqueGains) -> Iterator[str]:
+    for joint, (gain, half) in enumerate(zip(found.gains, found.half_widths, strict=True), 1):
+        unknown = "the load does not load it" if np.isnan(gain) else ""
+        yield f"joint {joint}: {unknown}" if unknown else _interval_line(f"joint {joint}: gain", gain, half, "")

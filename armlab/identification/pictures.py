@@ -1,0 +1,39 @@
+"""Pictures of a model beside a run."""
+
+import base64
+from io import BytesIO
+
+from matplotlib.figure import Figure
+
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.differentiate import Signals
+
+FIGURE_WIDTH, ROW_HEIGHT = 11.0, 1.5  # inches
+
+
+def residual_figure(model: TorqueModel, signals: Signals) -> Figure:
+    """Recorded and predicted torque, and what is left, joint by joint."""
+    predicted, joints = model.filtered_torque(signals), len(model.arm)
+    figure = Figure((FIGURE_WIDTH, ROW_HEIGHT * joints + 0.6), layout="constrained")
+    axes = figure.subplots(joints, 2, sharex=True, squeeze=False)
+    for joint, (left, right) in enumerate(axes):
+        unit = "N m" if model.arm.joints[joint].kind == "revolute" else "N"
+        left.plot(signals.time, signals.torque[:, joint], color="0.6", linewidth=1.2, label="recorded")
+        left.plot(signals.time, predicted[:, joint], color="tab:blue", linewidth=0.8, label="model")
+        right.plot(signals.time, signals.torque[:, joint] - predicted[:, joint], color="tab:red", linewidth=0.7)
+        left.set_ylabel(f"{model.arm.joints[joint].name}\n{unit}", fontsize=8)
+    axes[0, 0].set_title(f"torque on {signals.run.name}", fontsize=9)
+    axes[0, 1].set_title("recorded - model", fontsize=9)
+    axes[0, 0].legend(fontsize=7, loc="upper right")
+    for axis in axes[-1]:
+        axis.set_xlabel("time, s", fontsize=8)
+    for axis in axes.flat:
+        axis.tick_params(labelsize=7)
+    return figure
+
+
+def png_data_url(figure: Figure) -> str:
+    """A figure as the address of an embedded picture."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=80)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

@@ -1,0 +1,68 @@
+"""How far a model's torque is from the recorded one: joint by joint, filtered and as recorded."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.differentiate import Signals
+from armlab.recordings.recording import Array
+
+
+@dataclass(frozen=True)
+class JointError:
+    """Errors of one joint, counted from 1: N m (N), percent of the torque, percent of the rated torque or None."""
+
+    joint: int
+    rms: float
+    percent: float
+    percent_rated: float | None
+
+
+@dataclass(frozen=True)
+class RunError:
+    """Errors on one run: ||tau - tau_hat|| / ||tau|| over all joints in percent, and joint by joint.
+
+    recorded_percent: against the torque without any filter.
+    """
+
+    run: str
+    role: str
+    relative_percent: float
+    recorded_percent: float
+    joints: tuple[JointError, ...]
+
+
+def run_error(model: TorqueModel, signals: Signals) -> RunError:
+    """The errors of a model on a run."""
+    left = signals.torque - model.filtered_torque(signals)
+    rows = signals.filter.rows
+    recorded = signals.run.torque[rows]
+    raw = recorded - model.torque(signals.motion, signals.run)[rows]
+    each = range(len(model.arm))
+    joints = tuple(_joint_error(model, joint, left[:, joint], signals.torque[:, joint]) for joint in each)
+    percent = relative_percent(left, signals.torque)
+    return RunError(signals.run.name, signals.run.role, percent, relative_percent(raw, recorded), joints)
+
+
+def relative_percent(error: Array, torque: Array) -> float:
+    """||error|| / ||torque||, in percent."""
+    return float(100 * np.linalg.norm(error) / max(float(np.linalg.norm(torque)), 1e-300))
+
+
+def _joint_error(model: TorqueModel, joint: int, left: Array, torque: Array) -> JointError:
+    rms = float(np.sqrt(np.mean(left**2)))
+    rated = model.arm.joints[joint].limits.torque
+    return JointError(joint + 1, rms, relative_percent(left, torque), 100 * rms / rated if np.isfinite(rated) else None)
+
+
+def error_table(errors: tuple[RunError, ...]) -> str:
+    """A table in plain text."""
+    lines = ["run                   role      joint   rms N m  % of torque  % of rated"]
+    for each in errors:
+        for joint in each.joints:
+            rated = "-" if joint.percent_rated is None else f"{joint.percent_rated:.2f}"
+            name = f"{each.run:<21} {each.role:<9}"
+            lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {joint.percent:12.2f} {rated:>11}")
+        lines.append(f"{each.run}: {each.relative_percent:.2f} % in all, {each.recorded_percent:.2f} % unfiltered")
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Recordings of real arms: format, importers, checks and repairs, filters."""

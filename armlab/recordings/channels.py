@@ -1,0 +1,151 @@
+"""From the columns of a table to joint signals: SI units, gains, gear ratios, couplings between motors, and offsets."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from armlab.common.errors import InputError
+from armlab.common.settings import suggest_name
+from armlab.recordings.recording import Array, Finding, Run, Transmission
+from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry
+from armlab.recordings.table import Table
+from armlab.recordings.units import SI_UNITS, UNITS_BY_SIGNAL, Unit, resolve_units
+from problem.arm import Arm
+
+
+def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]) -> Run:
+    """The run of a table; values may still be NaN, stamps in any order."""
+    signals = {}
+    for name, columns in file.columns.signals().items():
+        factors = np.array([unit.factor for unit in units[name]])
+        shifts = np.array([unit.shift for unit in units[name]])
+        with np.errstate(over="ignore"):
+            values = table.columns(columns, name) * factors + shifts
+        signals["torque" if name == "current" else name] = values
+    time = signals.pop("time")[:, 0]
+    return Run(entry.file, entry.role, time, findings=(*table.findings, *report_assumed_units(file)), **signals)
+
+
+def channel_units(file: RecordingFile, arm: Arm, folder: Path) -> dict[str, tuple[Unit, ...]]:
+    """Units of every signal's channels, checked against the joints that they belong to.
+
+    A signal without a unit is in SI units. Raises InputError for an unknown unit, a length where the joint
+    turns, and A or V without gains.
+    """
+    where = str(folder / FILE_NAME)
+    signals = file.columns.signals()
+    for name in file.units:
+        if name not in UNITS_BY_SIGNAL:
+            raise InputError(f"units.{name} in {where}: unknown signal: {suggest_name(name, list(UNITS_BY_SIGNAL))}")
+    units = {}
+    for name, columns in signals.items():
+        names = file.units.get(name) or _si_units(name, arm, len(columns))
+        units[name] = resolve_units(name, names, len(columns), where)
+        _check_joints(name, units[name], file, arm, where)
+    return units
+
+
+def report_assumed_units(file: RecordingFile) -> tuple[Finding, ...]:
+    """A note for each signal whose unit the file does not name."""
+    unnamed = [name for name in file.columns.signals() if name not in file.units]
+    return tuple(Finding("assumed_unit", "note", f"no unit is given for {name}: taken as SI") for name in unnamed)
+
+
+def _si_units(name: str, arm: Arm, channels: int) -> str | tuple[str, ...]:
+    """SI units of a signal: those of its joints where there is one channel a joint."""
+    turning, sliding = SI_UNITS[name]
+    if len(arm) != channels or name == "temperature":
+        return turning
+    return tuple(turning if joint.kind == "revolute" else sliding for joint in arm.joints)
+
+
+def _check_joints(name: str, units: tuple[Unit, ...], file: RecordingFile, arm: Arm, where: str) -> None:
+    drive = name in ("torque", "current")
+    if drive and any(unit.quantity in ("A", "V") for unit in units):
+        if file.gains is None:
+            raise InputError(f"units.{name} in {where} is A or V: `gains` (N.m per A or V) are missing")
+        return
+    if name in ("time", "temperature") or (drive and file.transmission.torque) or _is_mixed_by_transmission(name, file):
+        return
+    if len(units) != len(arm):
+        raise InputError(f"columns.{name} in {where} names {len(units)} columns, but the robot has {len(arm)} joints")
+    for unit, joint in zip(units, arm.joints, strict=True):
+        if _is_linear(unit) != (joint.kind == "prismatic"):
+            right = "m and N" if joint.kind == "prismatic" else "rad and N.m"
+            raise InputError(
+                f"units.{name} in {where}: {joint.name} is {joint.kind}, so {right} fit, not {unit.quantity}"
+            )
+
+
+def _is_mixed_by_transmission(name: str, file: RecordingFile) -> bool:
+    return file.transmission.position is not None and name in ("position", "velocity", "reference_position")
+
+
+def _is_linear(unit: Unit) -> bool:
+    return unit.quantity in ("m", "m/s", "N")
+
+
+def make_transmission(file: RecordingFile, arm: Arm, folder: Path) -> Transmission:
+    """The transmission of a recording file, the identity where it names none.
+
+    Raises InputError where shapes do not fit the arm and the columns.
+    """
+    where = folder / FILE_NAME
+    channels = len(file.columns.position)
+    torques = len(file.columns.torque or file.columns.current or ())
+    given = file.transmission
+    position = _make_matrix(given.position, len(arm), channels, "position", where)
+    torque = _make_matrix(given.torque, len(arm), torques, "torque", where)
+    offset = _make_vector(given.offset, 0.0, len(arm), f"transmission.offset in {where}")
+    gains = _make_vector(file.gains, 1.0, torques, f"gains in {where}")
+    return Transmission(position, offset, torque, gains)
+
+
+def _make_matrix(
+    rows: tuple[tuple[float, ...], ...] | None, joints: int, channels: int, signal: str, where: Path
+) -> Array:
+    if rows is None:
+        if channels != joints:
+            raise InputError(
+                f"columns.{signal} in {where} names {channels} columns, but the robot has {joints} joints: "
+                f"another robot, or is transmission.{signal} missing?"
+            )
+        return np.eye(joints)
+    if len(rows) != joints or any(len(row) != channels for row in rows):
+        raise InputError(f"transmission.{signal} in {where} should be {joints} rows of {channels} numbers")
+    return np.array(rows, dtype=np.float64)
+
+
+def _make_vector(values: tuple[float, ...] | None, default: float, length: int, what: str) -> Array:
+    if values is None:
+        return np.full(length, default)
+    if len(values) != length:
+        raise InputError(f"{what} should hold {length} numbers, not {len(values)}")
+    return np.array(values, dtype=np.float64)
+
+
+def to_joint_side(run: Run, transmission: Transmission) -> Run:
+    """The run with motor signals carried over to the joints.
+
+    position, velocity and reference_position go through the position matrix; link_position and the simulated
+    signals are on the joint side already.
+    """
+    to_joints = transmission.position.T
+    signals = {
+        "position": run.position @ to_joints + transmission.offset,
+        "torque": run.torque * transmission.gains @ transmission.torque.T,
+    }
+    if run.velocity is not None:
+        signals["velocity"] = run.velocity @ to_joints
+    if run.reference_position is not None:
+        signals["reference_position"] = run.reference_position @ to_joints + transmission.offset
+    return run.with_signals(run.time, signals)
+
+
+def check_rate(run: Run, nominal_hz: float | None) -> Run:
+    """A warning where the time column and the nominal rate differ; the time column decides."""
+    if nominal_hz is None or abs(run.rate_hz / nominal_hz - 1) < 0.02:
+        return run
+    text = f"time column says {run.rate_hz:.6g} Hz, sample_rate_hz says {nominal_hz:g}; the time column decides"
+    return replace(run, findings=(*run.findings, Finding("rate", "warning", text)))

@@ -1,0 +1,181 @@
+"""The check of a recording folder: repairs, refused files, and warnings about channels and geometry."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from armlab.common.errors import InputError
+from armlab.recordings.geometry_check import check_torque_fit, find_turned_zero, thin_runs
+from armlab.recordings.load import load_runs, open_recording, with_runs
+from armlab.recordings.recording import Array, Finding, Recording, Run
+from problem.arm import Arm
+
+MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
+LIMIT_TOLERANCE_FACTOR = 1.05  # times a limit: calibration and rounding aside
+MIN_SLOPE_CORRELATION = 0.9  # correlation of a velocity channel with the slope of its position
+
+
+def check_channels(run: Run, arm: Arm) -> tuple[Finding, ...]:
+    """What is suspicious in the channels of a run, joint by joint."""
+    findings: list[Finding] = []
+    for joint in range(run.joints):
+        findings += (
+            _find_dead_channels(run, joint) + _find_frozen_torque(run, joint) + _find_limit_violations(run, arm, joint)
+        )
+        findings += _check_velocity(run, joint)
+    return tuple(findings)
+
+
+def _joint_warning(kind: str, joint: int, text: str) -> list[Finding]:
+    return [Finding(kind, "warning", text, joint + 1)]
+
+
+def _find_dead_channels(run: Run, joint: int) -> list[Finding]:
+    found = []
+    for name, signal in run.signals.items():
+        if name in ("torque", "velocity") and np.ptp(signal[:, joint]) == 0:
+            found += _joint_warning("dead_channel", joint, f"{name} of joint {joint + 1} is constant: a dead channel?")
+    if np.ptp(run.position[:, joint]) == 0:
+        found += _joint_warning("still_joint", joint, f"position of joint {joint + 1} is constant: locked, or dead?")
+    return found
+
+
+def _find_frozen_torque(run: Run, joint: int) -> list[Finding]:
+    torque, position = run.torque[:, joint], run.position[:, joint]
+    longest, start = _longest_repetition(torque)
+    least = max(int(MIN_FROZEN_TIME_S * run.rate_hz), 20)
+    if longest < least or longest == run.samples:
+        return []
+    moved = np.ptp(position[start : start + longest])
+    if moved < 0.01 * np.ptp(position):
+        return []
+    where = f"{run.time[start]:.4g} s to {run.time[start + longest - 1]:.4g} s"
+    text = f"torque of joint {joint + 1} repeats one value from {where} while the joint moves: frozen channel?"
+    return _joint_warning("frozen_channel", joint, text)
+
+
+def _longest_repetition(values: Array) -> tuple[int, int]:
+    """Length and start of the longest stretch of one and the same value."""
+    starts = np.append(0, np.flatnonzero(np.diff(values) != 0) + 1)
+    lengths = np.diff(np.append(starts, len(values)))
+    longest = int(np.argmax(lengths))
+    return int(lengths[longest]), int(starts[longest])
+
+
+def _find_limit_violations(run: Run, arm: Arm, joint: int) -> list[Finding]:
+    limits = arm.joints[joint].limits
+    low, high = run.position[:, joint].min(), run.position[:, joint].max()
+    slack = (LIMIT_TOLERANCE_FACTOR - 1) * (limits.position[1] - limits.position[0])
+    found = []
+    if np.isfinite(slack) and (low < limits.position[0] - slack or high > limits.position[1] + slack):
+        text = (
+            f"position of joint {joint + 1} runs from {low:.4g} to {high:.4g}, its limits are "
+            f"{limits.position[0]:.4g} and {limits.position[1]:.4g}: another unit, zero or robot?"
+        )
+        found += _joint_warning("beyond_limits", joint, text)
+    peak = float(np.abs(run.torque[:, joint]).max())
+    if peak > LIMIT_TOLERANCE_FACTOR * limits.torque:
+        text = f"torque of joint {joint + 1} reaches {peak:.4g}, its limit is {limits.torque:.4g}: another unit?"
+        found += _joint_warning("beyond_limits", joint, text)
+    return found
+
+
+def _check_velocity(run: Run, joint: int) -> list[Finding]:
+    """Compares a velocity channel with the slope of the positions; steps of the encoder are averaged away."""
+    if run.velocity is None or np.ptp(run.velocity[:, joint]) == 0:
+        return []
+    slopes = _block_means(np.gradient(run.position, run.time, axis=0))
+    velocity = _block_means(run.velocity[:, joint : joint + 1])[:, 0]
+    likeness = np.array([_correlation(velocity, slope) for slope in slopes.T])
+    if likeness[joint] >= MIN_SLOPE_CORRELATION or np.ptp(slopes[:, joint]) == 0:
+        return (
+            _check_velocity_scale(velocity, slopes[:, joint], joint) if likeness[joint] >= MIN_SLOPE_CORRELATION else []
+        )
+    best = int(np.argmax(np.abs(likeness)))
+    if abs(likeness[best]) < MIN_SLOPE_CORRELATION:
+        text = f"velocity of joint {joint + 1} does not follow its position (correlation {likeness[joint]:.2f})"
+    elif best == joint:
+        text = f"velocity of joint {joint + 1} has the opposite sign of its position's slope"
+    else:
+        text = f"velocity of joint {joint + 1} follows the position of joint {best + 1}: swapped channels?"
+    return _joint_warning("velocity_mismatch", joint, text)
+
+
+def _check_velocity_scale(velocity: Array, slope: Array, joint: int) -> list[Finding]:
+    scale = float(velocity @ slope / (slope @ slope))
+    if 0.9 < scale < 1.1:
+        return []
+    text = f"velocity of joint {joint + 1} is {scale:.4g} times its position's slope: another unit or gear?"
+    return _joint_warning("velocity_mismatch", joint, text)
+
+
+def _block_means(signal: Array) -> Array:
+    """Means over stretches of about a hundredth of the run."""
+    length = max(len(signal) // 100, 1)
+    whole = len(signal) // length * length
+    return np.asarray(signal[:whole].reshape(-1, length, signal.shape[1]).mean(axis=1))
+
+
+def _correlation(first: Array, second: Array) -> float:
+    first, second = first - first.mean(), second - second.mean()
+    scale = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / scale if scale > 0 else 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class CheckResult:
+    """A recording with the runs that could be read, and what was found.
+
+    findings: by the name of the run, "all runs" for those of the whole recording. refused: why a file could not
+    be read, by its name.
+    """
+
+    recording: Recording
+    findings: tuple[tuple[str, Finding], ...]
+    refused: tuple[tuple[str, str], ...]
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """One line a finding, as the terminal shows them."""
+        found = [f"{run}: {finding.severity}: {finding.text}" for run, finding in self.findings]
+        return (*(f"{file}: refused: {reason}" for file, reason in self.refused), *found)
+
+
+def check_recording(folder: Path) -> CheckResult:
+    """Reads and examines a recording; a run that cannot be used is reported beside the others.
+
+    Raises InputError where `recording.yaml` or the robot file is wrong.
+    """
+    recording, file = open_recording(folder)
+    runs: list[Run] = []
+    refused: list[tuple[str, str]] = []
+    for entry in file.runs:
+        try:
+            runs.extend(load_runs(recording, file, entry))
+        except InputError as error:
+            refused.append((entry.file, str(error)))
+    recording = with_runs(recording, runs)
+    return CheckResult(recording, tuple(_collect_findings(recording)), tuple(refused))
+
+
+def _collect_findings(recording: Recording) -> Iterator[tuple[str, Finding]]:
+    said: set[tuple[str, Finding]] = set()  # what was found before a file was cut stands at each of its parts
+    for run in recording.runs:
+        yield from ((run.name, finding) for finding in run.findings if (run.file, finding) not in said)
+        said.update((run.file, finding) for finding in run.findings)
+        yield from ((run.name, finding) for finding in check_channels(run, recording.arm))
+    whole = recording.findings
+    if recording.runs:
+        whole = (*whole, *_check_geometry(recording))
+    yield from (("all runs", finding) for finding in whole)
+
+
+def _check_geometry(recording: Recording) -> tuple[Finding, ...]:
+    """What the torques say of channels, robot and zeros."""
+    found = check_torque_fit(recording.runs, recording.arm)
+    if any(finding.kind == "swapped_channels" for finding in found):
+        return found
+    zero = find_turned_zero(recording.arm, thin_runs(recording.runs))
+    return (*found, zero) if zero else found

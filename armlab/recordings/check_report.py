@@ -1,0 +1,191 @@
+"""The HTML page of `armlab recording check`: findings first, then each run with its pictures."""
+
+import base64
+from collections.abc import Iterator
+from html import escape
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
+
+from armlab.common.errors import InputError
+from armlab.recordings.check import CheckResult
+from armlab.recordings.cutoff import CutoffChoice
+from armlab.recordings.differentiate import Signals, differentiate
+from armlab.recordings.recording import ROLES, Array, Recording, Run
+from problem.arm import Arm
+
+FIGURE_WIDTH_IN, ROW_HEIGHT_IN = 11.0, 1.5  # inches
+RAW_COLOR, FILTERED_COLOR = "0.72", "tab:blue"
+
+
+def encode_png(figure: Figure) -> str:
+    """A figure as the address of an embedded picture."""
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png", dpi=90)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+
+
+def draw_signals(signals: Signals, arm: Arm) -> Figure:
+    """Position and torque of each joint over time, as recorded and filtered."""
+    run = signals.run
+    figure = Figure((FIGURE_WIDTH_IN, ROW_HEIGHT_IN * run.joints + 0.6), layout="constrained")
+    axes = figure.subplots(run.joints, 2, sharex=True, squeeze=False)
+    for joint, (left, right) in enumerate(axes):
+        length, force = ("rad", "N m") if arm.joints[joint].kind == "revolute" else ("m", "N")
+        left.plot(run.time, run.position[:, joint], color=FILTERED_COLOR, linewidth=1)
+        right.plot(run.time, run.torque[:, joint], color=RAW_COLOR, linewidth=0.8, label="recorded")
+        right.plot(signals.time, signals.torque[:, joint], color=FILTERED_COLOR, linewidth=1, label="filtered")
+        left.set_ylabel(f"{arm.joints[joint].name}\n{length}", fontsize=8)
+        right.set_ylabel(force, fontsize=8)
+        _show_limits(left, arm.joints[joint].limits.position, run.position[:, joint])
+    axes[0, 0].set_title("position", fontsize=9)
+    axes[0, 1].set_title("torque", fontsize=9)
+    axes[0, 1].legend(fontsize=7, loc="upper right")
+    for axis in axes[-1]:
+        axis.set_xlabel("time, s", fontsize=8)
+    _shrink_labels(axes)
+    return figure
+
+
+def _show_limits(axis: Axes, limits: tuple[float, float], position: Array) -> None:
+    """Draws a limit that the position comes near to or passes."""
+    span = float(np.ptp(position)) or 1.0
+    for limit in limits:
+        if position.min() - span / 4 < limit < position.max() + span / 4:
+            axis.axhline(limit, color="tab:red", linewidth=0.8, linestyle="--")
+
+
+def draw_stamps(run: Run) -> Figure:
+    """Steps between the stamps of a run, as they are after the repairs."""
+    figure = Figure((FIGURE_WIDTH_IN / 2, 2.4), layout="constrained")
+    axis = figure.subplots()
+    axis.plot(run.time[1:], 1e3 * np.diff(run.time), ".", markersize=2, color=FILTERED_COLOR)
+    axis.set(xlabel="time, s", ylabel="step, ms", title="time between samples")
+    axis.set_ylim(bottom=0)
+    _shrink_labels(np.array([axis]))
+    return figure
+
+
+def draw_cutoff(choice: CutoffChoice, arm: Arm) -> Figure:
+    """Spectra of the accelerations with their noise, and the estimated error over the cut-off."""
+    figure = Figure((FIGURE_WIDTH_IN, 2.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    inside = choice.frequency_hz > 0
+    for joint in range(choice.spectrum.shape[1]):
+        color = f"C{joint % 10}"
+        spectrum = _smooth_spectrum(choice.spectrum[inside, joint])
+        left.loglog(choice.frequency_hz[inside], spectrum, color=color, linewidth=0.8, label=arm.joints[joint].name)
+        left.loglog(choice.frequency_hz[inside], choice.noise[inside, joint], ":", color=color, linewidth=0.8)
+    left.set(
+        xlabel="frequency, Hz", ylabel="power of acceleration", title="acceleration (solid), encoder noise (dotted)"
+    )
+    right.loglog(choice.candidates_hz, np.maximum(choice.risk, 1e-12), color="black", linewidth=1)
+    right.set(xlabel="cut-off, Hz", ylabel="estimated error", title=f"cut-off {choice.cutoff_hz:.3g} Hz")
+    for axis in (left, right):
+        axis.xaxis.set_minor_formatter(NullFormatter())
+        axis.yaxis.set_minor_formatter(NullFormatter())
+        axis.axvline(choice.cutoff_hz, color="tab:red", linewidth=1)
+    left.legend(fontsize=6, ncols=2)
+    _shrink_labels(np.array([left, right]))
+    return figure
+
+
+def _smooth_spectrum(spectrum: Array) -> Array:
+    """Running mean over nine frequencies, so that the picture shows levels rather than scatter."""
+    if len(spectrum) < 9:
+        return np.maximum(spectrum, 1e-30)
+    return np.maximum(np.convolve(spectrum, np.ones(9) / 9, mode="same"), 1e-30)
+
+
+def _shrink_labels(axes: np.ndarray) -> None:
+    for axis in axes.flat:
+        axis.tick_params(labelsize=7)
+        axis.title.set_fontsize(9)
+        axis.xaxis.label.set_fontsize(8)
+        axis.yaxis.label.set_fontsize(8)
+        axis.grid(alpha=0.25)
+
+
+STYLE = """
+body { font: 15px/1.45 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222; }
+h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; width: 100%; } th, td { text-align: left; padding: 4px 10px; vertical-align: top; }
+th { border-bottom: 2px solid #888; } td { border-bottom: 1px solid #e4e4e4; }
+img { max-width: 100%; display: block; margin: 0.6em 0; }
+.refused { color: #b00020; font-weight: 600; } .warning { color: #a85400; font-weight: 600; }
+td:nth-child(2) { white-space: nowrap; }
+.repaired { color: #00589b; } .note { color: #666; }
+"""
+
+
+def write_check_page(check: CheckResult, path: Path) -> Path:
+    """Writes the page of a check and returns its path; InputError where it cannot be written."""
+    body = "".join(_render_body(check))
+    name = escape(check.recording.name)
+    head = (
+        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name}</title><style>{STYLE}</style></head>'
+    )
+    try:
+        path.write_text(f"{head}<body>{body}</body></html>\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    return path
+
+
+def _render_body(check: CheckResult) -> Iterator[str]:
+    recording = check.recording
+    yield f"<h1>Recording {escape(recording.name)}</h1><p>{escape(_summarize_recording(recording))}</p>"
+    yield "<h2>Findings</h2>"
+    yield _render_findings(check)
+    for run in recording.runs:
+        yield from _render_run(run, recording)
+
+
+def _summarize_recording(recording: Recording) -> str:
+    roles = [f"{len(recording.with_role(role))} to {role}" for role in ROLES]
+    seconds = sum(run.time[-1] - run.time[0] for run in recording.runs)
+    arm = recording.arm
+    nominal = "with" if arm.links is not None else "without"
+    return (
+        f"Robot {arm.name}, {len(arm)} joint(s), {nominal} nominal inertial parameters. "
+        f"{len(recording.runs)} run(s), {seconds:.3g} s: {', '.join(roles)}."
+    )
+
+
+def _render_findings(check: CheckResult) -> str:
+    rows = [("refused", file, "", reason) for file, reason in check.refused]
+    for run, finding in check.findings:
+        rows.append((finding.severity, run, str(finding.joint or ""), finding.text))
+    if not rows:
+        return "<p>Nothing was repaired and nothing looks wrong.</p>"
+    order = ("refused", "warning", "repaired", "note")
+    rows.sort(key=lambda row: order.index(row[0]))
+    cells = "".join(
+        f'<tr><td class="{kind}">{kind}</td><td>{escape(run)}</td><td>{joint}</td><td>{escape(text)}</td></tr>'
+        for kind, run, joint, text in rows
+    )
+    return f"<table><tr><th></th><th>run</th><th>joint</th><th>what</th></tr>{cells}</table>"
+
+
+def _render_run(run: Run, recording: Recording) -> Iterator[str]:
+    signals = differentiate(run)
+    yield f"<h2>{escape(run.name)} ({run.role})</h2>"
+    yield f"<p>{run.samples} samples at {run.rate_hz:.5g} Hz, {run.time[-1] - run.time[0]:.4g} s.</p>"
+    yield _embed_picture(encode_png(draw_signals(signals, recording.arm)), f"position and torque of {run.name}")
+    if signals.cutoff is not None:
+        choice = signals.cutoff
+        yield (
+            f"<p>Cut-off {choice.cutoff_hz:.3g} Hz: the least estimated error of the acceleration, at most ten times "
+            f"the bandwidth of the motion ({choice.motion_hz:.2g} Hz).</p>"
+        )
+        yield _embed_picture(encode_png(draw_cutoff(choice, recording.arm)), f"choice of the cut-off for {run.name}")
+    if not run.even:
+        yield _embed_picture(encode_png(draw_stamps(run)), f"time between the samples of {run.name}")
+
+
+def _embed_picture(address: str, text: str) -> str:
+    return f'<img alt="{escape(text)}" src="{address}">'

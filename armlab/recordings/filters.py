@@ -1,0 +1,130 @@
+"""Filters without phase shift that treat the torque and the columns of a regressor alike.
+
+A low-pass rounds the jump of sign(velocity) at a reversal. A column that did not pass the filter of the torque
+differs from it there, and a fit takes the difference for physics. Therefore one object filters both.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from scipy.linalg import solveh_banded
+from scipy.signal import butter, sosfilt, sosfilt_zi
+
+from armlab.recordings.recording import Array
+
+BUTTERWORTH_ORDER = 4  # of the Butterworth filter each way
+
+
+class Filter(ABC):
+    """Smooths along the first axis, then keeps the rows that are worth keeping."""
+
+    @property
+    @abstractmethod
+    def rows(self) -> slice:
+        """The rows that are kept after smoothing."""
+
+    @abstractmethod
+    def smooth(self, signal: Array) -> Array:
+        """The smoothed signal, (samples, ...), all rows."""
+
+    def __call__(self, signal: Array) -> Array:
+        """The smoothed signal, rows near the ends left out and thinned: (kept, ...)."""
+        return self.smooth(signal)[self.rows]
+
+
+@dataclass(frozen=True)
+class LowPass(Filter):
+    """A low-pass with half gain at `cutoff_hz`; keeps each `step`-th row but `trim` rows at both ends."""
+
+    rate_hz: float
+    cutoff_hz: float
+    samples: int
+    step: int = 1
+
+    def __post_init__(self) -> None:
+        """Raises ValueError for a cut-off that the sampling rate cannot carry."""
+        if not 0 < self.cutoff_hz < self.rate_hz / 2:
+            limit = self.rate_hz / 2
+            raise ValueError(f"cut-off {self.cutoff_hz:g} Hz should lie between 0 and half the rate, {limit:g} Hz")
+
+    @property
+    def trim(self) -> int:
+        """Rows at each end that the end of the recording disturbs: two periods of the cut-off."""
+        return min(int(np.ceil(2 * self.rate_hz / self.cutoff_hz)), self.samples // 10)
+
+    @property
+    def rows(self) -> slice:
+        """The rows that are kept."""
+        return slice(self.trim, self.samples - self.trim, self.step)
+
+    @abstractmethod
+    def response(self, frequency_hz: Array) -> Array:
+        """Gain at each frequency, between 0 and 1."""
+
+
+@dataclass(frozen=True)
+class Butterworth(LowPass):
+    """Butterworth filter run forwards and backwards (Gustafsson 1996 for the ends: odd extension here)."""
+
+    def smooth(self, signal: Array) -> Array:
+        """The smoothed signal, (samples, ...)."""
+        sections, settled = _butterworth_sections(self.cutoff_hz, self.rate_hz)
+        padding = min(int(np.ceil(3 * self.rate_hz / self.cutoff_hz)), len(signal) - 1)
+        columns = signal.reshape(len(signal), -1).T
+        before, after = (
+            2 * columns[:, :1] - columns[:, padding:0:-1],
+            2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1],
+        )
+        passed = np.concatenate([before, columns, after], axis=1)
+        for _ in range(2):  # scipy's sosfiltfilt, which finds the settled state anew at each call
+            passed = sosfilt(sections, passed, zi=settled[:, None] * passed[:, :1])[0][:, ::-1]
+        return passed[:, padding : passed.shape[1] - padding].T.reshape(signal.shape)
+
+    def response(self, frequency_hz: Array) -> Array:
+        """Gain at each frequency: the squared one of a single pass, by the bilinear transform."""
+        ratio = np.tan(np.pi * frequency_hz / self.rate_hz) / np.tan(np.pi * self.cutoff_hz / self.rate_hz)
+        return np.asarray(1 / (1 + ratio ** (2 * BUTTERWORTH_ORDER)))
+
+
+@lru_cache(maxsize=64)
+def _butterworth_sections(cutoff_hz: float, rate_hz: float) -> tuple[Array, Array]:
+    """Second-order sections and their settled state; kept, for a diagnosis filters thousands of columns alike."""
+    sections = np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"))
+    return sections, np.asarray(sosfilt_zi(sections))
+
+
+@dataclass(frozen=True)
+class SmoothingSpline(LowPass):
+    """Cubic smoothing spline on even knots (Reinsch 1967): gain 1 / (1 + penalty frequency^4)."""
+
+    def smooth(self, signal: Array) -> Array:
+        """Values of the spline at the samples, (samples, ...).
+
+        With Q the second differences and R their Gram matrix of hat functions, (R + penalty Q'Q) gamma = Q' y
+        gives the second derivatives gamma, and y - penalty Q gamma the values.
+        """
+        values = signal.reshape(len(signal), -1)
+        count = len(signal) - 2
+        bands = np.empty((3, count))
+        bands[0], bands[1], bands[2] = self.penalty, 1 / 6 - 4 * self.penalty, 2 / 3 + 6 * self.penalty
+        curvature = solveh_banded(bands, np.diff(values, n=2, axis=0))
+        padded = np.zeros((count + 4, values.shape[1]))
+        padded[2:-2] = curvature
+        return np.asarray(values - self.penalty * np.diff(padded, n=2, axis=0)).reshape(signal.shape)
+
+    @property
+    def penalty(self) -> float:
+        """Weight of the squared second derivative, with the sample as the unit of time."""
+        return float(1 / _roughness(np.array(self.cutoff_hz / self.rate_hz)))
+
+    def response(self, frequency_hz: Array) -> Array:
+        """Gain at each frequency, far from the ends."""
+        return np.asarray(1 / (1 + self.penalty * _roughness(frequency_hz / self.rate_hz)))
+
+
+def _roughness(cycles: Array) -> Array:
+    """|Q|^2 / R at a frequency in cycles per sample."""
+    cosine = np.cos(2 * np.pi * cycles)
+    return np.asarray((2 - 2 * cosine) ** 2 / ((2 + cosine) / 3))

@@ -1,0 +1,143 @@
+"""CSV files of any layout: any separator, decimal comma, rows of units, comments, with or without a header."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from armlab.common.errors import InputError
+from armlab.recordings.recording import Array
+from armlab.recordings.table import Table, drop_broken_last_row, parse_numbers, read_text, split_rows
+
+SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}
+DECIMALS = (".", ",")
+COMMENT_START = re.compile(r"^\s*[#%!]+\s*")
+SAMPLE_LINES = 200
+MIN_DATA_ROWS = 2
+NumberedRows = list[tuple[int, list[str]]]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is written: cell separator and decimal sign."""
+
+    separator: str
+    decimal: str
+
+    def __str__(self) -> str:
+        """In words."""
+        return f"separator {SEPARATORS.get(self.separator, self.separator)}, decimal '{self.decimal}'"
+
+
+@dataclass(frozen=True, eq=False)
+class TextTable:
+    """A table with what else the file said: its layout, and the unit of each column where it names one."""
+
+    table: Table
+    layout: Layout
+    units: dict[str, str]
+
+
+def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None = None) -> TextTable:
+    """The columns of a text file with numbers; without a header they are called c1, c2, ...
+
+    separator, decimal: found in the file if left out. Raises InputError for a file without rows of numbers, and
+    for rows of different length before the last.
+    """
+    text = read_text(path)
+    layout = find_layout(text, separator, decimal, path)
+    rows = _split_lines(text, layout, str(path))
+    first = next((index for index, (_, cells) in enumerate(rows) if _is_data(cells, layout)), len(rows))
+    body = rows[first:]
+    if len(body) < MIN_DATA_ROWS:
+        raise InputError(f"{path} holds no rows of numbers with {layout}; give --separator and --decimal")
+    width = len(body[0][1])
+    names, units = _parse_header([cells for _, cells in rows[:first] if len(cells) == width], width)
+    body, findings = drop_broken_last_row(body, width, text, str(path))
+    values = np.array([_parse_cells(cells, layout) for _, cells in body]).reshape(len(body), width)
+    table = Table(path.name, names, values, np.array([line for line, _ in body], dtype=np.intp), findings)
+    return TextTable(table, layout, units)
+
+
+def find_layout(text: str, separator: str | None, decimal: str | None, path: Path) -> Layout:
+    """The layout in which most lines are numbers, in equal rows; InputError where none fits."""
+    sample = "\n".join(text.splitlines()[:SAMPLE_LINES])
+    tried = product([separator] if separator else SEPARATORS, [decimal] if decimal else DECIMALS)
+    layouts = [Layout(*pair) for pair in tried if pair[0] != pair[1] or separator]
+    best = max(layouts, key=lambda layout: _score_layout(sample, layout))
+    if _score_layout(sample, best) < MIN_DATA_ROWS:
+        raise InputError(f"{path} holds no rows of numbers that could be recognised; give --separator and --decimal")
+    return best
+
+
+def _score_layout(sample: str, layout: Layout) -> float:
+    """Rows of numbers of the most frequent width; more columns decide between equals."""
+    widths = [len(cells) for _, cells in _split_lines(sample, layout, "") if _is_data(cells, layout)]
+    if not widths:
+        return 0.0
+    common = max(set(widths), key=widths.count)
+    return widths.count(common) + common / (common + 1) if common > 1 else 0.0
+
+
+def _split_lines(text: str, layout: Layout, where: str) -> NumberedRows:
+    lines = text.splitlines()
+    comments = {number for number, line in enumerate(lines, 1) if COMMENT_START.match(line)}
+    bare = "\n".join(COMMENT_START.sub("", line) for line in lines)
+    if layout.separator == " ":
+        bare = "\n".join(re.sub(r"[ \t]+", " ", line.strip()) for line in bare.split("\n"))
+    rows = split_rows(bare, layout.separator, where)
+    return [
+        (line, _drop_empty_last_cell(cells))
+        for line, cells in rows
+        if not (line in comments and _is_data(cells, layout))  # numbers in a comment are no measurement
+    ]
+
+
+def _drop_empty_last_cell(cells: list[str]) -> list[str]:
+    """A separator at the end of a line opens no cell."""
+    return cells[:-1] if len(cells) > 1 and not cells[-1].strip() else cells
+
+
+def _is_data(cells: list[str], layout: Layout) -> bool:
+    return not np.isnan(_parse_cells(cells, layout)).any()
+
+
+def _parse_cells(cells: list[str], layout: Layout) -> Array:
+    point = cells if layout.decimal == "." else [_to_decimal_point(cell) for cell in cells]
+    return np.array(parse_numbers(point))
+
+
+def _to_decimal_point(cell: str) -> str:
+    """A number with a decimal comma; one with a point is none then (a thousands separator?)."""
+    return cell.replace(",", ".") if "." not in cell else "not a number"
+
+
+def _parse_header(lines: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Names and units from the rows above the numbers: `q1 [deg]`, or a row of units below the names."""
+    if not lines:
+        return tuple(f"c{column + 1}" for column in range(width)), {}
+    names, units = zip(*(_split_unit(cell) for cell in lines[0]), strict=True)
+    below = [_strip_brackets(cell) for cell in lines[1]] if len(lines) > 1 else [""] * width
+    unique = tuple(_make_unique(names))
+    return unique, {
+        name: unit or lower for name, unit, lower in zip(unique, units, below, strict=True) if unit or lower
+    }
+
+
+def _split_unit(cell: str) -> tuple[str, str]:
+    match = re.fullmatch(r"\s*(.*?)\s*[\[({]([^\[\](){}]*)[\])}]\s*", cell)
+    return (match[1], _strip_brackets(match[2])) if match and match[1] else (cell.strip(), "")
+
+
+def _strip_brackets(cell: str) -> str:
+    return cell.strip(" \t[](){}")
+
+
+def _make_unique(names: tuple[str, ...]) -> Iterator[str]:
+    """Names that differ: an empty one or a repeated one gets its column number."""
+    for column, name in enumerate(names):
+        repeated = name in names[:column]
+        yield f"{name}_c{column + 1}" if repeated and name else name or f"c{column + 1}"

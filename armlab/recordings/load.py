@@ -1,0 +1,70 @@
+"""From a recording folder to a `Recording`: read, repaired where safe, in SI units on the joint side."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.recordings.channels import channel_units, check_rate, make_raw_run, make_transmission, to_joint_side
+from armlab.recordings.recording import Finding, Recording, Run
+from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, read_recording_file
+from armlab.recordings.repair import (
+    drop_bad_rows,
+    drop_duplicate_rows,
+    fill_optional_signals,
+    sort_rows,
+    split_at_gaps,
+    unwrap_encoders,
+)
+from armlab.recordings.stamps import repair_stamps
+from armlab.recordings.table import read_table
+from problem.robot_file import load_arm
+
+
+def load_recording(folder: str | Path) -> Recording:
+    """The recording in a folder, SI units on the joint side; what was repaired is noted at each run.
+
+    Raises InputError, in one line, for what is missing, wrong, or not safe to repair.
+    """
+    empty, file = open_recording(Path(folder))
+    runs = [run for entry in file.runs for run in load_runs(empty, file, entry)]
+    return with_runs(empty, runs)
+
+
+def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
+    """The recording without its runs, and the file that lists them; InputError where the file is wrong."""
+    file = read_recording_file(folder)
+    arm = load_arm(file.robot, folder)
+    transmission = make_transmission(file, arm, folder)
+    simulation = folder / file.simulation if file.simulation else None
+    if simulation and not simulation.is_file():
+        raise InputError(f"no file {simulation}, which `simulation` in {folder / FILE_NAME} names")
+    return Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz), file
+
+
+def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tuple[Run, ...]:
+    """The run of one file: several where its clock steps back or pauses."""
+    units = channel_units(file, recording.arm, recording.folder)
+    table = read_table(recording.folder / entry.file)
+    names = file.columns.signals()
+    names["torque"] = file.columns.torque or file.columns.current or ()
+    run = drop_bad_rows(make_raw_run(table, file, entry, units), table.row_numbers, names)
+    run = fill_optional_signals(drop_duplicate_rows(sort_rows(run)))
+    angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in units.items()}
+    sound = (unwrap_encoders(repair_stamps(part), angles) for part in split_at_gaps(run))
+    joints = (to_joint_side(part, recording.transmission) for part in sound)
+    return tuple(check_rate(part, file.sample_rate_hz) for part in joints)
+
+
+def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
+    """The recording with its runs; notes where they differ in rate, or where none validates."""
+    findings = []
+    rates = {run.name: run.rate_hz for run in runs}
+    if rates and max(rates.values()) > 1.02 * min(rates.values()):
+        listed = ", ".join(f"{name} {rate:.5g} Hz" for name, rate in rates.items())
+        text = f"runs of different rate ({listed}); each is filtered at its own"
+        findings.append(Finding("different_rates", "note", text))
+    if not any(run.role == "validate" for run in runs):
+        text = "no run validates: blocks of time will have to be held out of the runs that identify"
+        findings.append(Finding("no_validation", "note", text))
+    return replace(recording, runs=tuple(runs), findings=tuple(findings))

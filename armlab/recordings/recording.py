@@ -1,0 +1,158 @@
+"""A recording: an arm, its runs in SI units on the joint side, and the findings about them."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from problem.arm import Arm
+
+Array = NDArray[np.float64]
+Role = Literal["identify", "validate"]
+ROLES: tuple[Role, ...] = ("identify", "validate")
+SIGNALS = (
+    "position",
+    "torque",
+    "velocity",
+    "temperature",
+    "link_position",
+    "reference_position",
+    "simulated_torque",
+    "simulated_position",
+)
+EVEN_TOLERANCE = 1e-6  # of a sample: stamps this close to an even grid count as even (they are rounded in the file)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something that a person should know about a recording, in one line.
+
+    kind: a short name like `time_jitter`. severity: `repaired` where the data were changed, `warning` where
+    they were left as they are, `note` where there is nothing to do. joint: from 1, if it concerns one.
+    """
+
+    kind: str
+    severity: Literal["repaired", "warning", "note"]
+    text: str
+    joint: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run, SI units, on the joint side of the transmission.
+
+    time: (samples,), s, strictly increasing. position, torque: (samples, joints), rad and N m (m and N for
+    prismatic joints). The other signals are None where they were not recorded; a column of NaN in one of them
+    is a joint without that sensor. temperature: (samples, sensors), degrees Celsius.
+    file: name of its file; part: from 1 where one file was cut into several runs, else 0.
+    """
+
+    file: str
+    role: Role
+    time: Array
+    position: Array
+    torque: Array
+    velocity: Array | None = None
+    temperature: Array | None = None
+    link_position: Array | None = None
+    reference_position: Array | None = None
+    simulated_torque: Array | None = None
+    simulated_position: Array | None = None
+    part: int = 0
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The file, and which part of it."""
+        return f"{self.file} part {self.part}" if self.part else self.file
+
+    @property
+    def samples(self) -> int:
+        """Number of instants."""
+        return len(self.time)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return int(self.position.shape[1])
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples per second: one over the median step."""
+        return float(1 / np.median(np.diff(self.time)))
+
+    @property
+    def even(self) -> bool:
+        """True if the stamps stand on an even grid, as filters need them."""
+        grid = np.linspace(self.time[0], self.time[-1], self.samples)
+        step = (self.time[-1] - self.time[0]) / (self.samples - 1)
+        # a stamp cannot be rounded more finely than its floating-point number
+        tolerance = max(EVEN_TOLERANCE * step, 4 * float(np.spacing(np.abs(self.time).max())))
+        return bool(np.abs(self.time - grid).max() <= tolerance)
+
+    @property
+    def repairs(self) -> tuple[Finding, ...]:
+        """The findings that changed data."""
+        return tuple(finding for finding in self.findings if finding.severity == "repaired")
+
+    @property
+    def signals(self) -> dict[str, Array]:
+        """The recorded signals by name, time aside."""
+        recorded = {name: getattr(self, name) for name in SIGNALS}
+        return {name: signal for name, signal in recorded.items() if signal is not None}
+
+    def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Run":
+        """The same run with only the chosen rows, or with rows in another order."""
+        return self.with_signals(self.time[chosen], {name: signal[chosen] for name, signal in self.signals.items()})
+
+    def with_signals(self, time: Array, signals: dict[str, Array]) -> "Run":
+        """The same run with other stamps and other values for the named signals."""
+        changed: dict[str, Any] = {"time": time, **signals}
+        return replace(self, **changed)
+
+    def with_findings(self, *findings: Finding) -> "Run":
+        """The same run with more findings."""
+        return replace(self, findings=(*self.findings, *findings))
+
+
+@dataclass(frozen=True, eq=False)
+class Transmission:
+    """How raw channels become joint signals: q = position @ raw + offset, tau = torque @ (gains * raw).
+
+    position, torque: (joints, channels). offset: (joints,), rad (m). gains: (channels,), N m (N) per A or V,
+    ones where the torque itself was recorded. Every run has passed it already: kept to know, not to use.
+    """
+
+    position: Array
+    offset: Array
+    torque: Array
+    gains: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What `recording.yaml` and its runs hold, in SI units on the joint side.
+
+    robot: as the file names it (a path beside it or a built-in name). simulation: the model to compare with,
+    None where the file names none. findings: those that concern more than one run.
+    """
+
+    folder: Path
+    robot: str
+    arm: Arm
+    runs: tuple[Run, ...]
+    transmission: Transmission
+    simulation: Path | None = None
+    sample_rate_hz: float | None = None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Name of the folder."""
+        return self.folder.resolve().name
+
+    def with_role(self, role: Role) -> tuple[Run, ...]:
+        """The runs that identify, or those that validate."""
+        return tuple(run for run in self.runs if run.role == role)

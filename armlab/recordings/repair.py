@@ -1,0 +1,173 @@
+"""Safe repairs of a run: bad rows, missing cells, the order of rows, gaps of the clock, and encoders that wrap around.
+
+Each repair reports what it changed. What cannot be repaired safely raises InputError.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.errors import InputError
+from armlab.recordings.recording import Array, Finding, Run
+
+MAX_PLAUSIBLE_VALUE = 1e9  # no arm moves, pulls or lasts this much in SI units
+MAX_BAD_ROW_SHARE = 0.05  # more bad rows than this, and the file is broken rather than a few rows
+REQUIRED_SIGNALS = ("position", "torque")
+MAX_SHORT_GAP = 5.0  # samples: over a shorter gap of a well sampled motion, interpolation is safe
+MIN_RUN_SAMPLES = 50  # samples: a shorter part tells nothing
+
+
+def drop_bad_rows(run: Run, rows: NDArray[np.intp], names: dict[str, tuple[str, ...]]) -> Run:
+    """Leaves out rows whose time, position or torque is no number, infinite or absurdly large.
+
+    rows: (samples,), where each stands in the file. names: of the columns of each signal, for the message.
+    Raises InputError where more than a few rows are bad.
+    """
+    wrong = {name: ~_is_plausible(signal) for name, signal in _required_signals(run).items()}
+    bad = np.any([flags.any(axis=1) for flags in wrong.values()], axis=0)
+    if not bad.any():
+        return run
+    row = int(np.flatnonzero(bad)[0])
+    signal, column = next((name, int(np.argmax(wrong[name][row]))) for name in wrong if wrong[name][row].any())
+    value = _required_signals(run)[signal][row, column]
+    example = f"line {rows[row]}: {names[signal][column]} = {value:g}"
+    text = f"{bad.sum()} of {len(bad)} rows hold what is no measurement ({example})"
+    if bad.sum() > max(1, MAX_BAD_ROW_SHARE * len(bad)):
+        raise InputError(f"{run.file}: {text}: too many to repair; export the run again")
+    return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
+
+
+def _required_signals(run: Run) -> dict[str, Array]:
+    return {"time": run.time[:, None], **{name: run.signals[name] for name in REQUIRED_SIGNALS}}
+
+
+def _is_plausible(values: Array) -> NDArray[np.bool_]:
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(values) < MAX_PLAUSIBLE_VALUE)
+
+
+def fill_optional_signals(run: Run) -> Run:
+    """Bridges cells that are missing in the optional signals by straight lines; empty columns stay empty."""
+    for name, signal in run.signals.items():
+        if name in REQUIRED_SIGNALS:
+            continue
+        good = _is_plausible(signal)
+        torn = good.any(axis=0) & ~good.all(axis=0)
+        empty = ~good.any(axis=0) & ~np.isnan(signal).all(axis=0)
+        if not (torn.any() or empty.any()):
+            continue
+        filled = np.where(good, signal, np.nan)
+        for column in np.flatnonzero(torn):
+            there = good[:, column]
+            filled[:, column] = np.interp(run.time, run.time[there], signal[there, column])
+        text = f"{(~good[:, torn | empty]).sum()} cells of {name} hold no number; filled by straight lines"
+        run = run.with_signals(run.time, {name: filled}).with_findings(Finding("bad_value", "repaired", text))
+    return run
+
+
+def drop_duplicate_rows(run: Run) -> Run:
+    """Leaves out rows that repeat the row before to the last digit."""
+    table = np.column_stack([run.time, *run.signals.values()])
+    same = np.append(False, np.all((table[1:] == table[:-1]) | np.isnan(table[1:]), axis=1))
+    if not same.any():
+        return run
+    text = f"{same.sum()} rows repeat the row before (first at {run.time[same][0]:g} s); left out"
+    return run.rows(~same).with_findings(Finding("duplicate_row", "repaired", text))
+
+
+def sort_rows(run: Run) -> Run:
+    """Sorts rows that stand in the wrong order, where the sorted stamps leave no doubt.
+
+    A clock that stepped back overlaps with what was before: then the rows stay, and the run is cut there.
+    """
+    backwards = int(np.sum(np.diff(run.time) < 0))
+    if not backwards:
+        return run
+    order = np.argsort(run.time, kind="stable")
+    steps = np.diff(run.time[order])
+    if steps.min() < 0.5 * np.median(steps):
+        return run
+    text = f"{backwards} rows stand before an earlier one; put in the order of their stamps"
+    return run.rows(order).with_findings(Finding("time_order", "repaired", text))
+
+
+MAX_BRIDGED_GAP = 5.5  # samples: over a shorter gap of a well sampled motion, interpolation is safe
+MIN_PART_SAMPLES = 50  # samples: a shorter part tells nothing
+
+
+def split_at_gaps(run: Run) -> tuple[Run, ...]:
+    """The parts of a run between gaps of the clock and steps back; parts that are too short are left out.
+
+    Raises InputError if nothing is left.
+    """
+    pieces = _split_rows_at_breaks(run.time, np.arange(run.samples))
+    long = [piece for piece in pieces if len(piece) >= MIN_PART_SAMPLES]
+    if not long:
+        longest = max(len(piece) for piece in pieces)
+        raise InputError(f"{run.file}: {longest} samples in a row at most; at least {MIN_PART_SAMPLES} are needed")
+    if len(pieces) == 1:
+        return (run,)
+    run = run.with_findings(_describe_cut(run.time, pieces, len(long)))
+    return tuple(replace(run.rows(piece), part=number) for number, piece in enumerate(long, 1))
+
+
+def _split_rows_at_breaks(time: Array, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Rows between breaks, looked for again in each piece: a long pause hides shorter ones."""
+    steps = np.diff(time[rows])
+    forward = steps[steps > 0]
+    if not len(forward):
+        return [rows]
+    usual = max(float(np.median(forward)), float(np.mean(forward)))
+    breaks = np.flatnonzero((steps < 0) | (steps > MAX_BRIDGED_GAP * usual)) + 1
+    if not len(breaks):
+        return [rows]
+    return [piece for part in np.split(rows, breaks) for piece in _split_rows_at_breaks(time, part)]
+
+
+def _describe_cut(time: Array, pieces: list[NDArray[np.intp]], kept: int) -> Finding:
+    before = np.array([piece[-1] for piece in pieces[:-1]])
+    steps = time[before + 1] - time[before]
+    back = int(np.sum(steps < 0))
+    kind, cause = (
+        ("time_backwards", f"the clock steps back {back} time(s)") if back else ("time_gap", f"{len(steps)} gap(s)")
+    )
+    short = len(pieces) - kept
+    tail = f", {short} of them too short to use and left out" if short else ""
+    text = f"{cause}, first after {time[before[0]]:g} s by {steps[0]:+.4g} s; cut into {len(pieces)} parts{tail}"
+    return Finding(kind, "repaired", text)
+
+
+TURN_RAD = 2 * np.pi
+ENCODER_SIGNALS = ("position", "link_position", "reference_position", "simulated_position")
+MIN_STEP_TURNS = 1e-3  # of a turn, at rest
+
+
+def unwrap_encoders(run: Run, angles: dict[str, tuple[bool, ...]]) -> Run:
+    """Adds whole turns where a channel jumps by some between two samples.
+
+    angles: for each signal, which of its channels are angles. A jump that is no whole turn is left alone.
+    """
+    for name in ENCODER_SIGNALS:
+        if name in run.signals:
+            for channel in np.flatnonzero(angles[name]):
+                run = _unwrap_channel(run, name, int(channel))
+    return run
+
+
+def _unwrap_channel(run: Run, name: str, channel: int) -> Run:
+    signal = run.signals[name]
+    steps = np.diff(signal[:, channel])
+    turns = np.rint(steps / TURN_RAD)
+    moved = np.abs(steps - TURN_RAD * turns)
+    ordinary = max(
+        3 * float(np.quantile(moved, 0.98)), MIN_STEP_TURNS * TURN_RAD
+    )  # whole turns aside, most steps are motion
+    wraps = (turns != 0) & (moved <= ordinary)
+    if not wraps.any() or ordinary > TURN_RAD / 2:
+        return run
+    mended = signal.copy()
+    mended[1:, channel] -= TURN_RAD * np.cumsum(np.where(wraps, turns, 0))
+    text = f"{name} of channel {channel + 1} jumps by whole turns {wraps.sum()} time(s); unwrapped"
+    finding = Finding("wrapped_encoder", "repaired", text, channel + 1)
+    return run.with_signals(run.time, {name: mended}).with_findings(finding)

@@ -1,0 +1,126 @@
+"""Repair of time stamps that jitter: were the samples taken at uneven times, or only stamped late?
+
+Both happen, and the data decide: a sample that was taken late has moved on by velocity times lateness.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.errors import InputError
+from armlab.recordings.recording import Array, Finding, Run
+
+MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
+MIN_WARNED_LATENESS = 0.1  # of a step: less is lost in what the splines do well
+MAX_GAP_SCATTER_RATIO = 0.9  # times the scatter: samples are missing only where that explains the stamps better
+MAX_GRID_LATENESS = 1.5  # steps: stamps further from any even grid cannot be counted
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """An even grid through the stamps: time = start + step * count, lateness = stamp - grid."""
+
+    start: float
+    step: float
+    count: NDArray[np.intp]
+    lateness: Array
+
+    @property
+    def time(self) -> Array:
+        """The grid's own stamps."""
+        return np.asarray(self.start + self.step * self.count, dtype=np.float64)
+
+    @property
+    def scatter(self) -> float:
+        """Root mean square lateness, in steps."""
+        return float(np.sqrt(np.mean(self.lateness**2)) / self.step)
+
+    @property
+    def missing(self) -> int:
+        """Grid points without a sample."""
+        return int(self.count[-1] + 1 - len(self.count))
+
+
+def repair_stamps(run: Run) -> Run:
+    """The run with stamps that strictly increase, on an even grid unless the samples were taken unevenly.
+
+    Raises InputError where stamps repeat and no even grid fits.
+    """
+    if run.even:
+        return run
+    grid = fit_even_grid(run.time)
+    worst = float(np.abs(grid.lateness).max() / grid.step)
+    if worst > MAX_GRID_LATENESS or (worst > MAX_ROUNDING_LATENESS and is_sampled_unevenly(run, grid)):
+        return _keep_stamps(run, grid, worst)
+    if worst > MAX_ROUNDING_LATENESS:
+        text = (
+            f"stamps stray from an even {1 / grid.step:.6g} Hz by up to {1e3 * worst * grid.step:.3g} ms, "
+            "and the motion shows that the samples do not; stamps made even"
+        )
+        run = run.with_findings(Finding("time_jitter", "repaired", text))
+    elif worst > 1e-4:
+        text = f"stamps are rounded (by up to {worst:.1%} of a step); put on an even {1 / grid.step:.6g} Hz"
+        run = run.with_findings(Finding("time_rounding", "repaired", text))
+    if grid.missing:
+        text = f"{grid.missing} single samples are missing; bridged by splines where the run is filtered"
+        run = run.with_findings(Finding("time_gap", "repaired", text))
+    return run.with_signals(grid.time, {})
+
+
+def fit_even_grid(time: Array) -> Grid:
+    """The even grid that fits the stamps best: with none missing, or counted by the length of the steps."""
+    steps = np.diff(time)
+    usual = float(np.median(steps)) or float(np.mean(steps))
+    counted = np.append(0, np.cumsum(np.maximum(1, np.rint(steps / usual)))).astype(np.intp)
+    complete, with_gaps = (_fit_grid(time, count) for count in (np.arange(len(time)), counted))
+    return with_gaps if with_gaps.scatter < MAX_GAP_SCATTER_RATIO * complete.scatter else complete
+
+
+def _fit_grid(time: Array, count: NDArray[np.intp]) -> Grid:
+    middle = count.mean()
+    step = float((count - middle) @ (time - time[0]) / np.sum((count - middle) ** 2))
+    start = float(np.mean(time - time[0]) - step * middle + time[0])
+    return Grid(start, step, count, time - start - step * count)
+
+
+def is_sampled_unevenly(run: Run, grid: Grid) -> bool:
+    """True if the motion follows the lateness of the stamps: q(stamp) = q(grid) + velocity * lateness.
+
+    Fourth differences take the smooth motion out of both sides; the slope between them is one for samples
+    that were taken when their stamps say, zero for even samples with late stamps.
+    """
+    velocity = np.gradient(run.position, grid.time, axis=0)
+    moved = _fourth_difference(velocity * grid.lateness[:, None])
+    seen = _fourth_difference(run.position)
+    scale = np.median(np.abs(seen), axis=0)
+    weight = np.where(scale > 0, 1 / np.where(scale > 0, scale, 1.0), 0.0)
+    moved, seen = moved * weight, seen * weight
+    length = float(np.sum(moved**2))
+    return length > 0 and float(np.sum(moved * seen)) / length > 0.5
+
+
+def _fourth_difference(signal: Array) -> Array:
+    return np.diff(signal, n=4, axis=0)
+
+
+def _keep_stamps(run: Run, grid: Grid, worst: float) -> Run:
+    """Keeps the stamps; of rows with one stamp only the first stays, if they hold about the same."""
+    later = np.append(False, np.diff(run.time) <= 0)
+    if later.any():
+        run = _drop_equal_stamps(run, later)
+    text = (
+        f"samples were taken at uneven times (up to {worst:.2g} steps off {1 / grid.step:.6g} Hz); "
+        "stamps kept, even samples made by splines where the run is filtered"
+    )
+    return run.with_findings(Finding("time_jitter", "warning" if worst > MIN_WARNED_LATENESS else "note", text))
+
+
+def _drop_equal_stamps(run: Run, later: NDArray[np.bool_]) -> Run:
+    changes = np.abs(np.diff(run.position, axis=0))
+    usual = np.quantile(changes, 0.9, axis=0)
+    if np.any(changes[later[1:]] > 3 * usual):
+        at = run.time[later][0]
+        raise InputError(f"{run.file}: different values with the same time stamp at {at:g} s: which one is right?")
+    text = f"{later.sum()} rows have the stamp of the row before and about its values; left out"
+    return run.rows(~later).with_findings(Finding("duplicate_stamp", "repaired", text))

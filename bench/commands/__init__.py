@@ -1,1 +1,0 @@
-"""The commands of `armlab`, without any logic of their own."""

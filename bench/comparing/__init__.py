@@ -1,1 +1,0 @@
-"""Two result sets beside each other."""

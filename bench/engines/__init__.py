@@ -1,1 +1,0 @@
-"""Where trials are run: in this process, on its cores, on a Dask cluster or on a Ray cluster, by those engines."""

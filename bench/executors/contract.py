@@ -1,0 +1,118 @@
+"""The contract between the dispatch of trials and an executor: batches of work, reports, settings, and what a worker
+does with a batch.
+"""
+
+import faulthandler
+import os
+import platform
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Annotated, Literal, NamedTuple, Protocol, Self
+
+from pydantic import Field, model_validator
+
+from armlab.common.settings import Settings
+from bench.execute import Failure, Outcome, Trial, load_algorithm, run_batch
+from bench.provenance import fingerprint, provenance
+from problem.registry import ProblemSettings
+
+Work = Sequence[tuple[str, Trial]]
+"""Trials, each with its key in the run store."""
+
+
+class WorkReport(NamedTuple):
+    """What became of a batch, trial by trial, and the provenance of the worker."""
+
+    results: list[tuple[str, Outcome | Failure]]
+    origin: str
+
+
+def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:
+    """Run trials one after the other; the process dies with a trial that takes longer than `timeout_s`."""
+    return WorkReport([(key, _run_with_time_limit(key, trial, timeout_s)) for key, trial in work], _worker_provenance())
+
+
+def run_in_worker(work: Work, timeout_s: float | None = None) -> WorkReport:
+    """`do` in a process of its own, after a look whether it holds the code that the keys speak of."""
+    strangers = [
+        (key, trial) for key, trial in work if trial.key(_code_fingerprint(trial.algorithm, trial.problem)) != key
+    ]
+    if strangers:
+        return WorkReport(
+            [(key, Failure(trial, _other_code_message())) for key, trial in strangers], _worker_provenance()
+        )
+    return run_work(work, timeout_s)
+
+
+def _run_with_time_limit(key: str, trial: Trial, timeout_s: float | None) -> Outcome | Failure:
+    with _time_limit(timeout_s):
+        ((_, result),) = run_batch([(key, trial)])
+    return result
+
+
+@contextmanager
+def _time_limit(timeout_s: float | None) -> Iterator[None]:
+    """End the process if the block takes longer.
+
+    The watchdog is a thread in C with a clock that nobody sets: it needs neither the interpreter's lock nor the main
+    thread, so that it ends a loop in compiled code as well.
+    """
+    if timeout_s is None:
+        yield
+        return
+    with open(os.devnull, "w") as nowhere:
+        faulthandler.dump_traceback_later(timeout_s, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+
+
+@lru_cache(maxsize=512)
+def _code_fingerprint(algorithm: str, problem: ProblemSettings) -> str:
+    return fingerprint(load_algorithm(algorithm), problem.model_dump(mode="json"))
+
+
+def _other_code_message() -> str:
+    return f"OtherCodeError: the worker on {platform.node()} has other code or files than the place of the start"
+
+
+@lru_cache
+def _worker_provenance() -> str:
+    return provenance()
+
+
+class ExecutorSettings(Settings):
+    """backend: the engine. address: of a cluster that is running; without one, processes on this machine.
+
+    Dask: `tcp://HOST:PORT` of the scheduler. Ray: `HOST:PORT` of the head, or `auto`.
+    """
+
+    backend: Literal["loky", "dask", "ray"] = "loky"
+    address: Annotated[str, Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _address_of_a_cluster(self) -> Self:
+        if self.backend == "loky" and self.address:
+            raise ValueError("'address' should stand beside backend 'dask' or 'ray': loky works on this machine alone")
+        return self
+
+
+class BatchExecutor(Protocol):
+    """Takes batches and gives futures of their reports.
+
+    slots: batches that keep all workers busy; more should not be under way. crashes: what a future raises when the
+    worker died.
+    """
+
+    @property
+    def slots(self) -> int: ...
+
+    @property
+    def crashes(self) -> tuple[type[BaseException], ...]: ...
+
+    def submit(self, work: Work) -> "Future[WorkReport]":
+        """A future of the batch; it may hold one of `crashes`."""
+        ...

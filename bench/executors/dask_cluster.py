@@ -1,0 +1,65 @@
+"""The executor on a Dask cluster; needs the extra `cluster`."""
+
+from collections.abc import Iterator
+from concurrent.futures import Executor as Pool
+from concurrent.futures import Future
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from distributed import Client, KilledWorker, LocalCluster
+
+from armlab.common.errors import InputError
+from bench.executors.contract import BatchExecutor, Work, WorkReport, run_in_worker
+
+_BATCHES_PER_WORKER = 2  # batches a worker, so that none waits for the next one
+_CONNECT_TIMEOUT_S = 30
+
+
+@dataclass(frozen=True)
+class DaskExecutor:
+    """Batches through the client's own pool of futures. A batch whose worker dies is given to another by Dask itself,
+    and is a crash when it has cost so many workers as the scheduler allows.
+    """
+
+    pool: Pool
+    slots: int
+    timeout_s: float | None
+    crashes: tuple[type[BaseException], ...] = (KilledWorker,)
+
+    def submit(self, work: Work) -> "Future[WorkReport]":
+        """A future of the batch."""
+        return self.pool.submit(run_in_worker, list(work), self.timeout_s)
+
+
+@contextmanager
+def dask_executor(address: str | None, workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
+    """A running cluster, or one of this machine for the time of the run.
+
+    Raises InputError if no cluster answers, or its workers have several threads.
+    """
+    with _connect_client(address, workers) as client:
+        threads = client.nthreads()
+        if any(count > 1 for count in threads.values()):
+            raise InputError(
+                f"the Dask workers at {address} have several threads, and processor time is counted by process: "
+                "start them with `dask worker --nthreads 1 --nworkers N`"
+            )
+        with client.get_executor(pure=False) as pool:
+            yield DaskExecutor(pool, _BATCHES_PER_WORKER * len(threads), timeout_s)
+
+
+@contextmanager
+def _connect_client(address: str | None, workers: int) -> Iterator[Any]:
+    if address is None:
+        local = LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+        with local as cluster, Client(cluster) as client:
+            yield client
+        return
+    try:
+        client = Client(address, timeout=_CONNECT_TIMEOUT_S)
+        client.wait_for_workers(1, timeout=_CONNECT_TIMEOUT_S)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(f"no Dask cluster with a worker answers at {address}: {error}".splitlines()[0]) from None
+    with client:
+        yield client

@@ -1,1 +1,0 @@
-"""A recorded trajectory in the forms that robot controllers read."""

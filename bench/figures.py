@@ -1,0 +1,135 @@
+"""Figures: one palette and one size, the same bytes for the same data; cost and time against swarm size (Figure 2),
+convergence (Figure 3).
+"""
+
+from collections.abc import Callable, Sequence
+from io import BytesIO
+from typing import NamedTuple
+
+import matplotlib
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+from bench.printed import display_name
+
+# Okabe and Ito 2008: told apart by readers with any colour vision; yellow is left out, too pale for a line.
+_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+_DASHES = ("solid", "dashed", "dashdot", "dotted", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+DrawPanels = Callable[[Sequence[Axes]], None]
+
+
+class LineStyle(NamedTuple):
+    """How one algorithm is drawn, in all panels of a figure."""
+
+    color: str
+    linestyle: str | tuple[int, tuple[int, ...]]
+    marker: str
+
+
+def line_style(index: int) -> LineStyle:
+    """The look of the index-th algorithm."""
+    place = index % len(_COLORS)
+    return LineStyle(_COLORS[place], _DASHES[place], _MARKERS[place])
+
+
+def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:
+    """The figure that `draw` makes on a row of axes, as PNG and SVG bytes, a legend below."""
+
+    def fill(figure: Figure) -> None:
+        axes = list(figure.subplots(1, panels, squeeze=False, sharey=True)[0])
+        draw(axes)
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4 * panels - 2)
+
+    return render_figure((2 + 3.6 * panels, 3.8), fill)
+
+
+def render_figure(size: tuple[float, float], fill: Callable[[Figure], None]) -> dict[str, bytes]:
+    """The figure of that size, inches, that `fill` makes, as PNG and SVG bytes."""
+    with matplotlib.rc_context():
+        _set_style()
+        figure = Figure(figsize=size, layout="constrained")
+        fill(figure)
+        return {suffix: _image_bytes(figure, suffix) for suffix in ("png", "svg")}
+
+
+def _set_style() -> None:
+    matplotlib.rcdefaults()  # a user's own style would change the bytes
+    matplotlib.rc("figure", dpi=150)
+    matplotlib.rc("font", size=9)
+    matplotlib.rc("axes", grid=True)
+    matplotlib.rc("axes.spines", top=False, right=False)
+    matplotlib.rc("grid", alpha=0.3)
+    matplotlib.rc("legend", frameon=False)
+    matplotlib.rc("svg", hashsalt="armlab")  # else every SVG has random ids
+
+
+def _image_bytes(figure: Figure, suffix: str) -> bytes:
+    buffer = BytesIO()
+    unsigned = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}[suffix]
+    figure.savefig(buffer, format=suffix, metadata=unsigned)
+    return buffer.getvalue()
+
+
+_SWARM_SIZE_LABEL = "swarm size (particles)"
+
+
+def draw_cost(table: pd.DataFrame) -> dict[str, bytes]:
+    """Median with quartiles, and minimum, of the repetitions, from a summary table; PNG and SVG bytes."""
+
+    def draw(axes: Sequence[Axes]) -> None:
+        for index, (label, rows) in enumerate(table.groupby("algorithm", sort=False)):
+            name, drawn, sizes = display_name(str(label)), line_style(index), rows["swarm_size"]
+            median = f"{name}, median and quartiles"
+            axes[0].plot(sizes, rows["median"], label=median, color=drawn.color, marker=drawn.marker)
+            quartiles = rows["lower_quartile"], rows["upper_quartile"]
+            axes[0].fill_between(sizes, *quartiles, color=drawn.color, alpha=0.15, linewidth=0)
+            axes[0].plot(sizes, rows["minimum"], label=f"{name}, minimum", color=drawn.color, linestyle=":")
+        axes[0].set(xlabel=_SWARM_SIZE_LABEL, ylabel="condition number of the best trajectory (-)")
+
+    return render_panels(1, draw)
+
+
+def draw_times(times: pd.DataFrame) -> dict[str, bytes]:
+    """Computing time of a run, average and standard deviation, from a table of times; PNG and SVG bytes."""
+
+    def draw(axes: Sequence[Axes]) -> None:
+        for index, (label, rows) in enumerate(times.groupby("algorithm", sort=False)):
+            drawn = line_style(index)
+            axes[0].errorbar(
+                rows["swarm_size"],
+                rows["average_seconds"],
+                yerr=rows["standard_deviation"],
+                label=display_name(str(label)),
+                color=drawn.color,
+                marker=drawn.marker,
+                capsize=2,
+            )
+        axes[0].set(xlabel=_SWARM_SIZE_LABEL, ylabel="computing time of a run on one core (s)")
+        axes[0].set_ylim(bottom=0)
+
+    return render_panels(1, draw)
+
+
+_CONVERGENCE_PANELS = {"best_so_far": "best so far", "present_best": "present best of the algorithm"}
+
+
+def draw_convergence(table: pd.DataFrame) -> dict[str, bytes]:
+    """Best so far and present best, averaged, from a convergence table; PNG and SVG bytes."""
+
+    def draw(axes: Sequence[Axes]) -> None:
+        for panel, (column, title) in zip(axes, _CONVERGENCE_PANELS.items(), strict=True):
+            for index, (label, rows) in enumerate(table.groupby("algorithm", sort=False)):
+                color, linestyle, _ = line_style(index)
+                name = display_name(str(label))
+                panel.plot(rows["iteration"], rows[column], label=name, color=color, linestyle=linestyle)
+            panel.set(title=title, xlabel="iteration (0: first population)", yscale="log")
+        axes[0].yaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5)))  # powers of ten alone may be out of range
+        axes[0].yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes[0].yaxis.set_minor_formatter(NullFormatter())
+        axes[0].set_ylabel("average condition number, feasible ends (-)")
+
+    return render_panels(2, draw)

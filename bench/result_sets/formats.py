@@ -1,0 +1,207 @@
+"""Result sets on the disk: tidy tables (CSV, Parquet) to write and read, and the format of IOHprofiler to write.
+
+IOHprofiler (Doerr 2018, arXiv 1810.05281), for IOHanalyzer, iohinspector and others: a folder an algorithm; in it, a
+problem's JSON file and its table of evaluations and best values. An infeasible best has no number in that format: it is
+written as the largest double. Readers know a run by its row at evaluation 1, but runs are kept population by
+population: that row has the same largest double, "nothing known yet".
+"""
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from io import BytesIO
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import yaml
+
+from algorithms.contract import Array
+from armlab.common.errors import InputError
+from bench.files import write_whole
+from bench.result_sets.result_set import TRIAL_COLUMNS, ResultSet, TableOfCurves, read_stored_results, runs_by_algorithm
+from bench.statistics.performance import Run
+
+SETTINGS, ORIGINS, TABLES = "settings.yaml", "origins.json", ("trials", "curves")
+_README_TEXT = """\
+# {name}: results as tidy tables
+
+`trials`: one row a trial. problem, swarm_size, budget (evaluations), algorithm, repetition: which; those with the same
+repetition began with the same first population. value: the problem's own figure of the best point, for an arm the
+condition number, without weights and penalty. violation: 0 where every limit is kept. fitness: what was minimised.
+evaluations: used. seconds: of processor time. dimension: numbers that were searched.
+
+`curves`: one row a trial and population. evaluations: used so far. value, violation: of the best point so far.
+
+`{settings}`: everything that was set. `{origins}`: versions, processor and commit of every machine that took part.
+"""
+
+
+def write_tidy(results: ResultSet, folder: Path, form: str) -> list[Path]:
+    """Write a result set into a folder, its tables as `csv` or `parquet`; returns the files."""
+    tables = {"trials": iter([results.trials]), "curves": (curves for _, _, curves in results.cells())}
+    files: dict[str, str | bytes | Iterable[bytes]] = {
+        f"{name}.{form}": _WRITERS[form](tables[name]) for name in TABLES
+    }
+    files |= {
+        ORIGINS: json.dumps(results.origins, indent=1) + "\n",
+        "README.md": _README_TEXT.format(name=results.name, settings=SETTINGS, origins=ORIGINS),
+        SETTINGS: results.settings,
+    }
+    make_folder(folder)
+    for name, content in files.items():
+        write_whole(folder / name, content)
+    return [folder / name for name in files]
+
+
+def read_tidy(folder: Path) -> ResultSet:
+    """The result set in a folder that `write_tidy` made; raises InputError, in one line, if it is none."""
+    try:
+        settings = (folder / SETTINGS).read_text()
+        origins = json.loads((folder / ORIGINS).read_text())
+        name = str(yaml.safe_load(settings)["name"])
+    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
+        raise InputError(f"{folder} is no folder of results: {error!s}".splitlines()[0]) from None
+    trials, curves = (_read_table(folder, table) for table in TABLES)
+    return ResultSet(name, settings, tuple(origins), trials, TableOfCurves(curves))
+
+
+def _read_table(folder: Path, name: str) -> pd.DataFrame:
+    for form, reader in _READERS.items():
+        path = folder / f"{name}.{form}"
+        if path.exists():
+            return _read_checked_table(reader, path)
+    raise InputError(f"{folder} is no folder of results: it holds neither {name}.csv nor {name}.parquet")
+
+
+def _read_checked_table(reader: Callable[[Path], pd.DataFrame], path: Path) -> pd.DataFrame:
+    try:
+        table = reader(path)
+    except (OSError, ValueError) as error:  # of pandas and pyarrow alike
+        raise InputError(f"cannot read {path}: {error!s}".splitlines()[0]) from None
+    missing = [column for column in [*TRIAL_COLUMNS, "evaluations", "value", "violation"] if column not in table]
+    if missing:
+        raise InputError(f"{path} lacks the columns {', '.join(missing)}")
+    return table
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for results; raises InputError if that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot make the folder {folder}: {error.strerror}") from None
+
+
+def _to_csv(pieces: Iterator[pd.DataFrame]) -> Iterator[bytes]:
+    for place, piece in enumerate(pieces):  # every digit, so that nothing changes on the way
+        yield piece.to_csv(index=False, header=place == 0, lineterminator="\n").encode()
+
+
+def _to_parquet(pieces: Iterator[pd.DataFrame]) -> bytes:
+    """A row group a piece; compressed, the whole is small enough for the memory."""
+    try:
+        from pyarrow import Table
+        from pyarrow.parquet import ParquetWriter
+    except ImportError:
+        raise InputError("Parquet needs the package `pyarrow`: install it, or write CSV") from None
+    first = Table.from_pandas(next(pieces), preserve_index=False)
+    buffer = BytesIO()
+    with ParquetWriter(buffer, first.schema) as writer:
+        writer.write_table(first)
+        for piece in pieces:
+            writer.write_table(Table.from_pandas(piece, schema=first.schema, preserve_index=False))
+    return buffer.getvalue()
+
+
+_WRITERS: dict[str, Callable[[Iterator[pd.DataFrame]], Any]] = {"csv": _to_csv, "parquet": _to_parquet}
+_READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": pd.read_csv, "parquet": pd.read_parquet}
+
+
+NOTHING_KNOWN = float(np.finfo(float).max)
+_IOH_VERSION = "0.3.5"  # of the format
+
+
+def write_iohprofiler(results: ResultSet, folder: Path) -> list[Path]:
+    """Write a result set into a folder; returns the JSON files."""
+    written = []
+    for number, (label, trials, curves) in enumerate(results.cells(), start=1):
+        for algorithm, runs in runs_by_algorithm(curves).items():
+            place = folder / _file_name(algorithm)
+            written.append(
+                _write_ioh_problem(
+                    place, number, label, int(trials["dimension"].iloc[0]), algorithm, list(runs.values())
+                )
+            )
+    return written
+
+
+def _write_ioh_problem(place: Path, number: int, label: str, dimension: int, algorithm: str, runs: list[Run]) -> Path:
+    name = f"f{number}_{_file_name(label)}"
+    table = f"data_{name}/IOHprofiler_f{number}_DIM{dimension}.dat"
+    make_folder(place / f"data_{name}")
+    write_whole(place / table, "\n".join(["evaluations raw_y", *map(_ioh_rows, runs)]) + "\n")
+    path = place / f"IOHprofiler_{name}.json"
+    scenario = {"dimension": dimension, "path": table, "runs": [_ioh_run_summary(run) for run in runs]}
+    write_whole(path, json.dumps(_ioh_header(number, label, algorithm) | {"scenarios": [scenario]}, indent=1) + "\n")
+    return path
+
+
+def _ioh_header(number: int, label: str, algorithm: str) -> dict[str, Any]:
+    return {
+        "version": _IOH_VERSION,
+        "suite": "armlab",
+        "function_id": number,
+        "function_name": label,
+        "maximization": False,
+        "algorithm": {"name": algorithm, "info": "armlab"},
+        "attributes": ["evaluations", "raw_y"],
+    }
+
+
+def _ioh_rows(run: Run) -> str:
+    known = zip(run.evaluations.tolist(), _finite_best(run).tolist(), strict=True)
+    return "\n".join([f"1 {NOTHING_KNOWN!r}", *(f"{evaluations:.0f} {value!r}" for evaluations, value in known)])
+
+
+def _ioh_run_summary(run: Run) -> dict[str, Any]:
+    best = _finite_best(run)
+    first = int(best.argmin())
+    found = {"evals": int(run.evaluations[first]), "y": float(best[first]), "x": []}
+    return {"instance": 1, "evals": int(run.evaluations[-1]), "best": found}
+
+
+def _finite_best(run: Run) -> Array:
+    return np.asarray(np.minimum(run.best, NOTHING_KNOWN))
+
+
+def _file_name(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9.-]+", "_", text)
+
+
+SHARED_FORMATS: Mapping[str, Callable[[ResultSet, Path], list[Path]]] = MappingProxyType(
+    {
+        "csv": lambda results, folder: write_tidy(results, folder, "csv"),
+        "parquet": lambda results, folder: write_tidy(results, folder, "parquet"),
+        "ioh": write_iohprofiler,
+    }
+)
+
+
+def read_results(where: Path, store: Path) -> ResultSet:
+    """The results of a configuration (its YAML file; outcomes from the store), or those in a folder of tidy tables.
+
+    Raises InputError, in one line, if there are none.
+    """
+    if where.is_dir():
+        return read_tidy(where)
+    if not where.exists():
+        raise InputError(f"there is no {where}: results are a configuration file, or a folder of tidy tables")
+    return read_stored_results(where, store)
+
+
+def share_results(where: Path, store: Path, form: str, folder: Path) -> list[Path]:
+    """Write results in one of FORMS into a folder; returns the files."""
+    return SHARED_FORMATS[form](read_results(where, store), folder)

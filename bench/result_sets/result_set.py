@@ -1,0 +1,149 @@
+"""A result set: the outcomes of an experiment as tidy tables, with the settings and the machines they come from."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+import yaml
+
+from armlab.common.errors import InputError
+from bench import execute
+from bench.dispatch import count_missing
+from bench.plan import Entry, Plan
+from bench.run import load_experiment
+from bench.statistics import is_feasible
+from bench.statistics.performance import Run
+from bench.store import open_store
+from bench.tables import entry_labels, tidy_frame
+
+CELL_COLUMNS = ["problem", "swarm_size", "budget"]
+TRIAL_COLUMNS = [*CELL_COLUMNS, "algorithm", "repetition"]
+CellKey = tuple[Any, ...]
+"""Problem, swarm size and budget."""
+
+
+class CurveSource(Protocol):
+    """Where the curves are: one row a trial and population, TRIAL, evaluations, value and violation of the best so far.
+
+    They take most of the space, so that no more than those of one cell are asked for at a time.
+    """
+
+    def of(self, cell: CellKey) -> pd.DataFrame:
+        """Those of one problem, swarm size and budget, in the order of the trials."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class TableOfCurves:
+    """Curves in a table that was read from a file."""
+
+    table: pd.DataFrame
+
+    def of(self, cell: CellKey) -> pd.DataFrame:
+        """Those rows."""
+        wanted = np.logical_and.reduce(
+            [self.table[name] == value for name, value in zip(CELL_COLUMNS, cell, strict=True)]
+        )
+        return self.table[wanted]
+
+
+@dataclass(frozen=True, eq=False)
+class StoredCurves:
+    """Curves that stay in the run store."""
+
+    store: Path
+    plan: Plan
+
+    def of(self, cell: CellKey) -> pd.DataFrame:
+        """Read now."""
+        entries = self.plan.of(*cell)
+        with open_store(self.store) as store:
+            return _curve_table(entries, [store.get(entry.key).curves for entry in entries])
+
+
+@dataclass(frozen=True, eq=False)
+class ResultSet:
+    """trials: one row a trial, as `bench.tables` has it. settings: YAML text. origins: who computed them."""
+
+    name: str
+    settings: str
+    origins: tuple[dict[str, Any], ...]
+    trials: pd.DataFrame
+    curves: CurveSource
+
+    @property
+    def seed(self) -> int:
+        """The seed of the experiment."""
+        return int(yaml.safe_load(self.settings)["seed"])
+
+    @property
+    def problems(self) -> dict[str, Any]:
+        """The settings of each problem by its label."""
+        found: dict[str, Any] = yaml.safe_load(self.settings)["problem"]
+        return found
+
+    @property
+    def algorithms(self) -> list[str]:
+        """Labels in the order of the configuration."""
+        return [str(label) for label in self.trials["algorithm"].unique()]
+
+    def cells(self) -> Iterator[tuple[str, pd.DataFrame, pd.DataFrame]]:
+        """Label, trials and curves of each problem, swarm size and budget."""
+        for label, trials in self.ends():
+            yield label, trials, self.curves.of(tuple(trials[CELL_COLUMNS].iloc[0]))
+
+    def ends(self) -> Iterator[tuple[str, pd.DataFrame]]:
+        """Label and trials of each problem, swarm size and budget."""
+        for cell, trials in self.trials.groupby(CELL_COLUMNS, sort=False):
+            yield self._label(cell), trials
+
+    def _label(self, cell: CellKey) -> str:
+        problem, swarm_size, budget = cell
+        parts = [str(problem)]
+        parts += [f"{swarm_size} points"] if self.trials["swarm_size"].nunique() > 1 else []
+        parts += [f"{budget} evaluations"] if self.trials["budget"].nunique() > 1 else []
+        return ", ".join(parts)
+
+
+def runs_by_algorithm(curves: pd.DataFrame) -> dict[str, dict[int, Run]]:
+    """The runs of one cell by algorithm and repetition; an infeasible best counts as infinite."""
+    found: dict[str, dict[int, Run]] = {}
+    feasible = is_feasible(curves["value"].to_numpy(), curves["violation"].to_numpy())
+    best = curves.assign(value=np.where(feasible, curves["value"], np.inf))
+    for (algorithm, repetition), rows in best.groupby(["algorithm", "repetition"], sort=False):
+        run = Run(rows["evaluations"].to_numpy(float), rows["value"].to_numpy())
+        found.setdefault(str(algorithm), {})[int(str(repetition))] = run
+    return found
+
+
+def read_stored_results(config: Path, path: Path) -> ResultSet:
+    """The outcomes of a configuration in a run store.
+
+    Raises InputError, in one line, for a mistake in the configuration, and if trials are missing.
+    """
+    loaded = load_experiment(config)
+    if not path.exists():
+        raise InputError(f"there is no run store {path}: `armlab run {config}` makes it")
+    with open_store(path) as store:
+        left = count_missing(loaded.entries, store)
+        if left:
+            raise InputError(
+                f"{left} of {len(loaded.entries)} trials of {config} are not in {path}: `armlab run {config}` first"
+            )
+        trials = tidy_frame(loaded.entries, store)
+        origins = tuple(json.loads(facts) for facts in store.origins(entry.key for entry in loaded.entries))
+    return ResultSet(loaded.experiment.name, loaded.settings, origins, trials, StoredCurves(path, loaded.entries))
+
+
+def _curve_table(entries: Sequence[Entry], curves: Sequence[execute.Curves]) -> pd.DataFrame:
+    names = pd.DataFrame([entry_labels(entry) for entry in entries])
+    table = names.loc[names.index.repeat([len(curve.evaluations) for curve in curves])].reset_index(drop=True)
+    return table.assign(
+        evaluations=np.concatenate([curve.evaluations for curve in curves]).astype(int),
+        value=np.concatenate([curve.best_value for curve in curves]),
+        violation=np.concatenate([curve.best_violation for curve in curves]),
+    )

@@ -1,0 +1,70 @@
+"""Average ranks over many problems, and which algorithms cannot be distinguished: a critical-difference chart."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import pandas as pd
+from scipy.stats import friedmanchisquare, rankdata
+
+from algorithms.contract import Array
+from bench.statistics.pairwise import holm, signed_rank_p
+
+Pair = tuple[str, str]
+ERROR_RATE = 0.05
+
+
+@dataclass(frozen=True)
+class CriticalDifference:
+    """Average ranks, best first; groups: those of more than one of which no two differ, each as long as it can be.
+
+    p: of every pair, after Holm over all of them. friedman_p: that all are equal, NaN for fewer than three.
+    """
+
+    ranks: dict[str, float]
+    p: dict[Pair, float]
+    groups: tuple[tuple[str, ...], ...]
+    friedman_p: float
+    blocks: int
+
+    @property
+    def has_too_few_blocks(self) -> bool:
+        """Whether so few blocks cannot tell any pair apart: even the least p-value, of equal signs, is too large."""
+        return len(self.p) * 2.0 ** (1 - self.blocks) > ERROR_RATE
+
+
+def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> CriticalDifference:
+    """From losses, finite, a row a block (a problem, or a repetition of one) and a column an algorithm."""
+    ranks = average_ranks(losses)
+    pairs = list(combinations(ranks, 2))
+    raw = np.array([signed_rank_p(losses[a].to_numpy(), losses[b].to_numpy()) for a, b in pairs])
+    p = dict(zip(pairs, holm(raw).tolist(), strict=True))
+    return CriticalDifference(
+        ranks, p, indistinguishable_groups(list(ranks), p, rate), _friedman_p(losses), len(losses)
+    )
+
+
+def average_ranks(losses: pd.DataFrame) -> dict[str, float]:
+    """Mean over the rows of the rank in a row, 1 the smallest loss, ties shared; best first."""
+    means = rankdata(losses.to_numpy(), axis=1).mean(axis=0)
+    order = np.argsort(means, kind="stable")
+    return {str(losses.columns[k]): float(means[k]) for k in order}
+
+
+def indistinguishable_groups(names: list[str], p: dict[Pair, float], rate: float) -> tuple[tuple[str, ...], ...]:
+    """Runs of neighbours in the ranking of which no pair differs; none that lies in another."""
+    found: list[tuple[int, int]] = []
+    for first in range(len(names)):
+        last = first
+        while last + 1 < len(names) and all(p[names[k], names[last + 1]] > rate for k in range(first, last + 1)):
+            last += 1
+        if last > first and (not found or last > found[-1][1]):
+            found.append((first, last))
+    return tuple(tuple(names[first : last + 1]) for first, last in found)
+
+
+def _friedman_p(losses: pd.DataFrame) -> float:
+    columns: Array = losses.to_numpy().T
+    if len(columns) < 3 or np.ptp(columns, axis=0).max() == 0:
+        return float("nan")
+    return float(friedmanchisquare(*columns).pvalue)

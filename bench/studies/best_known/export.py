@@ -1,0 +1,56 @@
+"""`armlab export`: the trajectory of a record, checked at the controller's rate, into a file."""
+
+from pathlib import Path
+from typing import Any
+
+from armlab.common.errors import InputError
+from armlab.common.settings import read_yaml, suggest_name
+from bench.execute import canonical
+from bench.files import write_whole
+from bench.studies.best_known.records import Record, build_excitation, read_records
+from bench.studies.best_known.search import record_point
+from bench.trajectory_files import TRAJECTORY_FORMATS, SampledTrajectory, sample_trajectory
+from problem.registry import ProblemSettings, parse_problem
+
+DEFAULT_RATE_HZ = 250.0
+_KEYS_THAT_MAY_DIFFER = (
+    "limits",
+    "workspace",
+    "coefficient_limit",
+    "samples",
+    "columns",
+    "unit_columns",
+    "criterion",
+    "penalty",
+)
+
+
+def export_record(
+    problem: Path, record: str, form: str, out: Path, records: Path, rate_hz: float = DEFAULT_RATE_HZ
+) -> SampledTrajectory:
+    """Write the trajectory of a record, in one of FORMATS, if it keeps the limits of `problem` at `rate_hz`.
+
+    problem: a YAML file with settings as `problem.registry` reads them; its limits may differ from those of
+    the record, its trajectory may not. Raises InputError, in one line, for every other case.
+    """
+    settings = parse_problem(read_yaml(problem), str(problem))
+    found = _find_record(records, record)
+    _check_same_trajectory(settings, found, problem, record)
+    trajectory = sample_trajectory(build_excitation(settings, str(problem)), record_point(found), rate_hz, record)
+    write_whole(out, TRAJECTORY_FORMATS[form](trajectory))
+    return trajectory
+
+
+def _find_record(path: Path, name: str) -> Record:
+    records = read_records(path)
+    if name not in records:
+        raise InputError(f"no record '{name}' in {path}: {suggest_name(name, list(records))}")
+    return records[name]
+
+
+def _check_same_trajectory(settings: ProblemSettings, record: Record, path: Path, name: str) -> None:
+    own: dict[str, Any] = settings.model_dump(mode="json")
+    for key in own.keys() | record.settings.keys():
+        here, there = (canonical(given.get(key)) for given in (own, record.settings))
+        if key not in _KEYS_THAT_MAY_DIFFER and here != there:
+            raise InputError(f"{path}: '{key}' is {here}, the record '{name}' has {there}: another one")

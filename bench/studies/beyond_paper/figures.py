@@ -1,0 +1,111 @@
+"""Figures of the study beyond the paper."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+
+from bench.figures import line_style, render_figure, render_panels
+from bench.printed import display_name
+from bench.tables import GROUP_COLUMNS, summary_table
+
+_TICK_MULTIPLES = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 7)
+
+
+def draw_budgets(frame: pd.DataFrame) -> dict[str, bytes]:
+    """Median and quartiles against the budget, a panel a problem, each with its own scale; PNG and SVG bytes."""
+    problems = list(frame["problem"].unique())
+
+    def fill(figure: Figure) -> None:
+        panels = figure.subplots(1, len(problems), squeeze=False)[0]
+        for axes, problem in zip(panels, problems, strict=True):
+            _draw_budget_panel(axes, frame[frame["problem"] == problem])
+            axes.set(title=problem, xlabel="budget of a run (evaluations)", xscale="log", yscale="log")
+            axes.yaxis.set_major_locator(LogLocator(subs=_TICK_MULTIPLES))  # powers of ten alone may be out of range
+            axes.yaxis.set_major_formatter("{x:g}")
+            axes.yaxis.set_minor_locator(NullLocator())
+            axes.xaxis.set_minor_formatter(NullFormatter())
+        panels[0].set_ylabel("condition number, median and quartiles (-)")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4 * len(problems))
+
+    return render_figure((2 + 4.2 * len(problems), 4.6), fill)
+
+
+def _draw_budget_panel(axes: Axes, frame: pd.DataFrame) -> None:
+    """Medians that are infinite, where most ends are infeasible, are left out."""
+    budgets = frame.drop_duplicates(GROUP_COLUMNS)["budget"].to_numpy()  # in the order of the summary
+    table = summary_table(frame).assign(budget=budgets)
+    for index, (label, group) in enumerate(table.groupby("algorithm", sort=False)):
+        color, linestyle, marker = _line_style(index)
+        rows = group[np.isfinite(group["median"])]
+        middle = rows["median"].to_numpy()
+        ends = np.abs(rows[["lower_quartile", "upper_quartile"]].to_numpy().T - middle)
+        shift = 1 + 0.03 * (index - 3.5)  # keeps the bars of neighbours apart
+        axes.errorbar(
+            rows["budget"] * shift,
+            middle,
+            yerr=np.where(np.isfinite(ends), ends, 0.0),
+            label=display_name(str(label)),
+            color=color,
+            linestyle=linestyle,
+            marker=marker,
+            markersize=4,
+            linewidth=1.2,
+            elinewidth=0.8,
+        )
+
+
+def _line_style(index: int) -> tuple[str, str | tuple[int, tuple[int, ...]], str]:
+    """As in every figure; the eighth line is grey, since the palette has seven colours."""
+    color, linestyle, marker = line_style(index)
+    return ("#999999", "solid", "*") if index == 7 else (color, linestyle, marker)
+
+
+def draw_ingredients(table: pd.DataFrame) -> dict[str, bytes]:
+    """Chance that each variant ends better than MuPSO as published, with intervals; a panel a problem and budget."""
+    cells = list(table.groupby(["problem", "budget"], sort=False))
+
+    def fill(figure: Figure) -> None:
+        panels = figure.subplots(1, len(cells), sharey=True, squeeze=False)[0]
+        for axes, ((problem, budget), rows) in zip(panels, cells, strict=True):
+            _draw_intervals(axes, rows)
+            axes.set_title(f"{problem}\n{budget} evaluations", fontsize=9)
+        panels[0].invert_yaxis()
+        figure.supxlabel(
+            "chance that the variant ends better than MuPSO (A12, 95 % interval; filled: p < 0.05)", fontsize=9
+        )
+
+    return render_figure((2.6 + 2.1 * len(cells), 6.4), fill)
+
+
+def _draw_intervals(axes: Axes, rows: pd.DataFrame) -> None:
+    places = np.arange(len(rows))
+    axes.axvline(0.5, color="black", linewidth=0.8)
+    axes.hlines(places, rows["low"], rows["high"], color=line_style(0).color, linewidth=1.2)
+    clear = (rows["p_holm"] < 0.05).to_numpy()
+    for chosen, face in ((clear, line_style(0).color), (~clear, "white")):
+        middle = rows["superiority"].to_numpy()[chosen]
+        axes.plot(middle, places[chosen], "o", color=line_style(0).color, markerfacecolor=face, markersize=5, zorder=3)
+    axes.set(xlim=(-0.03, 1.03), xticks=[0, 0.25, 0.5, 0.75, 1], yticks=places)
+    axes.set_xticklabels(["0", "", "0.5", "", "1"])
+    axes.set_yticklabels([display_name(str(label)) for label in rows["subject"]])
+
+
+def draw_swarm_sizes(frame: pd.DataFrame) -> dict[str, bytes]:
+    """Median against swarm size at equal evaluations; PNG and SVG bytes."""
+    table = summary_table(frame)
+
+    def draw(axes: Sequence[Axes]) -> None:
+        for index, (label, rows) in enumerate(table.groupby("algorithm", sort=False)):
+            color, linestyle, marker = line_style(index)
+            name = display_name(str(label))
+            axes[0].plot(
+                rows["swarm_size"], rows["median"], label=name, color=color, linestyle=linestyle, marker=marker
+            )
+        axes[0].set(xlabel="swarm size (particles)", ylabel="median condition number (-)")
+
+    return render_panels(1, draw)

@@ -1,0 +1,79 @@
+"""A claim of the paper with its verdict, and the evidence by which all claims are judged."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import pandas as pd
+
+from bench.printed import Printed
+from bench.studies.mutations import MutationHistory
+from bench.studies.paper.identification import BestRun, SimulatedIdentification
+from bench.studies.paper.literal import READINGS, Identifiability, Reading, identifiability, literal_matrix
+from bench.studies.paper.published import PublishedReading
+from bench.studies.paper.ranking import Standing
+from bench.tables import summary_table, times_table
+
+Verdict = Literal["reproduced", "not reproduced", "cannot be checked"]
+VERDICTS: tuple[Verdict, ...] = ("reproduced", "not reproduced", "cannot be checked")
+PRINTED_TOLERANCE = 0.10
+
+
+@dataclass(frozen=True)
+class Claim:
+    """place: in the paper. says: what it prints. ours: what the command computed. why: for the verdict.
+
+    A claim that cannot be checked names in `why` the datum that is missing.
+    """
+
+    place: str
+    says: str
+    ours: str
+    verdict: Verdict
+    why: str
+
+
+def verdict_if(condition: bool) -> Verdict:
+    """Reproduced if the condition holds, else not."""
+    return "reproduced" if condition else "not reproduced"
+
+
+def is_close_to_printed(ours: float, printed: float) -> bool:
+    """Whether a number agrees with the printed one within 10 %."""
+    return abs(ours - printed) <= PRINTED_TOLERANCE * abs(printed)
+
+
+def percent_change(new: float, old: float) -> float:
+    """Change from old to new in per cent of old."""
+    return 100 * (new / old - 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """frames: tidy outcomes by experiment. deviations, differences: from Tables 1 and 2.
+
+    lives: MuPSO's runs of Table 3 by the reading of eq. 6. readings: the paper's dynamics to the letter.
+    """
+
+    paper: Printed
+    frames: Mapping[str, pd.DataFrame]
+    deviations: list[str]
+    differences: list[str]
+    ranking: list[Standing]
+    mutation_histories: Mapping[str, list[MutationHistory]]
+    best: BestRun
+    found: SimulatedIdentification
+    published: list[PublishedReading]
+    readings: list[tuple[Reading, Identifiability]]
+
+    def column(self, experiment: str, statistic: str) -> dict[Any, float]:
+        """A statistic of the ends or the seconds of an experiment, by algorithm, or by (swarm size, algorithm)."""
+        frame = self.frames[experiment]
+        keys = ["swarm_size", "algorithm"] if frame["swarm_size"].nunique() > 1 else ["algorithm"]
+        table = summary_table(frame).merge(times_table(frame), on=keys, suffixes=("", "_of_seconds"))
+        return {key: float(value) for key, value in table.set_index(keys)[statistic].items()}
+
+
+def literal_readings(paper: Printed) -> list[tuple[Reading, Identifiability]]:
+    """What each literal reading of the paper's dynamics tells of the parameters."""
+    return [(reading, identifiability(literal_matrix(paper, reading))) for reading in READINGS]

@@ -1,0 +1,92 @@
+"""The ranking under each choice that the paper leaves open, and whether MuPSO differs from the others there."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from bench.printed import display_name
+from bench.statistics import is_feasible, quantile
+from bench.statistics.pairwise import Duel, duels_against_all
+
+SUBJECT = "mupso"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One choice of conventions. medians: by algorithm, infinite where half of the ends are infeasible.
+
+    duels: MuPSO against each other algorithm, Holm over them. best_known: condition number, None without a record.
+    """
+
+    problem: str
+    feasible_share: float
+    medians: dict[str, float]
+    minima: dict[str, float]
+    averages: dict[str, float]
+    duels: list[Duel]
+    best_known: float | None
+
+    @property
+    def usable(self) -> bool:
+        """Whether any algorithm found anything feasible."""
+        return self.feasible_share > 0
+
+    @property
+    def best(self) -> str | None:
+        """The algorithm with the least median; None where no median is finite."""
+        winner = min(self.medians, key=self.medians.__getitem__)
+        return winner if np.isfinite(self.medians[winner]) else None
+
+    def count(self, outcome: str) -> int:
+        """How many rivals MuPSO is `better` or `worse` than, at 5 % after Holm."""
+        winners = [duel.winner() for duel in self.duels]
+        return sum(winner is not None and (winner == SUBJECT) == (outcome == "better") for winner in winners)
+
+
+def standings(frame: pd.DataFrame, known: Mapping[str, float]) -> list[Standing]:
+    """One standing a problem of a tidy frame, in its order; known: best condition numbers by problem."""
+    groups = [(str(problem), rows) for problem, rows in frame.groupby("problem", sort=False)]
+    return [_make_standing(problem, rows, known.get(problem)) for problem, rows in groups]
+
+
+def _make_standing(problem: str, rows: pd.DataFrame, best_known: float | None) -> Standing:
+    feasible = is_feasible(rows["value"].to_numpy(), rows["violation"].to_numpy())
+    ends = rows.assign(end=np.where(feasible, rows["value"], np.inf), good=rows["value"].where(feasible))
+    groups = {str(label): group for label, group in ends.groupby("algorithm", sort=False)}
+    return Standing(
+        problem,
+        float(feasible.mean()),
+        {label: quantile(group["end"].to_numpy(), 0.5) for label, group in groups.items()},
+        {label: float(group["good"].min()) for label, group in groups.items()},
+        {label: float(group["good"].mean()) for label, group in groups.items()},
+        duels_against_all(rows, SUBJECT),
+        best_known,
+    )
+
+
+def ranking_table(found: list[Standing]) -> pd.DataFrame:
+    """One row a choice: who has the least median, MuPSO's own, and MuPSO against each other algorithm.
+
+    `+` MuPSO is better, `-` worse, `=` no difference at 5 % after Holm; in brackets the chance that a run of MuPSO
+    ends better (A12) and the corrected p-value. A lone `-`: nothing is feasible.
+    """
+    return pd.DataFrame([_standing_row(standing) for standing in found])
+
+
+def _standing_row(standing: Standing) -> dict[str, str]:
+    best = standing.best
+    return {
+        "box, duration, columns, joint 1": standing.problem,
+        "feasible": f"{standing.feasible_share:.0%}",
+        "least median": f"{display_name(best)} {standing.medians[best]:.3g}" if best else "-",
+        "MuPSO's median": f"{standing.medians[SUBJECT]:.3g}",
+        "best known": f"{standing.best_known:.3g}" if standing.best_known else "-",
+        "MuPSO's gap": f"{standing.medians[SUBJECT] / standing.best_known - 1:.0%}" if standing.best_known else "-",
+    } | {f"against {display_name(duel.rival)}": _duel_cell(duel) if standing.usable else "-" for duel in standing.duels}
+
+
+def _duel_cell(duel: Duel) -> str:
+    sign = {None: "=", duel.subject: "+", duel.rival: "-"}[duel.winner()]
+    return f"{sign} ({duel.superiority:.2f}, p {duel.p:.2g})"

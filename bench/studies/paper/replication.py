@@ -1,0 +1,144 @@
+"""`armlab paper`: all tables and figures of the paper and the replication report, in one folder."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from armlab.common.settings import Settings
+from bench.files import write_whole
+from bench.printed import read_printed
+from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_loaded_experiment
+from bench.store import open_store
+from bench.studies.best_known.records import best_known_values
+from bench.studies.mutations import MutationHistory, replay_mutations
+from bench.studies.paper.claims import Evidence, literal_readings
+from bench.studies.paper.identification import BestRun, find_best_run, simulate_identification
+from bench.studies.paper.published import published_readings
+from bench.studies.paper.ranking import SUBJECT, ranking_table, standings
+from bench.studies.paper.settings import (
+    Figure4Settings,
+    Table1Settings,
+    Table2Settings,
+    Table4Settings,
+    TrajectorySettings,
+    read_settings,
+    settings_to_yaml,
+)
+from bench.studies.paper.tables import make_table1, make_table2, make_table4, table1_deviations, table2_differences
+from bench.tables import as_csv, tidy_frame
+
+EXPERIMENTS = ("table3", "figure2", "figure2_equal_evaluations", "figure3", "ranking")
+STAGNATION_READINGS = ("second_difference", "no_improvement")
+Files = dict[str, str | bytes]
+
+
+@dataclass(frozen=True)
+class _ItemSettings:
+    """The settings of what is no experiment of its own."""
+
+    table1: Table1Settings
+    table2: Table2Settings
+    figure4: Figure4Settings
+    figure5: TrajectorySettings
+    table4: Table4Settings
+
+
+def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
+    """Run what is missing and write everything into the results folder; yields the files as they are written.
+
+    configs: the folder with one configuration for each table and figure. records: the best known trajectories.
+    Raises as `run_experiment` does.
+    """
+    items = _read_items(configs)
+    loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
+    for experiment in loaded.values():
+        yield from run_loaded_experiment(experiment, options, bar)
+    evidence = _gather_evidence(items, loaded, options, records)
+    files = _make_files(items, loaded, evidence) | _settings_files(items)
+    yield from _write_files(options.results, files)
+    yield from _write_files(options.results, _report_files(evidence, options.results))
+
+
+def describe_paper(configs: Path, options: RunOptions) -> Iterator[str]:
+    """What would be run, and how long it would take."""
+    for name in EXPERIMENTS:
+        yield from describe_run(configs / f"{name}.yaml", options)
+
+
+def _read_items(configs: Path) -> _ItemSettings:
+    return _ItemSettings(
+        read_settings(Table1Settings, configs / "table1.yaml"),
+        read_settings(Table2Settings, configs / "table2.yaml"),
+        read_settings(Figure4Settings, configs / "figure4.yaml"),
+        read_settings(TrajectorySettings, configs / "figure5.yaml"),
+        read_settings(Table4Settings, configs / "table4.yaml"),
+    )
+
+
+def _gather_evidence(
+    items: _ItemSettings, loaded: Mapping[str, LoadedExperiment], options: RunOptions, records: Path
+) -> Evidence:
+    paper = read_printed()
+    frames, best = _read_outcomes(items, loaded, options)
+    return Evidence(
+        paper=paper,
+        frames=frames,
+        deviations=table1_deviations(items.table1.arm, paper),
+        differences=table2_differences(loaded[items.table2.experiment].entries, paper),
+        ranking=standings(frames["ranking"], best_known_values(loaded["ranking"].entries, records)),
+        mutation_histories=_replay_subject(loaded["table3"], options.workers),
+        best=best,
+        found=simulate_identification(items.table4, best),
+        published=published_readings(paper.optimum),
+        readings=literal_readings(paper),
+    )
+
+
+def _read_outcomes(
+    items: _ItemSettings, loaded: Mapping[str, LoadedExperiment], options: RunOptions
+) -> tuple[dict[str, pd.DataFrame], BestRun]:
+    with open_store(options.store) as store:
+        frames = {name: tidy_frame(found.entries, store) for name, found in loaded.items()}
+        return frames, find_best_run(loaded[items.table4.experiment].entries, store, items.table4.algorithm)
+
+
+def _replay_subject(loaded: LoadedExperiment, workers: int) -> dict[str, list[MutationHistory]]:
+    runs = [entry for entry in loaded.entries if entry.trial.algorithm == SUBJECT]
+    return {reading: replay_mutations(runs, workers, stagnation=reading) for reading in STAGNATION_READINGS}
+
+
+def _make_files(items: _ItemSettings, loaded: Mapping[str, LoadedExperiment], evidence: Evidence) -> Files:
+    from bench.studies.paper.figures import draw_figure4, draw_figure5
+
+    figures = {
+        items.figure4.name: draw_figure4(items.figure4, evidence.best),
+        items.figure5.name: draw_figure5(items.figure5, evidence.best),
+    }
+    return {
+        **make_table1(items.table1, evidence.paper),
+        **make_table2(items.table2, loaded[items.table2.experiment].entries, evidence.paper),
+        **make_table4(items.table4, evidence.best, evidence.found, evidence.paper),
+        **{f"{name}.{suffix}": image for name, images in figures.items() for suffix, image in images.items()},
+        "ranking_duels.csv": as_csv(ranking_table(evidence.ranking)),
+    }
+
+
+def _settings_files(items: _ItemSettings) -> Files:
+    every: tuple[Settings, ...] = (items.table1, items.table2, items.figure4, items.figure5, items.table4)
+    return {f"{item.model_dump()['name']}.settings.yaml": settings_to_yaml(item) for item in every}
+
+
+def _report_files(evidence: Evidence, folder: Path) -> Files:
+    from bench.studies.paper.report import FIGURE_CAPTIONS, markdown_to_html, replication_page
+
+    text = replication_page(evidence)
+    images = {name: (folder / name).read_bytes() for name in FIGURE_CAPTIONS}
+    return {"replication.md": text, "replication.html": markdown_to_html("What could be reproduced", text, images)}
+
+
+def _write_files(folder: Path, files: Files) -> Iterator[Path]:
+    for name, content in files.items():
+        write_whole(folder / name, content)
+        yield folder / name

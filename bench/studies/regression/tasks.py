@@ -1,0 +1,78 @@
+"""The three tasks of `armlab regression`, each as the lines that it prints and an exit code."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bench.files import check_folder
+from bench.run import ProgressBar
+from bench.studies.regression.check import judge_run
+from bench.studies.regression.sweep import (
+    Baseline,
+    plan_entries,
+    read_baseline,
+    read_sweep,
+    run_entries,
+    write_baseline,
+)
+
+BASELINE_FILE = "regression_baseline.json"
+
+
+@dataclass(frozen=True)
+class TaskReport:
+    """What to print, and the exit code: 0 passed or written, 1 a regression."""
+
+    lines: Sequence[str]
+    exit_code: int = 0
+
+
+@dataclass(frozen=True)
+class RegressionTasks:
+    """The check of one configuration, with its baseline in the folder `results`.
+
+    Every method raises InputError, in one line, for bad input, StoppedError and TrialsFailedError.
+    """
+
+    config: Path
+    results: Path
+    workers: int
+    bar: ProgressBar
+
+    def check(self) -> TaskReport:
+        """Run the fixed sweep and compare it with the baseline."""
+        sweep = read_sweep(self.config)
+        baseline = read_baseline(self.results / BASELINE_FILE, sweep)
+        entries = plan_entries(sweep)
+        with self.bar(len(entries), 0) as progress:
+            verdict = judge_run(baseline, run_entries(entries, self.workers, progress.update), sweep.false_alarm_rate)
+        return TaskReport(verdict.lines(), 0 if verdict.passed else 1)
+
+    def update_baseline(self) -> TaskReport:
+        """Make the baseline anew from the present code, and check that the fixed run passes against it."""
+        sweep = read_sweep(self.config)
+        check_folder(self.results, "regression_baseline", "")
+        ends, fixed = plan_entries(sweep, sweep.baseline), plan_entries(sweep)
+        with self.bar(len(ends) + len(fixed), 0) as progress:
+            baseline = Baseline(
+                run_entries(ends, self.workers, progress.update), run_entries(fixed, self.workers, progress.update)
+            )
+        path = self.results / BASELINE_FILE
+        write_baseline(path, sweep, baseline)
+        verdict = judge_run(baseline, baseline.fixed_run, sweep.false_alarm_rate)
+        return TaskReport([f"wrote {path}", *verdict.lines()], 0 if verdict.passed else 1)
+
+    def calibrate(self) -> TaskReport:
+        """Compute the check's false-alarm rate and power, and write them down."""
+        from bench.studies.regression.calibration import (  # brings unittest.mock, which a check does not need
+            calibrate,
+            planned_trials,
+            write_calibration,
+        )
+
+        sweep = read_sweep(self.config)
+        baseline = read_baseline(self.results / BASELINE_FILE, sweep)
+        check_folder(self.results, "regression_calibration", "")
+        with self.bar(planned_trials(sweep), 0) as progress:
+            calibration = calibrate(sweep, baseline, self.workers, progress.update)
+        return TaskReport([f"wrote {path}" for path in write_calibration(self.results, sweep, calibration)])

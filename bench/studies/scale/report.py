@@ -1,0 +1,115 @@
+"""`armlab scale`: measure, and write `scale.md` and `kills.md`."""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from armlab.common.markdown import markdown_page, markdown_table
+from bench.files import write_whole
+from bench.provenance import provenance
+from bench.result_sets.formats import make_folder
+from bench.studies.scale.kills import KillResult, Victim, kill_repeatedly
+from bench.studies.scale.sweeps import ReportProgress, ScaleCost, SweepCost, measure_scale
+
+_SCALE_READING = """\
+Small trials on purpose: 50 evaluations of a function that costs microseconds, so that everything beside the searches
+shows. Memory: resident, of the command itself without its workers. Trials: seconds by the clock, without start and
+table, which the same command takes on the finished store. Searches: their processor time in sum. Overhead: what a trial
+costs beside its search, of one core: its key, its way to a worker and back, the store."""
+_KILLS_READING = """\
+SIGKILL when a random share of the trials is kept, to the command (the driver, which is then started again) or to one
+of its two workers (which the command replaces). Lost: trials that were in the store when the kill was over and at the
+end were not, or not the same. Exact: the restart ran those trials that were missing and no other; the table has the
+bytes of a run that nobody kills; SQLite finds no fault in the store."""
+
+
+def scale_page(scale: ScaleCost) -> str:
+    """Markdown text about sweeps."""
+    return markdown_page(
+        "Large sweeps",
+        _machine_text(),
+        _SCALE_READING,
+        _sweep_table([scale.tenth_sweep, scale.whole_sweep]),
+        _scale_verdict(scale),
+    )
+
+
+def kills_page(kills: Mapping[str, Sequence[KillResult]]) -> str:
+    """Markdown text about kills, by victim."""
+    return markdown_page("Kills", _machine_text(), _KILLS_READING, _kill_table(kills))
+
+
+def _machine_text() -> str:
+    facts = json.loads(provenance())
+    return f"{facts['processor']}, {facts['system']}, Python {facts['python']}."
+
+
+def _sweep_table(sweeps: Sequence[SweepCost]) -> str:
+    headings = ["", *(f"{sweep.trials:,} trials" for sweep in sweeps)]
+    rows = {
+        "trials, s": lambda sweep: f"{sweep.trial_seconds:.0f}",
+        "searches, s": lambda sweep: f"{sweep.search_seconds:.0f}",
+        "overhead of a trial, ms": lambda sweep: f"{sweep.overhead_ms:.2f}",
+        "start and table, s": lambda sweep: f"{sweep.repeated.seconds:.1f}",
+        "memory after a quarter, MB": lambda sweep: f"{sweep.run.after(0.25):.0f}",
+        "after a half": lambda sweep: f"{sweep.run.after(0.5):.0f}",
+        "after three quarters": lambda sweep: f"{sweep.run.after(0.75):.0f}",
+        "peak, table included": lambda sweep: f"{sweep.run.peak:.0f}",
+        "report, s": lambda sweep: f"{sweep.report.seconds:.0f}" if sweep.report else "-",
+        "peak of the report, MB": lambda sweep: f"{sweep.report.peak:.0f}" if sweep.report else "-",
+    }
+    return markdown_table(headings, [[name, *map(show, sweeps)] for name, show in rows.items()])
+
+
+def _scale_verdict(scale: ScaleCost) -> str:
+    growth = scale.whole_sweep.run.peak - scale.tenth_sweep.run.peak
+    return (
+        f"Ten times the trials take {growth:.0f} MB more at the peak. {scale.tenth_sweep.trials:,} trials on "
+        "one worker and "
+        f"on two, in turns, medians: {scale.alone:.1f} s and {scale.together:.1f} s, an efficiency of "
+        f"{scale.efficiency:.0%} while the machine had an average load of {scale.load:.1f} on {os.cpu_count()} cores, "
+        "these runs included."
+    )
+
+
+def _kill_table(kills: Mapping[str, Sequence[KillResult]]) -> str:
+    headings = ["victim", "kills", "kept at the kill", "lost", "computed by the restart", "exact"]
+    rows = [
+        [
+            victim,
+            len(found),
+            f"{sum(kill.kept for kill in found):,}",
+            sum(kill.lost for kill in found),
+            f"{sum(kill.computed for kill in found):,}" if victim == "driver" else "no restart",
+            f"{sum(kill.exact for kill in found)} of {len(found)}",
+        ]
+        for victim, found in kills.items()
+    ]
+    return markdown_table(headings, rows)
+
+
+_VICTIMS: tuple[Victim, ...] = ("driver", "worker")
+
+
+def write_scale(configs: Path, trials: int, results: Path, tell: ReportProgress) -> Path:
+    """Measure sweeps of so many trials, and a tenth of them, as `scale.yaml` in `configs` says; write `scale.md`.
+
+    Raises InputError for a number of trials that does not fit the configuration.
+    """
+    make_folder(results)
+    write_whole(results / "scale.md", scale_page(measure_scale(configs / "scale.yaml", trials, tell)))
+    return results / "scale.md"
+
+
+def write_kills(configs: Path, count: int, results: Path, tell: ReportProgress) -> tuple[Path, bool]:
+    """Kill the command, and its workers, that often while they run `scale_kills.yaml`; write `kills.md`.
+
+    Returns the page, and whether every kill was without a loss.
+    """
+    make_folder(results)
+    kills: dict[str, list[KillResult]] = {
+        victim: kill_repeatedly(configs / "scale_kills.yaml", count, victim, tell) for victim in _VICTIMS
+    }
+    write_whole(results / "kills.md", kills_page(kills))
+    return results / "kills.md", all(kill.exact for some in kills.values() for kill in some)

@@ -1,0 +1,197 @@
+"""Tables of outcomes: one row a trial, summaries by algorithm, times, average convergence, and the summary as a
+Markdown page.
+"""
+
+from collections.abc import Hashable, Iterable, Iterator, Sequence
+from dataclasses import asdict
+from itertools import chain, islice
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from algorithms.contract import Array
+from armlab.common.markdown import markdown_page, markdown_table
+from bench.config import Experiment
+from bench.execute import Curves
+from bench.plan import Entry
+from bench.printed import display_name, read_printed
+from bench.statistics import Summary, is_feasible, summarise
+from bench.store import RunStore
+
+GROUP_COLUMNS = ["problem", "swarm_size", "budget", "algorithm"]
+_ROWS_PER_PIECE = 4096  # that are Python objects at a time; in the table a row takes some tens of bytes
+
+
+def tidy_frame(entries: Iterable[Entry], store: RunStore) -> pd.DataFrame:
+    """One row a trial in the order of the entries, which must all be in the store; their arrays stay there."""
+    rows = (_trial_row(entry, store) for entry in entries)
+    return pd.concat(_frame_pieces(rows), ignore_index=True)
+
+
+def _frame_pieces(rows: Iterator[dict[str, object]]) -> Iterator[pd.DataFrame]:
+    for first in rows:
+        yield pd.DataFrame(list(chain([first], islice(rows, _ROWS_PER_PIECE - 1))))
+
+
+def _trial_row(entry: Entry, store: RunStore) -> dict[str, object]:
+    """The facts of one trial by column."""
+    return entry_labels(entry) | store.figures(entry.key)._asdict()
+
+
+def entry_labels(entry: Entry) -> dict[str, object]:
+    """Which trial it is, by column."""
+    return {
+        "problem": entry.problem,
+        "swarm_size": entry.trial.swarm_size,
+        "budget": entry.trial.evaluations,
+        "algorithm": entry.algorithm,
+        "repetition": entry.trial.repetition,
+    }
+
+
+SUMMARY_COLUMNS = ["algorithm", *Summary.__dataclass_fields__, "evaluations"]
+
+
+def summary_table(frame: pd.DataFrame) -> pd.DataFrame:
+    """One row a problem, swarm size, budget and algorithm, in the order of the frame.
+
+    evaluations: average over the repetitions. A tidy frame of one problem and swarm size gives COLUMNS alone.
+    """
+    rows = [
+        {
+            **dict(zip(GROUP_COLUMNS, names, strict=True)),
+            **asdict(summarise(group["value"].to_numpy(), group["violation"].to_numpy())),
+            "evaluations": group["evaluations"].mean(),
+        }
+        for names, group in frame.groupby(GROUP_COLUMNS, sort=False)
+    ]
+    return pd.DataFrame(rows)[_varying_columns(frame) + SUMMARY_COLUMNS]
+
+
+def times_table(frame: pd.DataFrame) -> pd.DataFrame:
+    """Seconds of search on one core, by the same groups: of a run on average, its deviation, and in total."""
+    seconds = frame.groupby(GROUP_COLUMNS, sort=False)["seconds"]
+    table = seconds.agg(average_seconds="mean", standard_deviation="std", total_seconds="sum").reset_index()
+    return table[[*_varying_columns(frame), "algorithm", "average_seconds", "standard_deviation", "total_seconds"]]
+
+
+def _varying_columns(frame: pd.DataFrame) -> list[str]:
+    return [name for name in ("problem", "swarm_size") if frame[name].nunique() > 1]
+
+
+def as_csv(table: pd.DataFrame) -> str:
+    """CSV text with six significant digits, which rounding differences between machines rarely reach."""
+    return table.to_csv(index=False, float_format="%.6g", na_rep="nan", lineterminator="\n")
+
+
+def convergence_table(entries: Sequence[Entry], store: RunStore) -> pd.DataFrame:
+    """One row an algorithm and iteration; iteration 0 is the first population.
+
+    best_so_far, present_best: averages over the repetitions whose point is feasible at that time, NaN without
+    any; the two shares say how many those are.
+    """
+    labels = dict.fromkeys(entry.algorithm for entry in entries)
+    return pd.concat(
+        [
+            _average_convergence(label, [store.get(entry.key).curves for entry in entries if entry.algorithm == label])
+            for label in labels
+        ],
+        ignore_index=True,
+    )
+
+
+def _average_convergence(label: str, curves: Sequence[Curves]) -> pd.DataFrame:
+    moments = np.unique(np.concatenate([curve.evaluations for curve in curves]))
+    best, best_share = _feasible_mean(
+        _align_curves(moments, curves, [curve.best_value for curve in curves]),
+        _align_curves(moments, curves, [curve.best_violation for curve in curves]),
+    )
+    present, present_share = _feasible_mean(
+        _align_curves(moments, curves, [curve.present_value for curve in curves]),
+        _align_curves(moments, curves, [curve.present_violation for curve in curves]),
+    )
+    return pd.DataFrame(
+        {
+            "algorithm": label,
+            "iteration": np.arange(len(moments)),
+            "evaluations": moments,
+            "best_so_far": best,
+            "best_so_far_feasible_share": best_share,
+            "present_best": present,
+            "present_best_feasible_share": present_share,
+        }
+    )
+
+
+def _align_curves(moments: Array, curves: Sequence[Curves], rows: Sequence[Array]) -> Array:
+    """Rows below each other at common numbers of evaluations (n, moments): populations need not be of one size.
+
+    Before its first population a run has the figure of that; after its end it stays where it ended.
+    """
+    places = [np.searchsorted(curve.evaluations, moments, side="right") - 1 for curve in curves]
+    return np.stack([row[np.maximum(place, 0)] for row, place in zip(rows, places, strict=True)])
+
+
+def _feasible_mean(values: Array, violations: Array) -> tuple[Array, Array]:
+    """Averages over the feasible entries of each column (n, k) and the shares of those."""
+    feasible = is_feasible(values, violations)
+    count = feasible.sum(axis=0)
+    total = np.where(feasible, values, 0.0).sum(axis=0)
+    mean = np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
+    return mean, count / len(values)
+
+
+_SUMMARY_NOTE = """\
+The figure is the problem's own, for an arm the condition number of the observation matrix of the
+trajectory itself, without weights and penalty. Minimum, average and sample standard deviation (n - 1) are
+of the feasible ends only, of which "feasible" gives the share; in the median and the quartiles an
+infeasible end counts as infinite. Evaluations: those of one run, the first population included; every
+algorithm has the same budget."""
+_PRINTED_NOTE = """\
+In brackets: the paper's Table 3 as printed. Its conventions cannot be recovered in full, so its figures stand
+beside ours for their order of magnitude, not to be met. Its seconds are as printed; ours are in
+`{name}_times.csv`, since no two runs share them."""
+_SUMMARY_HEADINGS = {
+    "minimum": "minimum",
+    "average": "average",
+    "standard_deviation": "standard deviation",
+    "median": "median",
+    "lower_quartile": "lower quartile",
+    "upper_quartile": "upper quartile",
+    "feasible_share": "feasible",
+    "evaluations": "evaluations",
+}
+_PRINTED_COLUMNS = ("minimum", "average", "standard_deviation")
+
+
+def summary_page(table: pd.DataFrame, experiment: Experiment) -> str:
+    """Markdown text of a summary table."""
+    names = [name for name in table.columns if name not in _SUMMARY_HEADINGS]
+    headings = [*names, *_SUMMARY_HEADINGS.values(), *(["seconds (paper)"] if experiment.printed else [])]
+    rows = [_summary_cells(row, names, experiment.printed) for row in table.to_dict("records")]
+    notes = [_SUMMARY_NOTE, *([_PRINTED_NOTE.format(name=experiment.name)] if experiment.printed else [])]
+    return markdown_page(experiment.name, _settings_line(experiment), markdown_table(headings, rows), *notes)
+
+
+def _settings_line(experiment: Experiment) -> str:
+    return (
+        f"{experiment.repetitions} repetitions, seed {experiment.seed}, bounds: {experiment.bounds}. "
+        f"All settings: `{experiment.name}.settings.yaml`."
+    )
+
+
+def _summary_cells(row: dict[Hashable, Any], names: list[str], beside: bool) -> list[str]:
+    label = str(row["algorithm"])
+    paper = read_printed().table3.rows.get(label) if beside else None
+    cells = [display_name(label) if name == "algorithm" else str(row[name]) for name in names]
+    for name in _SUMMARY_HEADINGS:
+        ours = _format_number(name, row[name])
+        cells.append(f"{ours} ({getattr(paper, name):g})" if paper and name in _PRINTED_COLUMNS else ours)
+    return [*cells, f"{paper.seconds:g}" if paper else "-"] if beside else cells
+
+
+def _format_number(name: str, value: float) -> str:
+    if name == "feasible_share":
+        return f"{value:.0%}"
+    return f"{value:.0f}" if name == "evaluations" else f"{value:.3g}"

@@ -1,1 +1,0 @@
-"""Models with missing physics as files of simulators, as far as these have the physics."""

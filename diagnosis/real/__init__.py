@@ -1,1 +1,0 @@
-"""The public recordings of real arms diagnosed with only the rigid body given."""

@@ -1,1 +1,0 @@
-"""Whether 95 % intervals hold the truth in 95 % of simulated experiments."""

@@ -1,1 +1,0 @@
-"""Identified models as files of simulators."""

@@ -1,1 +1,0 @@
-"""The same recordings through other packages: figaroh and mujoco.sysid, side by side with this one."""

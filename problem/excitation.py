@@ -1,0 +1,134 @@
+"""The excitation problem: a point in a box, its trajectory, and the fitness of that trajectory.
+
+A problem can also be shifted at random, so that only the origin of coordinates moves: an algorithm that is drawn to
+the origin gains or loses by the shift, any other finds the same trajectories.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from problem.arm import Arm
+from problem.base_parameters import BaseParameters
+from problem.contract import Evaluation, Problem
+from problem.fitness import Criterion, condition_number, singular_values
+from problem.limits import Constraints
+from problem.motion import Motion
+from problem.trajectories import Trajectory, sample_instants
+from problem.transforms import Array
+
+
+@dataclass(frozen=True)
+class Penalty:
+    """What a broken limit costs: fitness + step + weight * violation, with `step` paid once."""
+
+    step: float
+    weight: float
+
+    def fitness(self, merit: Array, violation: Array) -> Array:
+        """What is minimised (points,), from merits and violations (points,)."""
+        return merit + np.where(violation > 0, self.step + self.weight * violation, 0.0)
+
+
+@dataclass(frozen=True)
+class FeasibilityRules:
+    """Deb 2000: a feasible point beats an infeasible one, the merit orders the first, the violation the others.
+
+    One number a point says so, since a search that only compares fitness then keeps the rules.
+    """
+
+    floor: float = 1e30  # above every finite merit, and far enough below the largest double for any violation
+
+    def fitness(self, merit: Array, violation: Array) -> Array:
+        """What is minimised (points,), from merits and violations (points,)."""
+        return np.where(violation > 0, self.floor * (1.0 + violation), merit)
+
+
+@dataclass(frozen=True, eq=False)
+class ExcitationProblem:
+    """Find the trajectory from which the base parameters of an arm are seen best."""
+
+    name: str
+    arm: Arm
+    base: BaseParameters
+    trajectory: Trajectory
+    duration: float
+    samples: int
+    constraints: Constraints
+    criterion: Criterion
+    penalty: Penalty | FeasibilityRules
+    unit_columns: bool = False
+
+    @property
+    def spectral(self) -> bool:
+        """Whether a point's value is the condition number, whose derivatives are known."""
+        return True
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, (dimension,)."""
+        return self.trajectory.lower
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, (dimension,)."""
+        return self.trajectory.upper
+
+    @cached_property
+    def times(self) -> Array:
+        """Instants (samples,) at which a trajectory is judged, s."""
+        return sample_instants(self.duration, self.samples)
+
+    def evaluate(self, points: Array) -> Evaluation:
+        """Fitness, condition number and violation of points (points, dimension).
+
+        Each point's result is the same to the bit in any batch; a point that is not finite costs infinitely.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._evaluate(points)
+
+    def _evaluate(self, points: Array) -> Evaluation:
+        excitation = self.trajectory.motions(np.ascontiguousarray(points, dtype=np.float64), self.times)
+        violation = self.constraints.violation(excitation)
+        reached = excitation.overreach == 0
+        merit, value = np.zeros(len(points)), np.full(len(points), np.inf)
+        merit[reached], value[reached] = self._judge(excitation.motion.select(reached))
+        return Evaluation(self.penalty.fitness(merit, violation), value, violation)
+
+    def _judge(self, motion: Motion) -> tuple[Array, Array]:
+        """Criterion and condition number of motions (points, samples, joints), (points,) each."""
+        values = singular_values(self.arm, motion, self.base.columns, self.unit_columns)
+        return self.criterion.value(values), condition_number(values)
+
+
+MAX_SHIFT_WIDTHS = 2.0  # widths of the box by which the origin may move
+
+
+@dataclass(frozen=True, eq=False)
+class ShiftedProblem:
+    """A problem in coordinates x + shift (dimension,)."""
+
+    problem: Problem
+    shift: Array
+    name: str
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds, (dimension,)."""
+        return self.problem.lower + self.shift
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds, (dimension,)."""
+        return self.problem.upper + self.shift
+
+    def evaluate(self, points: Array) -> Evaluation:
+        """Results of the points (points, dimension) in the problem's own coordinates."""
+        return self.problem.evaluate(points - self.shift)
+
+
+def shift_randomly(problem: Problem, seed: int) -> ShiftedProblem:
+    """The problem with its origin moved by up to two widths of the box in each coordinate."""
+    shift = np.random.default_rng(seed).uniform(-MAX_SHIFT_WIDTHS, MAX_SHIFT_WIDTHS, len(problem.lower))
+    return ShiftedProblem(problem, shift * (problem.upper - problem.lower), f"{problem.name}-frame-{seed}")

@@ -1,1 +1,0 @@
-"""Recordings of real arms: format, importers, checks and repairs, filters, vocabulary of effects."""

@@ -1,1 +1,0 @@
-"""Readers of other formats: each gives the columns of one file as a table."""

@@ -1,1 +1,0 @@
-"""Public recordings of real arms: where they are, and how their raw files become recording folders."""
