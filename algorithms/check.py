@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from algorithms.contract import AnyAlgorithm, Array, Box, uniform_points
+from algorithms.contract import AnyAlgorithm, Box, uniform_points
 from algorithms.driver import clip
+from armlab.common.arrays import Array
 
 BetweenCalls = Callable[[Any, list[Array]], Any]
 

@@ -26,8 +26,9 @@ from typing import Any
 import numpy as np
 from cmaes import CMA
 
-from algorithms.contract import Array, Box, as_loss
+from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from armlab.common.arrays import Array
 
 
 class PicklableOptimiserState:

@@ -11,9 +11,8 @@ An algorithm knows no budget, bound policy, log, file or seed. `algorithms.check
 from typing import Any, ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array: TypeAlias = NDArray[np.float64]
+from armlab.common.arrays import Array
 
 ParamsT = TypeVar("ParamsT", contravariant=True)
 StateT = TypeVar("StateT")

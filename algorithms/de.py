@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import Array, Box, as_loss
+from algorithms.contract import Box, as_loss
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import AnyAlgorithm, Array, Box, as_loss
+from algorithms.contract import AnyAlgorithm, Box, as_loss
+from armlab.common.arrays import Array
 
 BoundPolicy = Callable[[Array, Box], Array]
 

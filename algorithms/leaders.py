@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Array, as_loss
+from algorithms.contract import as_loss
+from armlab.common.arrays import Array
 
 
 @dataclass

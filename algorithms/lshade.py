@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from algorithms.contract import Array, Box, as_loss
+from algorithms.contract import Box, as_loss
+from armlab.common.arrays import Array
 
 MEMORY_SPREAD = 0.1  # of both distributions about a memory entry
 

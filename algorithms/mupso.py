@@ -21,8 +21,9 @@ from typing import Literal
 
 import numpy as np
 
-from algorithms.contract import Array, Box, uniform_points
+from algorithms.contract import Box, uniform_points
 from algorithms.spso import Swarm, fly, global_best, land, new_swarm
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from algorithms.contract import AnyAlgorithm, Array, Box, uniform_points
+from algorithms.contract import AnyAlgorithm, Box, uniform_points
 from algorithms.driver import iterate, minimise, planned_iterations
+from armlab.common.arrays import Array
 
 SWARM_SIZE, DIMENSIONS, EVALUATIONS = 50, 15, 1550
 REFERENCE_BOX = Box(np.full(DIMENSIONS, -1.0), np.full(DIMENSIONS, 3.0))  # the origin inside, not in the centre

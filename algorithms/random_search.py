@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Array, Box, uniform_points
+from algorithms.contract import Box, uniform_points
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Array, Box
+from algorithms.contract import Box
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

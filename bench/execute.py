@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import AnyAlgorithm, Array, Box, as_loss
+from algorithms.contract import AnyAlgorithm, Box, as_loss
 from algorithms.driver import Result, minimise
 from algorithms.registry import load
+from armlab.common.arrays import Array
 from bench.seeds import first_population, own_stream
 from problem.contract import Evaluation, Problem
 from problem.registry import ProblemSettings

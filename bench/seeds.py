@@ -5,7 +5,8 @@ import json
 
 import numpy as np
 
-from algorithms.contract import Array, Box
+from algorithms.contract import Box
+from armlab.common.arrays import Array
 
 
 def named_generator(*names: str | int) -> np.random.Generator:

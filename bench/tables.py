@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.config import Experiment
 from bench.execute import Curves

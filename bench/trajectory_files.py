@@ -8,12 +8,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.excitation import ExcitationProblem
 from problem.limits import Constraints, peaks
 from problem.motion import Motion
 from problem.trajectories import sample_instants
-from problem.transforms import Array
 
 MAX_RATE_AT_REST = 1e-9  # rad/s and rad/s2 (m): what rounding leaves
 

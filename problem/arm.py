@@ -11,7 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from problem.transforms import Array, rotation_z, translation
+from armlab.common.arrays import Array
+from problem.transforms import rotation_z, translation
 
 PARAMETER_NAMES = ("m", "mcx", "mcy", "mcz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")  # eq. 31
 PARAMETER_UNITS = ("kg", *("kg.m",) * 3, *("kg.m2",) * 6)

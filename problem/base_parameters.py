@@ -12,10 +12,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import observation_matrix
-from problem.transforms import Array
 
 Preference = Literal["later_columns", "earlier_columns"] | Sequence[str]
 RANDOM_STATES = 200  # random states that probe the columns

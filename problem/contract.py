@@ -2,7 +2,7 @@
 
 from typing import NamedTuple, Protocol
 
-from problem.transforms import Array
+from armlab.common.arrays import Array
 
 
 class Evaluation(NamedTuple):

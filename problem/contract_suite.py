@@ -11,9 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.settings import validate
 from problem.contract import Evaluation, Problem
-from problem.transforms import Array
 
 
 class ProblemContract:

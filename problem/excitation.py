@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters
 from problem.contract import Evaluation, Problem
@@ -16,7 +17,6 @@ from problem.fitness import Criterion, condition_number, singular_values
 from problem.limits import Constraints
 from problem.motion import Motion
 from problem.trajectories import Trajectory, sample_instants
-from problem.transforms import Array
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import gram_matrix, observation_matrix
-from problem.transforms import Array
 
 MAX_GRAM_CONDITION = 1e4
 """Largest condition number taken from the Gram matrix: its square loses 2e-16 * cond^2 of relative accuracy,

@@ -6,8 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from problem.contract import Evaluation
-from problem.transforms import Array
 
 
 def sphere(x: Array) -> Array:

@@ -18,12 +18,12 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem
 from problem.motion import Motion
 from problem.regressor import observation_matrix
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
-from problem.transforms import Array
 
 Complex = NDArray[np.complex128]
 

@@ -6,8 +6,8 @@ J = [[sigma, h], [h^T, m]] with h the first moment and sigma = tr(I)/2 eye - I t
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from problem.arm import Link
-from problem.transforms import Array
 
 
 def pseudo_inertia_of(link: Link) -> Array:

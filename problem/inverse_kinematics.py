@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, link_poses
 from problem.motion import Motion
-from problem.transforms import Array
 
 MIN_SINE = 1e-6  # of the elbow's angle and of the distance (m) to the first axis: keeps the rates finite
 GEOMETRY_TOLERANCE = 1e-9

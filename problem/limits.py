@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from problem.arm import Arm, Limits, body_points
 from problem.kernel import lib, pointer
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.trajectories import Excitation
-from problem.transforms import Array
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from problem.transforms import Array
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal, TypeVar
 import numpy as np
 from annotated_types import Ge, Gt
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings
 from problem.arm import Arm, Limits
@@ -21,7 +22,6 @@ from problem.inverse_kinematics import planar_arm
 from problem.limits import Constraints, Workspace
 from problem.robot_file import load_arm
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
-from problem.transforms import Array
 
 Positive = Annotated[float, Gt(0)]
 Vector = tuple[float, float, float]

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 from problem.arm import Arm, Link
 from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of
 

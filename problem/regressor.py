@@ -10,10 +10,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from problem.arm import Arm, Joint
 from problem.kernel import ffi, lib, pointer
 from problem.motion import Motion
-from problem.transforms import Array
 
 MAX_JOINTS = 16  # as in kernel.c
 LANES = 8

@@ -10,10 +10,10 @@ from typing import Protocol
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from problem.inverse_kinematics import Path, PlanarArm
 from problem.kernel import lib, pointer
 from problem.motion import Motion
-from problem.transforms import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,8 @@
 """Homogeneous transforms, (4, 4), lengths in metres and angles in radians."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from armlab.common.arrays import Array
 
 
 def translation(x: float, y: float, z: float) -> Array:

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from problem.arm import Arm, Joint, Link
 from problem.inertia import link_from_pseudo_inertia
 from problem.motion import Motion
-from problem.transforms import Array, roll_pitch_yaw
+from problem.transforms import roll_pitch_yaw
 
 
 def random_pose(rng: np.random.Generator) -> Array:

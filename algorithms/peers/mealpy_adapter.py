@@ -14,8 +14,8 @@ from typing import Any
 
 from mealpy import DE, GOA, GWO, PSO, WOA, FloatVar
 
-from algorithms.contract import Array
 from algorithms.peers.peer import Evaluate, Peer, Start, answer_first_population
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

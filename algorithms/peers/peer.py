@@ -23,8 +23,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from algorithms.contract import Array, Box, as_loss
+from algorithms.contract import Box, as_loss
 from algorithms.leaders import Leaders, leader, no_leaders, promote
+from armlab.common.arrays import Array
 
 Evaluate = Callable[[Array], Array]
 Loop = Callable[[Evaluate], None]

@@ -14,8 +14,9 @@ from typing import Any
 
 import pygmo
 
-from algorithms.contract import Array, Box
+from algorithms.contract import Box
 from algorithms.peers.peer import Evaluate, Peer, Start
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, validate
-from armlab.recordings.recording import Array
 from problem.arm import Arm, Joint, Link
 from problem.inertia import (
     link_from_centre_of_mass,

@@ -10,11 +10,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
 
+from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.outside import OutsideEffect
 from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
 from armlab.concealed.sizing import SimulatedCase
-from armlab.recordings.recording import Array, Role
+from armlab.recordings.recording import Role
 
 ENCODER_BITS = (20, 24)  # powers of two a joint turn, gear included
 JITTER_S = 2e-5  # of stamps that are late while the samples are even

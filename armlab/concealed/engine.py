@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 from problem.arm import Arm, Joint, Link
 from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.motion import Motion

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
-from armlab.recordings.recording import Array
 
 Family = Callable[[np.random.Generator, Array, int], Array]
 USED_RANGE = 0.7  # of the position limits

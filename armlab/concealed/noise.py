@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 
 USUAL_KINDS = ("white", "coloured")
 JUDGED_KINDS = ("heavy_tails", "growing_with_speed", "quantised", "mains_hum")  # never in development sets

@@ -23,11 +23,11 @@ from typing import Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.effects.friction import bouc_wen
 from armlab.concealed.effects.hidden import HiddenEffect, smooth_sign, torque_share
 from armlab.concealed.engine import Mount, Parts, Pendulum, Track
-from armlab.recordings.recording import Array
 
 
 class OutsideEffect(HiddenEffect):

@@ -17,12 +17,12 @@ import mujoco
 import numpy as np
 from mujoco import rollout
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import with_parameters
 from armlab.concealed.effects.hidden import HiddenEffect, smooth_sign
 from armlab.concealed.engine import Parts, Plant, Track, build_plant
 from armlab.concealed.motions import make_reference, moving_average
 from armlab.concealed.plan import Plan, RunPlan
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
+from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.engine import Track
 from armlab.concealed.noise import Noise
@@ -33,7 +34,6 @@ from armlab.concealed.simulate import (
     reference_track,
     simulate_runs,
 )
-from armlab.recordings.recording import Array
 from armlab.recordings.vocabulary import EFFECTS
 
 ORACLE_HZ = 250.0  # rows a second: means over 4 ms

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Columns
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.solver import Fit
-from armlab.recordings.recording import ROLES, Array
+from armlab.recordings.recording import ROLES
 
 MAX_VARIANCE_RATIO = 1e5  # times the least variance: directions that other columns hold as well are not tested
 ROUNDING = 1e-14  # of the largest variance: rounding

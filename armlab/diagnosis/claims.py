@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes, parameter_half_widths
@@ -17,7 +18,6 @@ from armlab.effects.naming import IDENTICAL_EFFECTS
 from armlab.effects.next_experiment import next_experiment
 from armlab.effects.springs import SpringCompensator
 from armlab.effects.term import SIGN_SIGMAS
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis
 from problem.regressor import rigid_body_torque

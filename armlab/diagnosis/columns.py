@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.noise import Noise
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, binary_opening, median_filter
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.settings import Settings
 from armlab.recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
 from armlab.recordings.differentiate import Signals, differentiate, resample_at, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
-from armlab.recordings.recording import Array, Role, Run
+from armlab.recordings.recording import Role, Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import inertia_column

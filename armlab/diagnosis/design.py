@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.columns import (
     Block,
     Columns,
@@ -28,7 +29,6 @@ from armlab.effects.naming import is_first_name
 from armlab.effects.plausible import prior_scale
 from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array
 from problem.base_parameters import BaseParameters
 from problem.motion import Motion
 

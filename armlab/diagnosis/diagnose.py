@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.claims import make_claims
 from armlab.diagnosis.data import Observed, observe, rows_in
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
@@ -34,7 +35,7 @@ from armlab.diagnosis.unknown import (
     predict_residual_structure,
 )
 from armlab.effects.library import library
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
 
 

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import (
     BlockCovariance,
     Folds,
@@ -23,7 +24,6 @@ from armlab.diagnosis.refine import prior_precision
 from armlab.diagnosis.search import contained_groups
 from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, State
 from armlab.effects.plausible import reason_implausible
-from armlab.recordings.recording import Array
 
 HELD_OUT_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Columns, Moments
 from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.links import Widths
@@ -14,7 +15,6 @@ from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, Solver, State
 from armlab.diagnosis.surrogate import flexible_features, predict_structure
 from armlab.effects.contract import Family, Scene
-from armlab.recordings.recording import Array
 from problem.regressor import rigid_body_torque
 
 INITIAL_LINK_WIDTH = 0.08  # of the links' errors, for the first look

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import BlockCovariance, block_covariance, whitened_rows
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.refine import prior_precision
 from armlab.effects.contract import Candidate, Value
-from armlab.recordings.recording import Array
 
 CONFIDENCE = 0.95
 INTERVAL_FACTOR = (

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 from problem.arm import Arm, Link
 from problem.base_parameters import BaseParameters
 from problem.pseudo_inertia import entropic_information, pseudo_inertias, regular_nominal

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.result import Located
 from armlab.diagnosis.surrogate import Features, predict_structure
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.periods import find_period
-from armlab.recordings.recording import Array
 
 
 def noise_floor(final: Array, made: Sequence[Features], observed: Observed) -> Array:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment
-from armlab.recordings.recording import Array, Role
+from armlab.recordings.recording import Role
 
 FILTER_CORRELATION_ROWS = 1.5  # rows that the filter ties together
 MAX_ORDER = 12  # order at most

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2, norm
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report.words import (
     effect_in_words,
@@ -27,7 +28,7 @@ from armlab.identification.real.report import LOOKS_FILE
 from armlab.identification.real.study import RECIPES
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 
 LOGGED_MODEL = "diagnosis"
 RECORDING_NAMES = ("emps", "staubli-tx40", "unisa-ur10", "kuka-kr300")

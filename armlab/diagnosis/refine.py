@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import whitened_rows
 from armlab.diagnosis.columns import Block
 from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.solver import Fit, Solver, State
 from armlab.effects.contract import Candidate
-from armlab.recordings.recording import Array
 
 EVALUATIONS_PER_SHAPE = 18  # a shape parameter
 LOGARITHMIC_RATIO = 30.0  # bounds so far apart are searched by their logarithm

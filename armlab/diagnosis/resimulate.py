@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.result import Diagnosis
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion

@@ -3,12 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Literal
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import Candidate, Value
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 
 Status = Literal["mismatch", "none", "inconclusive"]
 Interval = tuple[float, float] | tuple[tuple[float, float], ...]

@@ -6,12 +6,12 @@ from functools import cached_property
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Group
 from armlab.diagnosis.links import LINK_UNCERTAINTY_GRID, SINGLE_LINK_GRID, Widths
 from armlab.diagnosis.settings import Guards
 from armlab.diagnosis.solver import CROWD_PENALTY, USUAL_EFFECTS, Solver, State
 from armlab.effects.plausible import reason_implausible
-from armlab.recordings.recording import Array
 
 SPECIAL_FRICTION = (
     "nonlinear_viscous_friction",

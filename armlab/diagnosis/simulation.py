@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.settings import Baseline
@@ -12,7 +13,7 @@ from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.geometry_check import check_torque_fit
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.regressor import rigid_body_torque
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.identification.export import (
     EXPORTED_EFFECTS,
     check_ending,
@@ -21,7 +22,6 @@ from armlab.identification.export import (
 )
 from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.inertia import link_from_centre_of_mass
 from problem.pseudo_inertia import links_of, parameters_of, pseudo_inertias, regular_nominal

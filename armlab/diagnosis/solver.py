@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Group, Moments
 from armlab.diagnosis.links import LinkPrior, Widths
-from armlab.recordings.recording import Array
 
 RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
 MIN_UNABSORBED_SHARE = 1e-6  # of a column's squared length: what less of it is left is not seen

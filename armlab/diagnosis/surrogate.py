@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import Gain, block_numbers, held_out_gain
 from armlab.diagnosis.data import Observed, Segment, rows_in
 from armlab.diagnosis.noise import Noise
-from armlab.recordings.recording import Array
 
 RIDGES = tuple(10.0 ** np.arange(-6.0, 2.0))  # of the mean squared length of a feature
 FOLD_S = 2.0  # s: stretches that choose the ridge in turn

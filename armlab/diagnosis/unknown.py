@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
@@ -13,7 +14,6 @@ from armlab.diagnosis.result import Claim
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import MIN_STRUCTURE_GAIN, Structure, feature_banks, find_structure
 from armlab.effects.next_experiment import next_experiment
-from armlab.recordings.recording import Array
 
 HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
 UNKNOWN_LEVEL = 0.03  # of the test between stretches of time, after all surrogates that were tried

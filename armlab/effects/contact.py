@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.term import Term, form_from_parameters, format_number
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 GRID_DURATIONS_S = (0.3, 1.0, 3.0)  # s, of a plain grid

@@ -3,9 +3,9 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
+from armlab.common.arrays import Array
 from armlab.effects.extras import Value
 from armlab.effects.scene import Scene
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 __all__ = ["Candidate", "Family", "Scene", "Value"]

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.friction import direction_of_motion
 from armlab.effects.term import Term, form_from_parameters, format_sum, joint_moves
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 WRIST_JOINTS = 3  # joints whose drives may go through one another

@@ -6,9 +6,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 KNEE_SHARES = (0.4, 0.6, 0.8)  # of the model's highest torque

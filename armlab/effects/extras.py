@@ -7,9 +7,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.effects.scene import Scene
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 ENTRY_POINT_GROUP = "armlab.effects"

@@ -6,9 +6,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number, format_sum, top_speed
-from armlab.recordings.recording import Array
 from armlab.recordings.vocabulary import VISCOUS
 from problem.arm import Arm
 

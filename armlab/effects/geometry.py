@@ -7,10 +7,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.sensitivity import GEOMETRY_STEP, directional_derivative, geometry_derivative, gravity_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
-from armlab.recordings.recording import Array
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.transforms import rotation_x, translation

@@ -9,9 +9,9 @@ from typing import Any, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, Term, format_number
-from armlab.recordings.recording import Array
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
 from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis

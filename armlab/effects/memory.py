@@ -8,6 +8,7 @@ import numpy as np
 from scipy.linalg.lapack import dtbtrs
 from scipy.signal import lfilter
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.friction import (
     PARTS_PER_SAMPLE,
@@ -18,7 +19,6 @@ from armlab.effects.friction import (
     positions_within_samples,
 )
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number, joint_moves, top_speed
-from armlab.recordings.recording import Array
 from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 

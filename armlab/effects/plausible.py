@@ -6,8 +6,8 @@ of a hundred kilograms. A normal prior of a generous width costs a real effect n
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
-from armlab.recordings.recording import Array
 
 PRIOR_SCALES = {  # of coefficients, SI units
     "geometry_error": 0.02,  # m or rad

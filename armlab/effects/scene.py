@@ -5,7 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from armlab.recordings.recording import Array, Run
+from armlab.common.arrays import Array
+from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import inertia_column, rigid_body_torque

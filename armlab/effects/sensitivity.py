@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import savgol_filter
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
-from armlab.recordings.recording import Array
 from problem.arm import Joint
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

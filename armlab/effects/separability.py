@@ -6,9 +6,9 @@ from itertools import combinations
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.filters import Filter
-from armlab.recordings.recording import Array
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
 

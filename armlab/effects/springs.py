@@ -6,6 +6,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.term import (
     SIGN_SIGMAS,
@@ -16,7 +17,6 @@ from armlab.effects.term import (
     format_sum,
     joint_moves,
 )
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

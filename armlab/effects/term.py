@@ -7,8 +7,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
-from armlab.recordings.recording import Array
 from armlab.recordings.vocabulary import Kind, effect_named
 from problem.arm import Arm
 

@@ -9,10 +9,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene, Value
 from armlab.effects.sensitivity import delay_signal, directional_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
 

@@ -12,11 +12,11 @@ from typing import Any, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.effects._drive_train import ffi, lib
 from armlab.effects.contract import Candidate, Scene, Value
 from armlab.effects.sensitivity import directional_derivative, joint_displacement
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.kernel import pointer
 from problem.motion import Motion

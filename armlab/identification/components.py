@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 from problem.motion import Motion

@@ -13,9 +13,9 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.stats import norm
 from scipy.stats import t as student
 
+from armlab.common.arrays import Array
 from armlab.identification.estimators.least_squares import Estimate
 from armlab.identification.regression import Regression
-from armlab.recordings.recording import Array
 
 CONFIDENCE = 0.95
 MIN_LAG_PERIODS = 2.0  # of the filter's cut-off, within the lag

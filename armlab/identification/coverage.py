@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import norm
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.identification.components import usual_components
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 from armlab.identification.structure import Structure
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.robot_file import load_arm

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
+from armlab.common.arrays import Array
 from armlab.identification.estimators.least_squares import Estimator, Prior
 from armlab.identification.regression import Regression
-from armlab.recordings.recording import Array
 
 FOLD_BLOCKS = 6
 GAP_PERIODS = 1.0  # of the filter's cut-off, left out on both sides of a held-out block

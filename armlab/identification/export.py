@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Array
 from problem.inertia import pseudo_inertia_of, transform_pseudo_inertia
 from problem.pseudo_inertia import link_of
 from problem.transforms import inverse, turn_z_to

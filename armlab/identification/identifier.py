@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.identification.components import Component, usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.cross_validation import held_out_error
@@ -32,7 +33,7 @@ from armlab.identification.regression import Regression, cutoff_of, regression, 
 from armlab.identification.selection import with_load
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.arm import Arm
 
 LOAD_TOLERANCE = 1e-8  # of the links, between two of these rounds

@@ -11,13 +11,13 @@ from pydantic import Field
 from scipy.linalg import block_diag
 from scipy.stats import norm
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
 from armlab.effects.extras import Extra, extra_from_file, registered_effects
 from armlab.identification.components import FORMS, Component
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import Parameter, TorqueModel, parameter_jacobian
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.pseudo_inertia import links_of
 from problem.robot_file import LinkEntry, built_in_arms, load_arm

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
@@ -24,7 +25,7 @@ from armlab.identification.selection import counterbalance_groups
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Array, Recording, Run
+from armlab.recordings.recording import Recording, Run
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
 from problem.inertia import link_from_centre_of_mass
 from problem.motion import Motion

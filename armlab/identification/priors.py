@@ -5,10 +5,10 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.identification.estimators.least_squares import Prior
 from armlab.identification.regression import Regression
 from armlab.identification.structure import Structure
-from armlab.recordings.recording import Array
 from problem.pseudo_inertia import entropic_information, parameters_of, regular_nominal
 
 

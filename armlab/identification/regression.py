@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.identification.structure import Structure
 from armlab.recordings.cutoff import choose_cutoff
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 
 MAX_CUTOFF_SHARE = 0.45  # of the sampling rate: cut-offs
 ROWS_PER_CUTOFF = 4  # rows kept in a period of the cut-off: what the filter leaves holds no more

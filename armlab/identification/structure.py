@@ -7,9 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.identification.components import Component
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array
 from problem.arm import PARAMETER_UNITS, Arm
 from problem.base_parameters import BaseParameters, base_parameters
 from problem.motion import Motion

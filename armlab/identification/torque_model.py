@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 from scipy.stats import norm
 
+from armlab.common.arrays import Array
 from armlab.effects.extras import Extra, torque_with_extras
 from armlab.effects.scene import Scene, scene_of
 from armlab.identification.components import Component
 from armlab.identification.regression import signals_of
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array
 
 
 @dataclass(frozen=True)

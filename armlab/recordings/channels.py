@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.recordings.recording import Array, Finding, Run, Transmission
+from armlab.recordings.recording import Finding, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry
 from armlab.recordings.table import Table
 from armlab.recordings.units import SI_UNITS, UNITS_BY_SIGNAL, Unit, resolve_units

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.geometry_check import check_torque_fit, find_turned_zero, thin_runs
 from armlab.recordings.load import load_runs, open_recording, with_runs
-from armlab.recordings.recording import Array, Finding, Recording, Run
+from armlab.recordings.recording import Finding, Recording, Run
 from problem.arm import Arm
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves

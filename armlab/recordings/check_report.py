@@ -11,11 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.check import CheckResult
 from armlab.recordings.cutoff import CutoffChoice
 from armlab.recordings.differentiate import Signals, differentiate
-from armlab.recordings.recording import ROLES, Array, Recording, Run
+from armlab.recordings.recording import ROLES, Recording, Run
 from problem.arm import Arm
 
 FIGURE_WIDTH_IN, ROW_HEIGHT_IN = 11.0, 1.5  # inches

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.recordings.filters import LowPass
-from armlab.recordings.recording import Array
 
 CANDIDATE_COUNT = 60
 MIN_CUTOFF_PERIODS = 10  # periods of the lowest candidate within the run

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.recordings.cutoff import CutoffChoice, choose_cutoff
 from armlab.recordings.filters import Butterworth, Filter, LowPass
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.motion import Motion
 
 MIN_STEP_SHARE = 0.2  # of a step: a spline through two noisy samples this close would swing out

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 
 BUTTERWORTH_ORDER = 4  # of the Butterworth filter each way
 

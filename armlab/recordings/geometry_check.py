@@ -12,8 +12,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.recordings.differentiate import differentiate
-from armlab.recordings.recording import Array, Finding, Run
+from armlab.recordings.recording import Finding, Run
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters, base_parameters
 from problem.motion import Motion

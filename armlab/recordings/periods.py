@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.recordings.differentiate import Signals, resample_at, resample_evenly
 from armlab.recordings.filters import Filter
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.motion import Motion
 
 MAX_PERIOD_MISMATCH = 0.02  # of the motion's variance: a lag with a smaller mean-square difference is a period

@@ -11,10 +11,11 @@ import numpy as np
 import pandas as pd
 from scipy.io import loadmat
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros import read_bag
-from armlab.recordings.recording import Array, Role
+from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 
 GITHUB = "https://raw.githubusercontent.com"

@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 
-Array = NDArray[np.float64]
 Role = Literal["identify", "validate"]
 ROLES: tuple[Role, ...] = ("identify", "validate")
 SIGNALS = (

@@ -9,9 +9,10 @@ import yaml
 from annotated_types import Gt, Len
 from pydantic import Field, model_validator
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
-from armlab.recordings.recording import Array, Role
+from armlab.recordings.recording import Role
 
 FILE_NAME = "recording.yaml"
 Names = Annotated[tuple[str, ...], Len(min_length=1)]

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import Array, Finding, Run
+from armlab.recordings.recording import Finding, Run
 
 MAX_PLAUSIBLE_VALUE = 1e9  # no arm moves, pulls or lasts this much in SI units
 MAX_BAD_ROW_SHARE = 0.05  # more bad rows than this, and the file is broken rather than a few rows

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import Array, Finding, Run
+from armlab.recordings.recording import Finding, Run
 
 MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
 MIN_WARNED_LATENESS = 0.1  # of a step: less is lost in what the splines do well

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.recordings.recording import Array, Finding
+from armlab.recordings.recording import Finding
 
 HEADER_LINES = 1
 

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.result_sets.result_set import ResultSet, runs_by_algorithm
 from bench.statistics import Summary, is_feasible, quantile, summarise
 from bench.statistics.ends import quantile_interval, row_quantiles

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from algorithms.contract import Array
 from algorithms.registry import names as registered
+from armlab.common.arrays import Array
 from bench.files import write_whole
 from bench.report import sections
 from bench.report.analysis import Cell, analyse_cells, block_losses, share_of_targets_reached

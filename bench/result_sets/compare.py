@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.files import write_whole

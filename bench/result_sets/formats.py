@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from bench.files import write_whole
 from bench.result_sets.result_set import TRIAL_COLUMNS, ResultSet, TableOfCurves, read_stored_results, runs_by_algorithm

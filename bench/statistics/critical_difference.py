@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import friedmanchisquare, rankdata
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.statistics.pairwise import holm, signed_rank_p
 
 Pair = tuple[str, str]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.seeds import named_generator
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import wilcoxon
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.statistics.ends import is_feasible, percentile_interval, resamples
 
 

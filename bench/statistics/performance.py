@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

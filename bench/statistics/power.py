@@ -13,7 +13,7 @@ from scipy.optimize import bisect
 from scipy.special import ndtri
 from scipy.stats import wilcoxon
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.seeds import named_generator
 
 POWER_SIMULATIONS = 4000

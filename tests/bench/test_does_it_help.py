@@ -11,6 +11,7 @@ from scipy.stats import spearmanr
 import bench.studies.does_it_help.judgement as judgement
 import bench.studies.does_it_help.study as study
 import bench.studies.does_it_help.trajectories as trajectories
+from armlab.common.arrays import Array
 from bench.studies.best_known.records import RECORDS_FILE, read_records
 from bench.studies.does_it_help.identification import NOISE_KINDS, MeasurementNoise, identification_errors
 from bench.studies.does_it_help.judgement import (
@@ -28,7 +29,6 @@ from bench.studies.does_it_help.trajectories import PROBLEM_SETTINGS, make_speci
 from problem.excitation import ExcitationProblem
 from problem.registry import parse_problem
 from problem.regressor import rigid_body_torque
-from problem.transforms import Array
 
 RESULTS = Path(__file__).parents[2] / "results"
 

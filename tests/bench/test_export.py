@@ -9,12 +9,12 @@ import pytest
 import yaml
 from refusals import refusal
 
+from armlab.common.arrays import Array
 from bench.studies.best_known.export import export_record
 from bench.studies.best_known.records import RECORDS_FILE, Record, write_records
 from bench.trajectory_files import TRAJECTORY_FORMATS, SampledTrajectory, sample_trajectory, to_csv, to_rapid, to_ros2
 from problem.motion import Motion
 from problem.registry import parse_problem
-from problem.transforms import Array
 
 ROOT = Path(__file__).parents[2]
 REST = {"preset": "joint-fourier", "rest": True, "harmonics": 3, "duration": 4.0}

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
 from armlab.concealed.case_files import log_run
 from armlab.concealed.effects.hidden import HiddenEffect
@@ -12,7 +13,6 @@ from armlab.concealed.noise import Noise
 from armlab.concealed.plan import Plan, RunPlan
 from armlab.concealed.simulate import rigid_torque
 from armlab.concealed.sizing import SimulatedCase, simulate_case
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 
 MACHINE = make_machine("irb120-arm")

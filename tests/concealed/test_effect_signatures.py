@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hidden_cases import MACHINE, case, residual
 
+from armlab.common.arrays import Array
 from armlab.concealed.effects.bodies import Geometry, LinkError, Payload, Tilt
 from armlab.concealed.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew
 from armlab.concealed.effects.drives import Backlash, Coupling, Elasticity, Rotor
@@ -27,7 +28,6 @@ from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.effects.springs import Cable, Compensator, Ripple
 from armlab.concealed.outside import OUTSIDE
-from armlab.recordings.recording import Array
 from armlab.recordings.vocabulary import EFFECT_IDS
 from problem.arm import link_poses
 from problem.motion import Motion

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from refusals import refusal
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
 from armlab.concealed.loop import case
 from armlab.concealed.loop.case import Forecast, SecondMotion, Tools, play_case
@@ -18,7 +19,6 @@ from armlab.concealed.loop.recordings import simulate_first_recording, simulate_
 from armlab.concealed.loop.run import ANSWERS_FILE, LoopSettings, close_loop, play_cases, read_results, seal_loop
 from armlab.concealed.sets import read_checked_manifest
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Array
 
 SECONDS, RATE_HZ = 2.0, 250.0
 

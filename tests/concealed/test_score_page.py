@@ -13,6 +13,7 @@ import yaml
 from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
 from armlab.concealed.score import held_out
 from armlab.concealed.score.cases import MISSING_VERDICT, JudgedCase
@@ -25,7 +26,6 @@ from armlab.concealed.score.page import format_measure, judge_measure, render_pa
 from armlab.concealed.score.rows import make_rows
 from armlab.concealed.score.words import describe_hidden, describe_said
 from armlab.concealed.simulate import rigid_torque
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 
 ELSEWHERE = verdict("mismatch", (finding("backlash", 3),))

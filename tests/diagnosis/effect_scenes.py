@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 from random_arms import random_arm
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.library import BUILT_IN
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from armlab.recordings.recording import Array, Recording, Role, Run, Transmission
+from armlab.common.arrays import Array
+from armlab.recordings.recording import Recording, Role, Run, Transmission
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.next.problem import RivalSettings, TellApartProblem, TellApartSettings
-from armlab.recordings.recording import Array
 from problem.robot_file import BUILT_IN_FOLDER
 
 VISCOUS: dict[str, Any] = {"effect": "viscous_friction", "joint": 2, "parameters": {"coefficient": 0.3}}

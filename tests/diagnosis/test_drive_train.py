@@ -10,10 +10,10 @@ from random_arms import random_arm
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
 from armlab.effects.sensitivity import directional_derivative
 from armlab.effects.transmission import WALL_HZ, Backlash, JointElasticity, Twist, felt_inertia, integrate_twist
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 
 JOINT = 1

@@ -9,8 +9,8 @@ from effect_scenes import candidate, scene, scene_of, torque_of, waves
 from engines import inverse_dynamics, mujoco_model
 from random_arms import random_arm
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
-from armlab.recordings.recording import Array
 from problem.arm import Arm, Link
 from problem.inertia import link_from_centre_of_mass
 from problem.transforms import rotation_x, translation

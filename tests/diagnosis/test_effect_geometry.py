@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from effect_scenes import scene_of, waves
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.library import BUILT_IN
 from armlab.effects.separability import Confusion, base_rows, candidate_rows, compute_confusion
 from armlab.recordings.filters import Butterworth
-from armlab.recordings.recording import Array
 from problem.base_parameters import base_parameters
 from problem.robot_file import load_arm
 

@@ -9,9 +9,9 @@ from engines import pinocchio_model
 from random_arms import random_arm
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.concealed.effects.channels import EncoderOffset as HiddenOffset
 from armlab.effects.contract import Scene
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.motion import Motion
 

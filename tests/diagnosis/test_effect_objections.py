@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from effect_scenes import candidate, scene
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 from problem.inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from effect_scenes import family, scene
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Scene
-from armlab.recordings.recording import Array
 
 
 def scanned(effect: str, residual: Callable[[Scene], Array], joint: int) -> list[Candidate]:

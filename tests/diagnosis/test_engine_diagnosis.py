@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import yaml
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.verdict_files import verdict_content, write_verdict
 from armlab.identification.identifier import Identifier
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 from problem.robot_file import load_arm
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.location import period_scatter
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.filters import Butterworth
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 
 
 def run_of(position: Array, torque: Array, time: Array) -> Run:

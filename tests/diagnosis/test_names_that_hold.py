@@ -6,11 +6,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment
 from armlab.diagnosis.evidence import Evidence, reason_no_contact
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import is_form_error, names_contradicted_by_residual
-from armlab.recordings.recording import Array
 
 
 def _evidence(gain: float, joint: int = 1, usual: bool = False) -> Evidence:

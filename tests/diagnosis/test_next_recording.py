@@ -8,13 +8,14 @@ import pytest
 from engine_cases import NOISE, of_runs, recording, run
 from next_questions import verdict_file
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.next.experiment import choose_rival_groups, prepare_experiment
 from armlab.diagnosis.next.motion import Budget, build_excitation_problem, limits_in_force, random_point
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.problem import tell_apart_problem
 from armlab.diagnosis.next.question import Name
 from armlab.diagnosis.next.verdict_file import read_verdict
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 from problem.arm import Arm, Limits
 from problem.motion import Motion
 from problem.robot_file import load_arm

@@ -7,6 +7,7 @@ import pytest
 from next_questions import points, told_apart
 from refusals import refusal
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.claims import MAX_DEFICIT
 from armlab.diagnosis.next.decision import (
     decision_chances,
@@ -23,7 +24,6 @@ from armlab.diagnosis.next.question import Law, Name, Question, Rival
 from armlab.diagnosis.next.remedies import find_remedies
 from armlab.diagnosis.next.sampling import kept_columns, white_noise_sampling
 from armlab.effects.friction import ViscousFriction
-from armlab.recordings.recording import Array
 from problem.arm import Limits
 from problem.robot_file import load_arm
 

@@ -9,6 +9,7 @@ import pytest
 from public_copies import needs_copies
 from told_recordings import ARM, COULOMB, PAYLOAD, VISCOUS, frame, motion_at, recording_in
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.real_concealed.conceal import (
     Reference,
@@ -26,7 +27,7 @@ from armlab.identification.identifier import Identifier
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.study import RECIPES
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.regressor import rigid_body_torque
 
 CASES = (

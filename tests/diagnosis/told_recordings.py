@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.identification.components import Component, usual_components
 from armlab.identification.structure import Structure
-from armlab.recordings.recording import Array, Role, Run
+from armlab.recordings.recording import Role, Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.robot_file import load_arm

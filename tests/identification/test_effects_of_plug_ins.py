@@ -11,12 +11,13 @@ import yaml
 from refusals import refusal
 from simulated_arm import arm, motion, run, structure, truth
 
+from armlab.common.arrays import Array
 from armlab.effects import extras
 from armlab.effects.scene import Scene
 from armlab.identification.components import every_joint
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.identification.components import usual_components
 from armlab.identification.export import export_model, mjcf_document, srdf_document, urdf_document
 from armlab.identification.model import Model
 from armlab.identification.structure import Structure
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 from problem.pseudo_inertia import parameters_of, regular_nominal
 from problem.robot_file import load_arm

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from simulated_arm import arm, run, structure, truth
 
+from armlab.common.arrays import Array
 from armlab.identification.components import every_joint
 from armlab.identification.estimators.least_squares import (
     BayesianLeastSquares,
@@ -18,7 +19,7 @@ from armlab.identification.model import Model
 from armlab.identification.priors import Pull, nominal_prior, point_mass
 from armlab.identification.regression import Regression, regression, signals_of
 from armlab.identification.selection import candidate_groups, select_structure
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.motion import Motion
 from problem.pseudo_inertia import least_eigenvalues, parameters_of, regular_nominal
 

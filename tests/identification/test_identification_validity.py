@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 from simulated_arm import arm, motion, run, structure, truth
 
+from armlab.common.arrays import Array
 from armlab.identification.components import every_joint
 from armlab.identification.covariance import uncertainty
 from armlab.identification.coverage import Noise, three_joint_experiment
@@ -27,7 +28,7 @@ from armlab.identification.selection import (
 )
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.pseudo_inertia import link_of
 from problem.regressor import observation_matrix
 from problem.robot_file import load_arm

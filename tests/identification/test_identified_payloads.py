@@ -10,12 +10,13 @@ from refusals import refusal
 from simulated_arm import RATE_HZ, arm, motion
 
 from armlab.cli.identification import gains, payload
+from armlab.common.arrays import Array
 from armlab.identification.payload import PayloadSetting, Place, gains_lines, identify_payload, payload_lines
 from armlab.identification.priors import point_mass
 from armlab.identification.regression import signals_of
 from armlab.identification.structure import Structure
 from armlab.recordings.public import fetch_recording
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 from problem.arm import Arm
 from problem.motion import Motion

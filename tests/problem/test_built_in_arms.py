@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml
 from problem.arm import Link, link_poses
 from problem.inertia import (
@@ -17,7 +18,7 @@ from problem.inertia import (
     transform_pseudo_inertia,
 )
 from problem.robot_file import BUILT_IN_FOLDER, built_in_arms, load_arm
-from problem.transforms import Array, inverse, translation
+from problem.transforms import inverse, translation
 
 SCHEMA = Path(__file__).parents[1] / "schemas" / "robot.schema.json"
 BY_HAND = ("irb120-arm", "irb120-arm-eq49", "irb120")

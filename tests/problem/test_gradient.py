@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from random_arms import random_arm, random_motion
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem
 from problem.gradient import (
@@ -19,7 +20,6 @@ from problem.gradient import (
 from problem.motion import Motion
 from problem.registry import parse_problem
 from problem.regressor import observation_matrix
-from problem.transforms import Array
 
 EIGHTH_ORDER = (4 / 5, -1 / 5, 4 / 105, -1 / 280)
 SETTINGS: list[dict[str, Any]] = [

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_arms import random_arm, random_motion
 
+from armlab.common.arrays import Array
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.regressor import gram_matrix, observation_matrix, rigid_body_torque
 from problem.robot_file import load_arm
-from problem.transforms import Array
 
 ARM = random_arm("RRPR", seed=3)
 COLUMNS = np.array([5, 12, 20, 23, 29, 30, 31, 39])

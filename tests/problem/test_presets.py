@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from refusals import refusal
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.contract import Problem
 from problem.excitation import ExcitationProblem, ShiftedProblem
 from problem.functions import FUNCTIONS
 from problem.registry import names, parse_problem
-from problem.transforms import Array
 
 BARE_URDF = """<robot name="bare"><link name="a"/><link name="b"/>
 <joint name="j1" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""

@@ -7,11 +7,11 @@ import pytest
 from engines import mujoco_torque, pinocchio_model, pinocchio_regressor
 from random_arms import random_arm, random_motion
 
+from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import inertia_column, observation_matrix, rigid_body_torque
 from problem.robot_file import RobotFile, load_arm
-from problem.transforms import Array
 from problem.urdf import read_urdf
 
 STATES = 1000

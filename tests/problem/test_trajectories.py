@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, body_points, link_poses
 from problem.inverse_kinematics import planar_arm
 from problem.motion import Motion
 from problem.robot_file import load_arm
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory, sample_instants
-from problem.transforms import Array
 
 ARM = load_arm("irb120-arm")
 TOOL = np.array([0.0, 0.0, 0.374])

@@ -16,6 +16,7 @@ from public_copies import needs_copies
 from refusals import refusal
 
 from armlab.cli.recordings import PUBLIC_RECORDING_NAMES
+from armlab.common.arrays import Array
 from armlab.recordings.differentiate import Signals, differentiate
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import (
@@ -31,7 +32,6 @@ from problem.arm import Arm, link_poses
 from problem.base_parameters import base_parameters
 from problem.regressor import observation_matrix
 from problem.robot_file import load_arm
-from problem.transforms import Array
 from problem.urdf import read_urdf
 
 NEEDS_COPIES = needs_copies()

@@ -5,10 +5,10 @@ from typing import Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues, torque_share
 from armlab.concealed.engine import Track
-from armlab.recordings.recording import Array
 
 SATURATION_SHARPNESS = 8  # of saturation: the larger, the sharper
 

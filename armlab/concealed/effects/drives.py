@@ -5,10 +5,10 @@ from typing import Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine, with_rotor
 from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues, smooth_sign, torque_share
 from armlab.concealed.engine import Parts, Spring, Track
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 

@@ -4,10 +4,10 @@ from typing import Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues, smooth_sign, torque_share
 from armlab.concealed.engine import Track
-from armlab.recordings.recording import Array
 
 
 class Coulomb(HiddenEffect):

@@ -6,9 +6,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.engine import Parts, Track
-from armlab.recordings.recording import Array
 from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.concealed.loop.draw import draw_case
 from armlab.concealed.loop.recordings import (
@@ -16,7 +17,6 @@ from armlab.concealed.loop.recordings import (
     write_loop_recording,
 )
 from armlab.concealed.plan import random_stream
-from armlab.recordings.recording import Array
 
 Place = tuple[str, int | None]
 Start = Literal["ambiguous", "one name", "another class", "nothing"]

@@ -7,6 +7,7 @@ import numpy as np
 import yaml
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.case_files import write_case
 from armlab.concealed.engine import Track
@@ -23,7 +24,6 @@ from armlab.concealed.simulate import (
     simulate_runs,
 )
 from armlab.concealed.sizing import SimulatedCase, SizedEffects, correct_sizes, effect_multiples, resize_effects
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 
 CELL_SHARE = 0.35  # of the speeds, accelerations and ranges: a narrow cell, alike for all kinds of second motion

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from armlab.common.arrays import Array
 from armlab.concealed.score.cases import JudgedCase
 from armlab.concealed.score.figures import BLACK, BLUE, GREY, ORANGE, SKY, make_figure
 from armlab.concealed.score.held_out import SCORE_CUTOFF_HZ, HeldOut, filter_held_out_run, rms
@@ -26,7 +27,6 @@ from armlab.concealed.score.words import (
     name_hidden,
     name_said,
 )
-from armlab.recordings.recording import Array
 
 PICTURE_SIZE_IN, PICTURE_DPI = (7.8, 4.9), 100
 PALETTE_SIZE = 48  # of the palette of a picture: a file of some 30 kB, and no difference that one could see

@@ -14,12 +14,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import smooth_sign
 from armlab.concealed.score.cases import JudgedCase
 from armlab.concealed.simulate import rigid_torque, rotor_torque
 from armlab.recordings.differentiate import Signals, differentiate
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.regressor import observation_matrix

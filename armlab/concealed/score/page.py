@@ -15,14 +15,14 @@ STRICTER_MEASURES = {  # shown below the measure that is wanted: the same, count
 MAX_SHOWN_MISSES = 30
 SHOWN_MISS_COLUMNS = ["miss", "case", "tier", "arm", "effect", "law", "joint", "limits", "hidden", "said"]
 HOW_TO_READ = f"""\
-A *detection limit* is the size at which an oracle that knows the true law and the true noise finds the effect with 90 %
-power, at one per cent over all effects and places. Whoever does not know the law needs more: names are expected above
-{MIN_NAMED_MULTIPLE:g} limits. *Clean*: the simulation is exact but for what is hidden. *Realistic*: every link is
-3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden; *decoy*: only
-wrong links. A *claim* is a finding; one of what really is there, friction of the background too, is right; one whose first name is wrong is a wrong claim,
-even with the right name among its rivals. Intervals are 95 %: Wilson's for shares (as if the effects of a case were
-independent), bootstrap for medians. *Met*: the figure is as wanted; *surely*: so is its whole interval (or, not met,
-none of it); *perhaps*: the interval reaches across what was wanted."""
+A *detection limit* is the size at which an oracle that knows the true law and the true noise finds the effect with 90
+% power, at one per cent over all effects and places. Whoever does not know the law needs more: names are expected
+above {MIN_NAMED_MULTIPLE:g} limits. *Clean*: the simulation is exact but for what is hidden. *Realistic*: every link
+is 3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden; *decoy*: only wrong links.
+A *claim* is a finding; one of what really is there, friction of the background too, is right; one whose first name is
+wrong is a wrong claim, even with the right name among its rivals. Intervals are 95 %: Wilson's for shares (as if the
+effects of a case were independent), bootstrap for medians. *Met*: the figure is as wanted; *surely*: so is its whole
+interval (or, not met, none of it); *perhaps*: the interval reaches across what was wanted."""
 CAPTIONS = {
     "detection": "Size against share named. Bands: Wilson, 95 %; dotted: three limits.",
     "detection_by_effect": (

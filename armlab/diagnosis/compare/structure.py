@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.stats import t as student
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.columns import base_columns
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.intervals import parameter_half_widths
@@ -17,7 +18,6 @@ from armlab.effects.contract import Candidate, Scene
 from armlab.effects.extras import Extra, torque_with_extras
 from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array
 from problem.arm import PARAMETER_UNITS, Arm
 from problem.base_parameters import BaseParameters, base_parameters
 from problem.regressor import rigid_body_torque

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.settings import Settings
@@ -22,7 +23,6 @@ from armlab.effects.separability import Confusion, base_rows, candidate_rows, co
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.filters import Butterworth, Filter
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Array
 from armlab.recordings.table import read_table
 from problem.arm import Arm
 from problem.base_parameters import base_parameters

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.confusability.card import (
     CERTAIN_STANDARD_ERRORS,
@@ -26,7 +27,6 @@ from armlab.diagnosis.report.charts import PALE_COLOR, shorten_text, svg_element
 from armlab.diagnosis.report.html import folded_details, html_document, html_table, paragraph, section
 from armlab.diagnosis.verdict_files import write_texts
 from armlab.effects.library import library
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.robot_file import load_arm
 

@@ -10,13 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.next.decision import Chances
 from armlab.diagnosis.next.experiment import CLEAR_SEPARATION, Experiment, RivalPair
 from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
 from armlab.diagnosis.next.motion import random_point
 from armlab.diagnosis.next.question import Question
 from armlab.diagnosis.next.sampling import kept_columns
-from armlab.recordings.recording import Array
 
 CARD_SCHEMA = "next/1"
 

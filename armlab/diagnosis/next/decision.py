@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.claims import MAX_DEFICIT
 from armlab.diagnosis.next.moments import Index, draw_coefficients, solve_least_squares
 from armlab.diagnosis.next.prepare import PreparedQuestions
@@ -15,7 +16,6 @@ from armlab.diagnosis.next.question import Law, Question, Rival
 from armlab.diagnosis.search import SPECIAL_FRICTION
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.solver import USUAL_EFFECTS
-from armlab.recordings.recording import Array
 
 MIN_SEPARATION = 1e-9  # standard errors
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.next.decision import Chances, decision_chances
 from armlab.diagnosis.next.motion import (
@@ -28,7 +29,6 @@ from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem
 from problem.robot_file import load_arm
-from problem.transforms import Array
 
 RANDOM_MOTIONS = 20  # random motions that a design is compared with
 WHOLE_LIBRARY = "library"  # in place of names: everything that comes near

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import (
     CREEP_RATIO,
     HIGH_SPEED_QUANTILE,
@@ -22,7 +23,7 @@ from armlab.diagnosis.noise import fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.cutoff import acceleration_spectrum, noise_level
-from armlab.recordings.recording import Array, Recording, Role
+from armlab.recordings.recording import Recording, Role
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
 from armlab.effects.plausible import prior_scale, reason_implausible
-from armlab.recordings.recording import Array
 
 RELATIVE_RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
 ROUNDING_SHARE = 1e-6  # of a squared length: what less of it is left is not seen

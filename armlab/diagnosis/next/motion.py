@@ -11,6 +11,7 @@ import numpy as np
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
 from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.recording import Recording, Run
@@ -22,7 +23,6 @@ from problem.fitness import Criterion
 from problem.limits import Constraints, peaks
 from problem.motion import Motion
 from problem.trajectories import Excitation, JointFourier, sample_instants
-from problem.transforms import Array
 
 USED_LIMIT_SHARE = 0.995  # of each limit is used: peaks may lie between the instants at which they are looked for
 CENTRE_RANGE_SHARE = 0.97  # of the range: where q0 may be, so that there is room for a swing

@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
@@ -38,7 +39,7 @@ from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictFile
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.library import library
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters, base_parameters

@@ -10,6 +10,7 @@ import numpy as np
 from annotated_types import Ge, Gt
 from pydantic import Field
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings
 from armlab.diagnosis.next.decision import decision_strength
@@ -24,7 +25,6 @@ from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
 from problem.motion import Motion
 from problem.presets import LimitSettings, PerJoint, Positive, per_joint_values
 from problem.robot_file import load_arm
-from problem.transforms import Array
 
 MIN_STRENGTH = 1e-6  # standard errors: less is none
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.next.moments import ROUNDING_SHARE, Index, Moments, unexplained_power
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.filters import Filter
-from armlab.recordings.recording import Array
 from problem.base_parameters import BaseParameters
 
 LINK_PARAMETER_ERROR = "inertial_parameter_error"  # is in the links of a model, not beside them

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.next.first_run import PresentModel
 from armlab.diagnosis.next.moments import Index
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.question import Layout, Question, Rival, build_layout, inseparable_rivals
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion

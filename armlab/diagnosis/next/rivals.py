@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.next.first_run import FoundEffect
 from armlab.diagnosis.next.moments import (
@@ -24,7 +25,6 @@ from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.drive import TORQUE_OFFSET
 from armlab.effects.friction import COULOMB_FRICTION, VISCOUS_FRICTION
 from armlab.effects.naming import is_first_name
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 MAX_SHAPES = 24  # of a law that are looked at

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 from scipy.signal import lfilter
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import STANDSTILL_MARGIN, Segment, rows_in, split_segment
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.filters import Butterworth, Filter
-from armlab.recordings.recording import Array
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
 

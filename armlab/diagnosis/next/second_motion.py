@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.next.decision import Chances, decision_chances
@@ -35,7 +36,6 @@ from problem.arm import Arm
 from problem.excitation import ExcitationProblem
 from problem.robot_file import load_arm
 from problem.trajectories import sample_instants
-from problem.transforms import Array
 
 MotionKind = Literal["designed", "random", "condition"]
 MOTION_RATE_HZ = 250.0

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.real_concealed.plan import Disturbance, Piece, PieceKind
 from armlab.identification.components import Component
 from armlab.identification.identifier import Identifier
@@ -14,7 +15,7 @@ from armlab.identification.real.study import Recipe
 from armlab.identification.selection import Groups, components_of, describe_choice, select_structure
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import differentiate, resample_evenly
-from armlab.recordings.recording import Array, Recording, Run
+from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
 from problem.inertia import link_from_centre_of_mass
 from problem.motion import Motion

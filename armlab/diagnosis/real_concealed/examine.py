@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.diagnose import diagnose
@@ -28,7 +29,7 @@ from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.identification.model_file import write_model
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 
 Span = tuple[float, float]
 

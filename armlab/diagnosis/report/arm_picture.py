@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.report.charts import (
     GUILTY_COLOR,
     INNOCENT_COLOR,
@@ -15,7 +16,6 @@ from armlab.diagnosis.report.charts import (
     svg_picture,
     svg_text,
 )
-from armlab.recordings.recording import Array
 from problem.arm import Arm
 
 PICTURE_WIDTH, ROW_HEIGHT = 372.0, 17.0

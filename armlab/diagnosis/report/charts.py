@@ -8,7 +8,7 @@ from html import escape
 
 import numpy as np
 
-from armlab.recordings.recording import Array
+from armlab.common.arrays import Array
 
 FONT_FAMILY = "system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif"
 INK_COLOR, PALE_COLOR, LINE_COLOR = "#1b1f24", "#5b6570", "#d5dae0"

@@ -4,6 +4,7 @@ and simulated motion.
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.report.charts import (
     FOUND_LOOK,
     GIVEN_LOOK,
@@ -19,7 +20,7 @@ from armlab.diagnosis.report.charts import (
 from armlab.diagnosis.report.words import format_number, join_words, shorten_name
 from armlab.diagnosis.resimulate import WINDOW_SECONDS, NoInertiaError, Resimulation, resimulate
 from armlab.diagnosis.result import Diagnosis
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 
 MAX_DRAWN_WINDOWS = 3  # joints whose most telling window is drawn
 MOTION_HEIGHT = 215.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment, rows_in
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.recordings.recording import Array
 
 Rows = NDArray[np.intp]
 

@@ -4,6 +4,7 @@ the error is.
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.report.charts import (
     CHART_WIDTH,
     FITTED_ROWS_LOOK,
@@ -34,7 +35,6 @@ from armlab.diagnosis.report.charts import (
 from armlab.diagnosis.report.residuals import ShownResiduals, bin_means, clearest_stretch, residual_without, space_rows
 from armlab.diagnosis.report.words import effect_in_words, format_number, joint_unit, shorten_name
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.recordings.recording import Array
 
 STRETCH_SECONDS = 4.0
 JOINT_ROW_HEIGHT = 26.0

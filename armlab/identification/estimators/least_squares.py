@@ -8,8 +8,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.identification.regression import Regression
-from armlab.recordings.recording import Array
 
 RANK_TOLERANCE = 1e-7  # of the largest singular value, columns scaled to unit length; its square is near rounding
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import eigh
 
+from armlab.common.arrays import Array
 from armlab.identification.estimators.least_squares import Estimate, column_lengths, least_squares, pseudo_inverse
 from armlab.identification.regression import Regression, refilter
 from armlab.identification.structure import Structure
 from armlab.recordings.cutoff import acceleration_spectrum, noise_level
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.recording import Array, Run
+from armlab.recordings.recording import Run
 
 
 def reference_instruments(structure: Structure, signals: Signals) -> Array:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.identification.estimators.least_squares import (
     Estimate,
@@ -23,7 +24,6 @@ from armlab.identification.estimators.least_squares import (
 from armlab.identification.priors import NO_PULL, Pull, nominal_prior, nominal_rotors, point_mass
 from armlab.identification.regression import Regression
 from armlab.identification.structure import Structure
-from armlab.recordings.recording import Array
 from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis, pseudo_inertias, regular_nominal
 

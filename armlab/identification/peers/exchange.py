@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.recordings.filters import Butterworth
-from armlab.recordings.recording import Array
 
 
 @dataclass(frozen=True, eq=False)

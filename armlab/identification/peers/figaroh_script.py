@@ -14,8 +14,8 @@ from figaroh.identification import BaseIdentification
 from figaroh.tools.load_robot import load_robot
 from figaroh.tools.regressor import build_regressor_basic
 
+from armlab.common.arrays import Array
 from armlab.identification.peers.exchange import PeerRun, read_runs, write_answer
-from armlab.recordings.recording import Array
 
 
 class RecordedIdentification(BaseIdentification):  # type: ignore[misc]

@@ -14,8 +14,8 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
+from armlab.common.arrays import Array
 from armlab.identification.peers.exchange import PeerRun, read_runs, write_answer
-from armlab.recordings.recording import Array
 
 FIT_ROWS_PER_CUTOFF = 10  # rows in a period of the cut-off, at which a fit looks
 MAX_ITERATIONS = 60

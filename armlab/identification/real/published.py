@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from armlab.common.arrays import Array
 from armlab.identification.components import Component, neighbour_couplings, usual_components
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 from armlab.recordings.public import PUBLIC_RECORDINGS, STAUBLI, RemoteFile, find_raw_file
-from armlab.recordings.recording import Array, Recording
+from armlab.recordings.recording import Recording
 from problem.arm import PARAMETER_NAMES
 
 PUBLISHED_TABLE = RemoteFile(

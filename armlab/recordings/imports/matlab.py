@@ -18,8 +18,8 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import Array
 from armlab.recordings.table import Table
 
 READER_MODULE = "armlab.recordings.imports.matlab"

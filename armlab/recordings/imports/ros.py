@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.recordings.recording import Array
 from armlab.recordings.table import Table
 
 JOINT_STATE = "sensor_msgs/msg/JointState"

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import Array
 from armlab.recordings.table import Table, drop_broken_last_row, parse_numbers, read_text, split_rows
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}

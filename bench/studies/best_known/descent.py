@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.excitation import ExcitationProblem
 from problem.gradient import SpectralFunction, spectral_gradient, tangents
 from problem.motion import Motion
-from problem.transforms import Array
 
 
 @dataclass(frozen=True, eq=False)

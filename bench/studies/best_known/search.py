@@ -16,6 +16,7 @@ import numpy as np
 from algorithms.cmaes import CMAESParams
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from bench.config import find_algorithm
 from bench.execute import canonical
@@ -33,7 +34,6 @@ from bench.studies.best_known.records import (
 )
 from problem.excitation import ExcitationProblem
 from problem.fitness import Criterion
-from problem.transforms import Array
 
 METHOD_TURNS = ("cma-es", "gradient", "kick", "cma-es", "kick", "kick")  # one after the other
 METHOD_TURNS_WITHOUT_DERIVATIVES = ("cma-es", "kick")  # the same where there are no derivatives

@@ -8,10 +8,10 @@ from types import MappingProxyType
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from armlab.common.arrays import Array
 from problem.excitation import ExcitationProblem
 from problem.motion import Motion
 from problem.regressor import observation_matrix, rigid_body_torque
-from problem.transforms import Array
 
 RATE_HZ = 100.0
 FILTER_CUTOFF_HZ = 5.0  # ten times the highest harmonic of the family

@@ -9,13 +9,13 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.stats import rankdata
 
+from armlab.common.arrays import Array
 from bench.seeds import named_generator
 from bench.studies.does_it_help.identification import NOISE_KINDS, identification_errors
 from bench.studies.does_it_help.trajectories import Specimen, random_feasible
 from problem.excitation import ExcitationProblem
 from problem.fitness import Criterion, condition_number, singular_values
 from problem.regressor import observation_matrix
-from problem.transforms import Array
 
 CRITERIA = ("cond", "cond_unit_columns", "d_optimality", "e_optimality", "eq44")  # the smaller, the better
 ERRORS = ("prediction", "parameters", "parameters_si")

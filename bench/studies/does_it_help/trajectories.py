@@ -8,6 +8,7 @@ import numpy as np
 
 from algorithms.contract import Box
 from algorithms.driver import minimise
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from bench.config import find_algorithm
 from bench.seeds import named_generator
@@ -16,7 +17,6 @@ from bench.studies.best_known.search import record_point
 from problem.excitation import ExcitationProblem
 from problem.fitness import Criterion
 from problem.registry import parse_problem
-from problem.transforms import Array
 
 PROBLEM_SETTINGS: dict[str, Any] = {"preset": "joint-fourier"}
 BEST_RECORD = "joint-fourier"  # the record of that problem

@@ -7,13 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from armlab.common.arrays import Array
 from bench.figures import line_style, render_figure
 from bench.printed import display_name
 from bench.studies.paper.identification import BestRun
 from bench.studies.paper.settings import Figure4Settings, TrajectorySettings
 from problem.arm import Limits, body_points
 from problem.trajectories import sample_instants
-from problem.transforms import Array
 
 _ARM_COLOR = "#555555"
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from bench.execute import build_problem
 from bench.plan import Entry
@@ -19,7 +20,6 @@ from problem.excitation import ExcitationProblem
 from problem.motion import Motion
 from problem.regressor import observation_matrix, rigid_body_torque
 from problem.trajectories import sample_instants
-from problem.transforms import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,10 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from bench.printed import Printed, times_pi
 from problem.arm import PARAMETER_NAMES
-from problem.transforms import Array, rotation_x, rotation_z, translation
+from problem.transforms import rotation_x, rotation_z, translation
 
 PRINTED_GRAVITY = 9.8  # section 3
 RANDOM_STATES = 200

@@ -7,13 +7,13 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from bench.printed import PrintedOptimum
 from problem.excitation import ExcitationProblem
 from problem.fitness import condition_number, singular_values
 from problem.motion import Motion
 from problem.presets import PaperSettings
 from problem.trajectories import CartesianFourier
-from problem.transforms import Array
 
 DURATIONS = (0.5, 1.0, 2.0, 5.0, 2 * np.pi, 10.0)  # s; 2 pi makes the fundamental 1 rad/s
 TOOLS = ((0.0, 0.0, 0.374), (0.0, 0.0, 0.302))  # flange and wrist, m beyond the elbow's offset

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from armlab.common.arrays import Array
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import read_yaml, validate
 from bench.plan import Entry
@@ -18,7 +19,6 @@ from bench.tables import as_csv
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS
 from problem.base_parameters import BaseParameters
 from problem.robot_file import BUILT_IN_FOLDER, JointEntry, RobotFile
-from problem.transforms import Array
 
 _LENGTH_COLUMNS = {"a_mm": "a (mm)", "d_mm": "d (mm)"}
 _ANGLE_COLUMNS = {"alpha": "alpha (deg)", "lower": "lower range (deg)", "upper": "upper range (deg)"}

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.files import write_whole
 from bench.plan import Entry
 from bench.provenance import provenance

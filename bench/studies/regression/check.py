@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import gammaln
 from scipy.stats import mannwhitneyu
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.statistics import quantile
 from bench.statistics.pairwise import holm
 from bench.studies.regression.sweep import Baseline, Cell, Ends

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from algorithms.contract import as_loss
 from algorithms.de import DE, DEState
 from algorithms.spso import Swarm, fly
+from armlab.common.arrays import Array
 from bench.execute import Outcome, Trial, run_trial
 from bench.plan import Entry
 from bench.studies.regression.sweep import Ends, Progress, group_ends
@@ -24,7 +25,6 @@ from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.registry import ProblemSettings
 from problem.regressor import gram_matrix, observation_matrix
-from problem.transforms import Array
 
 Injection = Callable[[], AbstractContextManager[object]]
 Matrix = Callable[[Arm, Motion], Array]

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.config import Experiment, PositiveInt

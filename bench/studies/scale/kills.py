@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.run import RunOptions, load_experiment, run_experiment
 from bench.studies.scale.sweeps import ReportProgress
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.studies.speed.clock import median_seconds
 from problem.arm import Arm
 from problem.base_parameters import base_parameters

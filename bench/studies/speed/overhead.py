@@ -8,9 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from algorithms.contract import Array, Box
+from algorithms.contract import Box
 from algorithms.driver import minimise
 from algorithms.registry import load
+from armlab.common.arrays import Array
 from bench.studies.speed import peers
 from bench.studies.speed.clock import Task, median_seconds
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from algorithms.contract import Array
+from armlab.common.arrays import Array
 from bench.studies.speed.clock import Task
 
 Tasks = dict[tuple[str, str], tuple[Task, int]]

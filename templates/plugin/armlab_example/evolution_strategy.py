@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from algorithms.contract import Array, Box, as_loss
+from algorithms.contract import Box, as_loss
+from armlab.common.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 import numpy as np
 from annotated_types import Ge
 
+from armlab.common.arrays import Array
 from armlab.common.settings import Settings
 from problem.contract import Evaluation, Problem
-from problem.transforms import Array
 
 
 @dataclass(frozen=True)
