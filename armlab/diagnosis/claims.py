@@ -1,5 +1,6 @@
 """From a pruned model to claims: names, numbers, equations and rivals."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,32 +13,75 @@ from armlab.diagnosis.links import Widths
 from armlab.diagnosis.result import Claim, Interval, Parameter, Rival
 from armlab.diagnosis.search import Search
 from armlab.diagnosis.solver import State
-from armlab.effects.contract import Candidate
-from armlab.effects.links import InertialError, Payload, felt_values
-from armlab.effects.naming import IDENTICAL_EFFECTS
-from armlab.effects.next_experiment import next_experiment
-from armlab.effects.springs import SpringCompensator
-from armlab.effects.term import SIGN_SIGMAS
-from problem.motion import Motion
-from problem.pseudo_inertia import pseudo_inertia_basis
-from problem.regressor import rigid_body_torque
+from armlab.effects.contract import Candidate, Effect
+from armlab.effects.links import LinkLaw, felt_values, link_law
 
 MAX_DEFICIT = 2.0  # units of log likelihood: a difference that may be chance
 HELD_OUT_TOLERANCE = 0.01  # of the held-out error
 MAX_RIVALS = 3
+OUTLYING_FACTOR = 4.0  # times the median width of the other links
 
-RivalRows = list[tuple[str, int | None, tuple[int, ...], bool, float]]
+
+def make_claims(found: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence]) -> tuple[Claim, ...]:
+    """All claims of a model, the strongest first."""
+    if not effects and not links:
+        return ()
+    wide = extend_with_shapes(found)
+    claims = [_effect_claim(found, wide, group, evidence) for group, evidence in effects.items()]
+    claims += _link_claims(found, wide, links)
+    known = list(dict.fromkeys(group.candidate.facts for group in found.solver.groups))
+    claims = [_with_equal_sums(claim, claims, known) for claim in claims]
+    return tuple(sorted(claims, key=lambda claim: -claim.evidence.score))
 
 
-def find_rivals(found: FittedModel, group: int, own: Candidate) -> RivalRows:
-    """Rivals of a group in the state of a round: effect, joint, joints, identical, deficit; the best first.
+def next_experiment(effect: Effect, rivals: Sequence[Rival]) -> str | None:
+    """What would tell a claim from its rivals; None where there is nothing to tell."""
+    return effect.experiment or None if rivals else None
 
-    own: the candidate under its first name.
+
+def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effect]) -> Claim:
+    """The claim with effects as rivals that equal its sum with another claim at its joint, for any motion.
+
+    What not every arm has keeps its name: the rival stands beside the usual part of the sum.
     """
+    here = {other.effect for other in claims if other.joint == claim.joint}
+    equal = [each for each in known if any(claim.effect in pair and set(pair) <= here for pair in each.equal_sums)]
+    if claim.candidate is None or not claim.candidate.facts.usual or not equal:
+        return claim
+    names = {each.id for each in equal}
+    sums = [Rival(each.id, claim.joint, claim.joints, True) for each in equal]
+    rivals = (*sums, *(each for each in claim.rivals if each.effect not in names))[:MAX_RIVALS]
+    return replace(claim, rivals=rivals, next_experiment=next_experiment(claim.candidate.facts, rivals))
+
+
+def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evidence) -> Claim:
+    solver = found.solver
+    columns = solver.groups[group].columns
+    coefficients, covariance = solver.values(found.fit, group), wide.covariance(group)
+    candidate = solver.groups[group].candidate.first_name(coefficients, found.bench.scenes)
+    own = np.zeros(found.moments.size)
+    own[columns] = coefficients
+    rivals = find_rivals(found, group, candidate)
+    return Claim(
+        effect=candidate.effect,
+        joint=candidate.joint,
+        joints=candidate.joints,
+        parameters=named_parameters(candidate, coefficients, covariance, wide.factor),
+        equation=candidate.equation(coefficients),
+        evidence=evidence,
+        prediction=found.columns.torque_of(own),
+        rivals=rivals,
+        next_experiment=next_experiment(candidate.facts, rivals),
+        candidate=candidate,
+        coefficients=coefficients,
+        covariance=covariance,
+    )
+
+
+def find_rivals(found: FittedModel, group: int, own: Candidate) -> tuple[Rival, ...]:
+    """What these data cannot tell from a group of a model; the best first. own: its candidate, first name."""
     solver, state = found.solver, found.state
-    out: RivalRows = [
-        (name, own.joint, own.joints, True, 0.0) for name in IDENTICAL_EFFECTS.get((own.effect, own.form), ())
-    ]
+    out = [Rival(name, own.joint, own.joints, True) for name in own.identical]
     search = Search(solver, found.bench.settings.guards, True, 0)
     without = state.minus(group)
     scores = search.gains(without)
@@ -49,90 +93,18 @@ def find_rivals(found: FittedModel, group: int, own: Candidate) -> RivalRows:
             break
         candidate = solver.groups[rival].candidate
         same = candidate.effect == own.effect and candidate.joint == own.joint
-        known = any(each[:2] == (candidate.effect, candidate.joint) for each in out)
+        known = any((each.effect, each.joint) == (candidate.effect, candidate.joint) for each in out)
         if same or known or search.excluded(without, rival):
             continue
         other = search.with_group(without, rival)
         if search.objection(other, rival) is None and _predicts_as_well(found, other, full):
-            out.append((candidate.effect, candidate.joint, candidate.joints, False, max(deficit, 0.0)))
-    return out
+            out.append(Rival(candidate.effect, candidate.joint, candidate.joints, False, max(deficit, 0.0)))
+    return tuple(out)
 
 
 def _predicts_as_well(found: FittedModel, other: State, full: Array) -> bool:
     error = found.moments.heldout_error(found.solver.fit(other).coefficients)
     return bool(np.all(error <= (1 + HELD_OUT_TOLERANCE) * full))
-
-
-BY_DIRECTION = {"coulomb_friction", "torque_offset"}
-CONSTANT = {"torque_offset", "cable_stiffness"}
-COMPENSATOR_SHARE = 0.5  # of the scatter of the joint's gravity torque
-BODY_SIZE_M = 0.1  # m: the size of a body
-EIGENVALUE_TOLERANCE = (
-    0.1  # of the largest eigenvalue: a point has no spread, and what is fitted to it may have a little less
-)
-OUTLYING_FACTOR = 4.0  # times the median width of the other links
-
-
-def make_claims(found: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence]) -> tuple[Claim, ...]:
-    """All claims of a round, the strongest first."""
-    if not effects and not links:
-        return ()
-    wide = extend_with_shapes(found)
-    claims = [_effect_claim(found, wide, group, evidence) for group, evidence in effects.items()]
-    claims += _link_claims(found, wide, links)
-    claims = [_with_direction_rival(claim, claims) for claim in claims]
-    return tuple(sorted(claims, key=lambda claim: -claim.evidence.score))
-
-
-def _with_direction_rival(claim: Claim, claims: list[Claim]) -> Claim:
-    """Coulomb friction beside an offset or the rest of a spring is two levels that differ by direction, exactly."""
-    here = {other.effect for other in claims if other.joint == claim.joint}
-    if claim.effect not in BY_DIRECTION or "coulomb_friction" not in here or not here & CONSTANT:
-        return claim
-    rival = Rival("asymmetric_friction", claim.joint, claim.joints, True)
-    rivals = (rival, *(each for each in claim.rivals if each.effect != rival.effect))
-    names = tuple(each.effect for each in rivals)
-    return replace(claim, rivals=rivals[:MAX_RIVALS], next_experiment=next_experiment(claim.effect, names))
-
-
-def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evidence) -> Claim:
-    solver = found.solver
-    candidate, columns = solver.groups[group].candidate, solver.groups[group].columns
-    candidate = _prefer_compensator(found, candidate, group)
-    coefficients, covariance = solver.values(found.fit, group), wide.covariance(group)
-    parameters = named_parameters(candidate, coefficients, covariance, wide.factor)
-    own = np.zeros(found.moments.size)
-    own[columns] = coefficients
-    rivals = tuple(Rival(*each) for each in find_rivals(found, group, candidate))
-    return Claim(
-        candidate.effect,
-        candidate.joint,
-        candidate.joints,
-        parameters,
-        candidate.equation(coefficients),
-        evidence,
-        found.columns.torque_of(own),
-        rivals,
-        next_experiment(candidate.effect, tuple(each.effect for each in rivals)),
-        candidate,
-        coefficients,
-        covariance,
-    )
-
-
-def _prefer_compensator(found: FittedModel, candidate: Candidate, group: int) -> Candidate:
-    """A linear spring that carries a good part of gravity is a compensator: no cable does."""
-    if (candidate.effect, candidate.form) != ("cable_stiffness", "linear") or candidate.joint is None:
-        return candidate
-    values, joint = found.solver.values(found.fit, group), candidate.joint - 1
-    springs, gravity = [], []
-    for scene in found.bench.scenes:
-        still = Motion(scene.motion.position, *(np.zeros_like(scene.motion.position),) * 2)
-        springs.append(candidate.columns(scene)[:, 0] @ values)
-        gravity.append(rigid_body_torque(scene.arm, still, scene.inertial)[:, joint])
-    spring, weight = np.concatenate(springs), np.concatenate(gravity)
-    carries = float(np.std(spring)) > COMPENSATOR_SHARE * float(np.std(weight)) and float(np.mean(spring * weight)) < 0
-    return SpringCompensator.at(found.bench.simulation.arm, candidate.joint) if carries else candidate
 
 
 def named_parameters(
@@ -158,59 +130,46 @@ def _link_claims(found: FittedModel, wide: ShapedFit, links: dict[int, Evidence]
         return []
     base, covariance = wide.base()
     mean, spread = bench.prior.deviations(widths, base, covariance)
-    return [_link_claim(found, wide.factor, link, (mean, spread), evidence) for link, evidence in links.items()]
+    claims = []
+    for link, evidence in links.items():
+        place = slice(10 * link, 10 * link + 10)
+        law = link_law(
+            bench.simulation.arm, link + 1, mean[place], spread[place, place], added=is_outlying(widths, link)
+        )
+        claims.append(_link_claim(found, wide.factor, law, mean[place], spread[place, place], evidence))
+    return claims
 
 
 def _link_claim(
-    found: FittedModel, factor: float, link: int, deviations: tuple[Array, Array], evidence: Evidence
+    found: FittedModel, factor: float, law: LinkLaw, mean: Array, spread: Array, evidence: Evidence
 ) -> Claim:
-    """The claim about one link (from 0); deviations: mean and covariance of all links' parameters."""
-    bench, (mean, spread) = found.bench, deviations
-    place, widths = slice(10 * link, 10 * link + 10), found.fit.state.widths or ()
-    turn = np.column_stack([felt_values(bench.simulation.arm, link + 1, unit) for unit in np.eye(10)])
-    coefficients, covariance = turn @ mean[place], turn @ spread[place, place] @ turn.T
-    last = link + 1 == len(bench.simulation.arm)
-    body = _may_be_body(mean[place], spread[place, place])
-    carried = last and body and is_outlying(widths, link)
-    kind = Payload if carried else InertialError
-    candidate: Candidate = kind.at(bench.simulation.arm, link + 1)
-    change, torque = np.zeros(len(mean)), np.zeros(found.moments.size)
-    change[place] = mean[place]
+    """The claim about one link. mean (10,), spread (10, 10): what it has more than its simulation."""
+    bench, candidate = found.bench, law.candidate
+    link = candidate.joints[0]
+    turn = np.column_stack([felt_values(bench.simulation.arm, link, unit) for unit in np.eye(10)])
+    coefficients, covariance = turn @ mean, turn @ spread @ turn.T
+    change, torque = np.zeros(10 * len(bench.simulation.arm)), np.zeros(found.moments.size)
+    change[10 * link - 10 : 10 * link] = mean
     torque[: len(bench.base)] = bench.base.grouping @ change
-    other = Rival("inertial_parameter_error" if carried else "payload", link + 1, (), True)
-    rivals = (other,) if body else ()
+    rivals = tuple(Rival(each, link, (), True) for each in law.rivals)
     return Claim(
-        candidate.effect,
-        link + 1,
-        (),
-        named_parameters(candidate, coefficients, covariance, factor),
-        candidate.equation(coefficients),
-        evidence,
-        found.columns.torque_of(torque),
-        rivals,
-        next_experiment(candidate.effect, tuple(each.effect for each in rivals)),
-        candidate,
-        coefficients,
-        covariance,
+        effect=candidate.effect,
+        joint=link,
+        joints=(),
+        parameters=named_parameters(candidate, coefficients, covariance, factor),
+        equation=candidate.equation(coefficients),
+        evidence=evidence,
+        prediction=found.columns.torque_of(torque),
+        rivals=rivals,
+        next_experiment=next_experiment(candidate.facts, rivals),
+        candidate=candidate,
+        coefficients=coefficients,
+        covariance=covariance,
         in_links=True,
     )
 
 
 def is_outlying(widths: Widths, link: int) -> bool:
-    """Whether a link is off far more than the others: something was added to it."""
+    """Whether a link (from 0) is off far more than the others: something was added to it."""
     others = [width for other, width in enumerate(widths) if other != link]
     return not others or widths[link] >= OUTLYING_FACTOR * float(np.median(others))
-
-
-def _may_be_body(ten: Array, covariance: Array) -> bool:
-    """Whether what a link has more than its simulation could be a body: mass, and a positive semidefinite inertia."""
-    scale = np.array(
-        [1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1.0]
-    )  # so that all of the pseudo-inertia is in kilograms
-    parts = pseudo_inertia_basis() * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", ten, parts))
-    slopes = np.einsum("a,pab,b->p", vectors[:, 0], parts, vectors[:, 0])
-    doubt = 1.5 * SIGN_SIGMAS * np.sqrt(max(float(slopes @ covariance @ slopes), 0.0)) + EIGENVALUE_TOLERANCE * float(
-        np.abs(values).max()
-    )
-    return bool(ten[0] > 0 and values[0] + doubt >= 0)

@@ -25,8 +25,6 @@ from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.solver import Solver
 from armlab.diagnosis.surrogate import Features
 from armlab.effects.contract import Candidate, Family, Scene
-from armlab.effects.naming import is_first_name
-from armlab.effects.plausible import prior_scale
 from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals
 from problem.base_parameters import BaseParameters
@@ -65,7 +63,7 @@ class DesignMatrix:
     def solver(self, noise: Noise) -> tuple[Moments, Solver]:
         """Moments and solver under a noise model."""
         found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
-        scales = [prior_scale(group.candidate, self.simulation.inertial) for group in groups]
+        scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
         return found, Solver(found, groups, len(self.base), self.prior, self.places, scales)
 
     def block(self, candidate: Candidate, variant: int) -> Block:
@@ -84,7 +82,7 @@ class DesignMatrix:
         for family in families:
             places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
             for shapes in places:
-                blocks += [self.block(each, variant) for variant, each in enumerate(shapes) if is_first_name(each)]
+                blocks += [self.block(each, variant) for variant, each in enumerate(shapes) if not each.second_name]
         return replace(self, blocks=tuple(block for block in blocks if _is_usable(block)))
 
     def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":

@@ -22,8 +22,7 @@ from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.refine import prior_precision
 from armlab.diagnosis.search import contained_groups
-from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, State
-from armlab.effects.plausible import reason_implausible
+from armlab.diagnosis.solver import Fit, State
 
 HELD_OUT_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
 
@@ -137,7 +136,6 @@ MIN_EXCITATION = 0.25  # of the mean square in identification
 MAX_LOSS = 0.002  # of the validation error
 MAX_LOSS_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
 MAX_WHITENED_LOSS = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
-SINGLE_EVENT_EFFECTS = ("external_contact",)
 MIN_LOG_RATIO = float(
     np.log(20)
 )  # units of log likelihood: of two laws with as many numbers, the one that is surely it
@@ -191,16 +189,16 @@ class Judge:
         for group in state.groups:
             candidate = solver.groups[group].candidate
             values = solver.values(fit, group)
-            objection = reason_implausible(candidate, values)
+            objection = candidate.absurdity(values)
             objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
             tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
             evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
             if self.simpler(group) and not self._in_place_of_usual(group):
                 evidence = self._beyond_usual(group)
-            if candidate.effect in SINGLE_EVENT_EFFECTS:
+            if candidate.facts.single_event:
                 evidence = replace(evidence, repeatable=False)
                 objection = self._pushed(group)
-            out[group] = replace(evidence, objection=objection, usual=candidate.effect in USUAL_EFFECTS)
+            out[group] = replace(evidence, objection=objection, usual=candidate.facts.usual)
         return out
 
     def links(self) -> dict[int, Evidence]:

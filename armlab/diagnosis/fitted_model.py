@@ -12,7 +12,7 @@ from armlab.diagnosis.links import Widths
 from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.refine import refine_shapes
 from armlab.diagnosis.search import Search, Step, background_state
-from armlab.diagnosis.solver import USUAL_EFFECTS, Fit, Solver, State
+from armlab.diagnosis.solver import Fit, Solver, State
 from armlab.diagnosis.surrogate import flexible_features, predict_structure
 from armlab.effects.contract import Family, Scene
 from problem.regressor import rigid_body_torque
@@ -76,7 +76,7 @@ def fit_background(bench: DesignMatrix, families: Sequence[Family], seed: int, p
     seed: of the surrogates' random waves.
     """
     progress("fitting links and friction")
-    plain = bench.with_candidates(family for family in families if family.effect in USUAL_EFFECTS)
+    plain = bench.with_candidates(family for family in families if family.facts.usual)
     first = _fit_model(
         plain, _white_noise(plain.target, plain), lambda solver: background_state(solver, initial_link_widths(plain))
     )

@@ -6,7 +6,7 @@ from armlab.diagnosis.evidence import Evidence, Judge
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.solver import USUAL_EFFECTS, State
+from armlab.diagnosis.solver import State
 
 SINGLE_EVENT_SHARE = 1 / 3  # of the least gain: what happened once acts in a small part of the time
 SELF_EVIDENT_GAIN = 0.25  # of the held-out error: a gain that needs no other evidence for its name
@@ -112,7 +112,7 @@ def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
     solver, state = judge.found.solver, judge.state
     joint = solver.groups[weakest].candidate.joint
     special = {each for each in state.groups if judge.simpler(each) and solver.groups[each].candidate.joint == joint}
-    if solver.groups[weakest].candidate.effect not in USUAL_EFFECTS or not special:
+    if not solver.groups[weakest].candidate.facts.usual or not special:
         return {weakest}
     usual = {other for group in special for other in judge.simpler(group)}
     plain = State(tuple(sorted(set(state.groups) - special | usual)), state.widths)

@@ -10,42 +10,23 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Group
 from armlab.diagnosis.links import LINK_UNCERTAINTY_GRID, SINGLE_LINK_GRID, Widths
 from armlab.diagnosis.settings import Guards
-from armlab.diagnosis.solver import CROWD_PENALTY, USUAL_EFFECTS, Solver, State
-from armlab.effects.plausible import reason_implausible
-
-SPECIAL_FRICTION = (
-    "nonlinear_viscous_friction",
-    "stribeck_friction",
-    "asymmetric_friction",
-    "presliding_hysteresis",
-    "friction_drift",
-    "load_dependent_friction",
-)
-USUAL_FRICTION = ("coulomb_friction", "viscous_friction")  # what every joint has
-SPRINGS = ("cable_stiffness", "gravity_compensator")  # a constant is a part of them
+from armlab.diagnosis.solver import CROWD_PENALTY, Solver, State
 
 
 def contained_groups(groups: Sequence[Group], number: int) -> tuple[int, ...]:
-    """Numbers of the usual friction that a special law of friction has to be better than, or of a spring's constant."""
-    candidate = groups[number].candidate
-    wanted = {name for name in candidate.replaces if name in USUAL_EFFECTS}
-    if candidate.effect in SPECIAL_FRICTION:
-        wanted |= set(USUAL_FRICTION)
-    if candidate.effect in SPRINGS:
-        wanted |= {"torque_offset"}
+    """Numbers of the simpler effects that a group contains and has to be better than."""
+    own = groups[number].candidate
     return tuple(
-        number
-        for number, each in enumerate(groups)
-        if each.candidate.effect in wanted and each.candidate.joint == candidate.joint
+        other
+        for other, each in enumerate(groups)
+        if each.candidate.joint == own.joint
+        and (
+            each.candidate.effect in own.facts.contains
+            or (each.candidate.effect in own.replaces and each.candidate.facts.usual)
+        )
     )
 
 
-EXCLUSIVE_FRICTION_LAWS = (
-    "nonlinear_viscous_friction",
-    "stribeck_friction",
-    "asymmetric_friction",
-    "presliding_hysteresis",
-)
 MAX_CANDIDATES_ASKED = 40  # best candidates of a step that are asked for their physics
 MAX_UNUSUAL_EFFECTS = 12  # effects beside friction and offsets: a start that asks for more has lost its way
 MIN_SCORE_STEP = 1e-6  # of a score: smaller steps are rounding
@@ -131,21 +112,23 @@ class Search:
         """Whether the state holds the group's place already, or something that contains it."""
         candidate = self.solver.groups[group].candidate
         inside = [self.solver.groups[other] for other in state.groups]
-        return self._late_twice(state, group) or any(
+        return self._too_many_beside(state, group) or any(
             other.place == self.solver.groups[group].place
             or (
-                candidate.effect in EXCLUSIVE_FRICTION_LAWS
-                and other.candidate.effect in EXCLUSIVE_FRICTION_LAWS
+                bool(candidate.facts.one_of)
+                and candidate.facts.one_of == other.candidate.facts.one_of
                 and candidate.joint == other.candidate.joint
             )
             or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
             for other in inside
         )
 
-    def _late_twice(self, state: State, group: int) -> bool:
-        """Whether a delay of all channels would stand beside several skews: the skew of one, told in many words."""
-        late = [self.solver.groups[each].candidate.effect for each in (*state.groups, group)]
-        return "time_delay" in late and late.count("channel_skew") > 1
+    def _too_many_beside(self, state: State, group: int) -> bool:
+        """Whether an effect would have more of another beside it than it allows, see `Effect.at_most_beside`."""
+        facts = [self.solver.groups[each].candidate.facts for each in (*state.groups, group)]
+        present = [each.id for each in facts]
+        limits = [limit for each in facts for limit in each.at_most_beside.items()]
+        return any(present.count(effect) > count for effect, count in limits)
 
     def _addition(self, state: State, but: int | None = None) -> int | None:
         """The group that raises the score most and breaks no law of physics."""
@@ -182,7 +165,7 @@ class Search:
         fit = self.solver.fit(state)
         candidate = self.solver.groups[group].candidate
         values, covariance = self.solver.values(fit, group), self.solver.covariance(fit, group)
-        return reason_implausible(candidate, values) or candidate.objection(values, covariance)
+        return candidate.absurdity(values) or candidate.objection(values, covariance)
 
     def _backward(self, state: State) -> Iterator[tuple[str, State]]:
         if not self.guards.backward_elimination or not state.groups:
@@ -208,7 +191,8 @@ class Search:
         own, free = self.solver.groups[group].candidate, bare
         for other in bare.groups:  # one law may stand for all friction of a joint, and no part alone makes room for it
             beside = self.solver.groups[other].candidate
-            if own.effect == USUAL_FRICTION[0] and beside.effect in USUAL_FRICTION and beside.joint == own.joint:
+            usual_friction = all(each.facts.usual and each.facts.dissipates for each in (own, beside))
+            if usual_friction and beside.joint == own.joint:
                 free = free.minus(other)
         return list(dict.fromkeys((bare, back, free)))
 
@@ -235,8 +219,6 @@ class Search:
 def background_state(solver: Solver, widths: Widths | None) -> State:
     """Friction and offset on every joint."""
     chosen = [
-        number
-        for number, group in enumerate(solver.groups)
-        if group.candidate.effect in USUAL_EFFECTS and group.variant == 0
+        number for number, group in enumerate(solver.groups) if group.candidate.facts.usual and group.variant == 0
     ]
     return State(tuple(chosen), widths)

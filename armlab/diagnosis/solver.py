@@ -20,7 +20,6 @@ from armlab.diagnosis.links import LinkPrior, Widths
 RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
 MIN_UNABSORBED_SHARE = 1e-6  # of a column's squared length: what less of it is left is not seen
 CROWD_PENALTY = 4.0  # units of log likelihood that each unusual effect makes the next one dearer: many at once are rare
-USUAL_EFFECTS = ("coulomb_friction", "viscous_friction", "torque_offset")  # what every arm has is no surprise
 
 
 @dataclass(frozen=True)
@@ -100,13 +99,13 @@ class Solver:
         number = next(index for index, each in enumerate(self.groups) if each is group)
         rows = sum(self.moments.rows[row] for row in group.candidate.rows)
         parameters = self.ranks[number] + len(group.candidate.shape)
-        tried = 1 if group.candidate.effect in USUAL_EFFECTS else self.places * group.candidate.looks
+        tried = 1 if group.candidate.facts.usual else self.places * group.candidate.looks
         return float(0.5 * parameters * np.log(max(rows, 2)) + np.log(tried))
 
     @cached_property
     def unusual(self) -> NDArray[np.bool_]:
         """Which groups are no friction or offset as every arm has them."""
-        return np.array([each.candidate.effect not in USUAL_EFFECTS for each in self.groups], dtype=bool)
+        return np.array([not each.candidate.facts.usual for each in self.groups], dtype=bool)
 
     def crowd(self, groups: Sequence[int]) -> int:
         """How many unusual effects there are."""

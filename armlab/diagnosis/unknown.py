@@ -13,7 +13,7 @@ from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import MIN_STRUCTURE_GAIN, Structure, feature_banks, find_structure
-from armlab.effects.next_experiment import next_experiment
+from armlab.effects.contract import UNKNOWN
 
 HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
 UNKNOWN_LEVEL = 0.03  # of the test between stretches of time, after all surrogates that were tried
@@ -63,14 +63,14 @@ def make_unknown_claim(found: FittedModel, each: Structure, residual: Array) -> 
     prediction[:, each.joint] = each.prediction
     joint = each.joint + 1
     return Claim(
-        "unknown",
+        UNKNOWN.id,
         joint,
         (joint,),
         (),
         f"tau_{joint} += f({', '.join(each.depends_on)})",
         evidence,
         prediction,
-        next_experiment=next_experiment("unknown", ()),
+        next_experiment=UNKNOWN.experiment,
         depends_on=each.depends_on,
     )
 

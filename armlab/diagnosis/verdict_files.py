@@ -16,10 +16,10 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Parameter, Unexplained
+from armlab.effects.library import effect_named
 from armlab.identification.model_file import SCHEMA
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Recording
-from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.robot_file import built_in_arms

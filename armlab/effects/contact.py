@@ -6,9 +6,19 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import TORQUE, Candidate, Effect, Family, Parameter, Scene, Value
 from armlab.effects.term import Term, form_from_parameters, format_number
 from problem.arm import Arm
+
+EXTERNAL_CONTACT_FACTS = Effect(
+    "external_contact",
+    "a push during a stretch of time",
+    (Parameter("start", "s"), Parameter("end", "s"), Parameter("peak", TORQUE)),
+    single_event=True,
+    scanned=True,
+    axis="time",
+    experiment="repeat the run without contact",
+)
 
 GRID_DURATIONS_S = (0.3, 1.0, 3.0)  # s, of a plain grid
 SCANNED_DURATIONS_S = tuple(0.1 * 2 ** (number / 2) for number in range(11))  # s
@@ -21,7 +31,7 @@ GRID_WINDOWS = 40  # of a plain grid, a run and joint
 class Contact(Term):
     """peak sin(pi (t - start) / (end - start)) between start and end of one run; shape: start, end, s."""
 
-    effect = "external_contact"
+    facts = EXTERNAL_CONTACT_FACTS
     form = "half sine"
     names = ("start", "end", "peak")
     run: str = field(default="", kw_only=True)
@@ -71,7 +81,7 @@ class Push(Contact):
 class ContactFamily(Family):
     """A place is a joint in a run."""
 
-    effect: str = "external_contact"
+    facts: Effect = EXTERNAL_CONTACT_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Half sines of three durations that overlap by half, thinned to WINDOWS: use `scan` for all of them."""

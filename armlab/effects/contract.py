@@ -1,32 +1,128 @@
-"""What an effect of the library promises: columns of torque, named parameters, the signs of physics."""
+"""What an effect of the library consists of: facts, laws at a place (candidates), and the family that offers them."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import ClassVar, Literal
+
+import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.extras import Value
+from armlab.common.settings import suggest_name
 from armlab.effects.scene import Scene
 from problem.arm import Arm
 
-__all__ = ["Candidate", "Family", "Scene", "Value"]
+__all__ = ["Candidate", "Effect", "Family", "Kind", "Parameter", "Scene", "Value"]
+
+Kind = Literal["revolute", "prismatic"]
+Value = float | tuple[float, ...]
+
+TORQUE, ANGLE, INERTIA = "{torque}", "{position}", "{inertia}"  # units that depend on how the joint moves
+UNITS: Mapping[Kind, Mapping[str, str]] = MappingProxyType(
+    {
+        "revolute": {"torque": "N.m", "position": "rad", "inertia": "kg.m2"},
+        "prismatic": {"torque": "N", "position": "m", "inertia": "kg"},
+    }
+)
+MAX_SCALE_RATIO = 3.0  # times the prior scale: a coefficient that no arm has (chosen by eye)
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of an effect: its name, its unit, and whether physics wants it positive."""
+
+    name: str
+    unit: str
+    positive: bool = False
+
+    def unit_for(self, kind: Kind = "revolute") -> str:
+        """The unit at a joint that turns or slides."""
+        return self.unit.format(**UNITS[kind])
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Everything that is known of an effect, whatever law it follows.
+
+    id: its name in verdicts and models. meaning: a line for a list. parameters: those that a finding may give.
+    title: its name in a sentence; the id with spaces where it is left out.
+    where: `joint` for an effect at one joint, `coupling` where torque and motion are at two joints, `link` for
+    parameters of a link, `robot` for an effect of the whole arm (its joint is null).
+    usual: every arm has it, so that finding it is no surprise. dissipates: it takes energy from the motion.
+    sticks: at rest it takes any value up to its level, so that a standstill tells nothing of it.
+    contains: ids of simpler effects at the same joint. A law of this effect has to explain more than they do.
+    one_of: a joint has at most one effect of each set that bears a name.
+    at_most_beside: ids of other effects, and how many of each may stand beside this one.
+    equal_sums: pairs of effects which together are this effect exactly, for any motion.
+    prior_scale: standard deviation of its coefficients (SI units) that a fit draws them to zero with; infinite
+    where nothing is known. single_event: it happens once, in one stretch of one run, so that no other data repeat it.
+    scanned: its places are found by a look at the residual, not by columns alone.
+    axis: the variable against which a figure shows it; `cycle` is the position within one wave.
+    experiment: the next experiment that separates it from its rivals.
+    simulators: how simulators express it: the name of a format, and the field that holds it.
+    """
+
+    id: str
+    meaning: str
+    parameters: tuple[Parameter, ...] = ()
+    title: str = ""
+    where: Literal["joint", "coupling", "link", "robot"] = "joint"
+    usual: bool = False
+    dissipates: bool = False
+    sticks: bool = False
+    contains: tuple[str, ...] = ()
+    one_of: str = ""
+    at_most_beside: Mapping[str, int] = field(default_factory=dict, hash=False)
+    equal_sums: tuple[tuple[str, str], ...] = ()
+    prior_scale: float = float("inf")
+    single_event: bool = False
+    scanned: bool = False
+    axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
+    experiment: str = ""
+    simulators: Mapping[str, str] = field(default_factory=dict, hash=False)
+
+    @property
+    def words(self) -> str:
+        """Its name in a sentence."""
+        return self.title or self.id.replace("_", " ")
+
+    def parameter(self, name: str) -> Parameter:
+        """The parameter of that name; ValueError, with the right names, for an unknown one."""
+        found = {parameter.name: parameter for parameter in self.parameters}
+        if name not in found:
+            raise ValueError(f"'{name}' is no parameter of {self.id}: {suggest_name(name, list(found))}")
+        return found[name]
+
+
+COULOMB_LEVEL = Parameter("level", TORQUE, positive=True)
+VISCOUS_COEFFICIENT = Parameter("coefficient", f"{TORQUE}.s/{ANGLE}", positive=True)
+STIFFNESS = Parameter("stiffness", f"{TORQUE}/{ANGLE}", positive=True)
+
+UNKNOWN = Effect(
+    "unknown",
+    "structure that no effect of this library explains",
+    experiment="move the joint alone over the variables it depends on, one at a time",
+)
 
 
 class Candidate(ABC):
-    """An effect at a place, its nonlinear parameters held: linear in its coefficients.
+    """A law of an effect at a place, its nonlinear parameters held: linear in its coefficients.
 
-    effect: an id of the vocabulary, or a user's own name. joint: from 1, None for the whole robot, the link for
-    parameters of a link. joints: (where the torque appears, where the motion is) for a coupling. rows: the
-    joints, from 0, whose torque its columns change. form: which of an effect's laws, where it has several.
-    shape: values of the nonlinear parameters, in their order; bounds: one (lowest, highest) a value.
-    follows_model: whether its columns depend on `Scene.torque` or `Scene.inertial` and have to be computed anew
-    when the model changes. closely: whether they do so on the motion as the filter of the torque leaves it, noise
-    included, and not on a calmer one. of_channel: whether it falsifies the torque of all others (a gain, a delay, a
-    limit); `Scene.torque` leaves those out, or they would act on themselves. replaces: effects at the same joint
-    that its columns contain (Stribeck friction those of Coulomb's); a model has either them or it. looks: among how
-    many alternatives a scan of the residual has picked it, for the correction of what was tried.
+    facts: the effect. joint: from 1, None for the whole robot, the link for parameters of a link. joints: (where the
+    torque appears, where the motion is) for a coupling. rows: the joints, from 0, whose torque its columns change.
+    form: which of the effect's laws, where it has several. shape: values of the nonlinear parameters, in their order;
+    bounds: one (lowest, highest) a value.
+    follows_model: its columns depend on `Scene.torque` or `Scene.inertial` and have to be computed anew when the model
+    changes. follows_closely: on the motion as the filter of the torque leaves it, noise included, and not on a calmer
+    one. of_channel: it falsifies the torque of all others (a gain, a delay, a limit); `Scene.torque` leaves those out,
+    or they would act on themselves. replaces: effects at the same joint that its columns contain (Stribeck friction
+    those of Coulomb's); a model has either them or it. identical: effects that no motion tells from this law.
+    second_name: another effect names the same columns first, so that a search does not look for this law.
+    looks: among how many alternatives a scan of the residual has picked it, for the correction of what was tried.
     """
 
-    effect: str
+    facts: ClassVar[Effect]
     joint: int | None
     joints: tuple[int, ...]
     rows: tuple[int, ...]
@@ -36,8 +132,15 @@ class Candidate(ABC):
     follows_model: bool = False
     follows_closely: bool = False
     replaces: tuple[str, ...] = ()
+    identical: tuple[str, ...] = ()
+    second_name: bool = False
     of_channel: bool = False
     looks: int = 1
+
+    @property
+    def effect(self) -> str:
+        """The id of its effect."""
+        return self.facts.id
 
     @abstractmethod
     def columns(self, scene: Scene) -> Array:
@@ -45,11 +148,11 @@ class Candidate(ABC):
 
     @abstractmethod
     def with_shape(self, shape: tuple[float, ...]) -> "Candidate":
-        """The same effect at the same place with other nonlinear parameters."""
+        """The same law at the same place with other nonlinear parameters."""
 
     @abstractmethod
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Parameters by their names in the vocabulary, SI units; the nonlinear ones included.
+        """Parameters by their names, SI units; the nonlinear ones included.
 
         A vector (a centre of mass, a direction of gravity) is a tuple.
         """
@@ -66,15 +169,33 @@ class Candidate(ABC):
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
         """Which law of physics these coefficients break beyond their uncertainty, in a few words; else None."""
 
+    def absurdity(self, coefficients: Array) -> str | None:
+        """Why no arm has an effect of this size, in a few words; else None."""
+        largest = float(np.abs(coefficients).max(initial=0.0))
+        return f"{largest:.3g} is more than any arm has" if largest > MAX_SCALE_RATIO * self.facts.prior_scale else None
+
+    def prior_scale(self, inertial: Array | None) -> float:
+        """Standard deviation of its coefficients; infinite where nothing is known. inertial: (10 * joints,)."""
+        return self.facts.prior_scale
+
+    def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> "Candidate":
+        """The law under the name that comes first for these coefficients; itself where there is no other."""
+        return self
+
 
 class Family(ABC):
     """All candidates of one effect. Registered through the entry-point group `armlab.effects`."""
 
-    effect: str
+    facts: Effect
+
+    @property
+    def effect(self) -> str:
+        """The id of the effect."""
+        return self.facts.id
 
     @abstractmethod
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
-        """One list a place: the same effect there with each shape worth a first look (one if it has none)."""
+        """One list a place: the same law there with each shape worth a first look (one if it has none)."""
 
     def scan(self, arm: Arm, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[list[Candidate]]:
         """The same after a cheap look at what the present model leaves, where a plain grid is long.

@@ -8,10 +8,29 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import (
+    COULOMB_LEVEL,
+    INERTIA,
+    VISCOUS_COEFFICIENT,
+    Candidate,
+    Effect,
+    Family,
+    Parameter,
+    Scene,
+    Value,
+)
 from armlab.effects.friction import direction_of_motion
 from armlab.effects.term import Term, form_from_parameters, format_sum, joint_moves
 from problem.arm import Arm
+
+JOINT_COUPLING_FACTS = Effect(
+    "joint_coupling",
+    "torque from the motion of another joint",
+    (VISCOUS_COEFFICIENT, COULOMB_LEVEL, Parameter("inertia", INERTIA)),
+    where="coupling",
+    axis="velocity",
+    experiment="move the driving joint alone while the other one rests",
+)
 
 WRIST_JOINTS = 3  # joints whose drives may go through one another
 
@@ -24,7 +43,7 @@ class JointCoupling(Term):
     joint's own friction, of which gears carry a share over, it has that joint's direction. with_own: which of these.
     """
 
-    effect = "joint_coupling"
+    facts = JOINT_COUPLING_FACTS
     names: ClassVar[tuple[str, ...]] = ("coefficient", "level", "inertia")
     with_own: ClassVar[bool] = True
 
@@ -123,7 +142,7 @@ COUPLING_FORMS = (ViscousCoupling, CoulombCoupling, InertiaCoupling, FrictionCou
 class CouplingFamily(Family):
     """Neighbours both ways, and all pairs of a wrist."""
 
-    effect: str = "joint_coupling"
+    facts: Effect = JOINT_COUPLING_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Each term alone and their groups, for each pair of which the driving joint moves."""

@@ -7,9 +7,41 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Scene, Value
+from armlab.effects.contract import INERTIA, TORQUE, Effect, Parameter, Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number
 from problem.arm import Arm
+
+ROTOR_INERTIA_FACTS = Effect(
+    "rotor_inertia",
+    "inertia of the motor behind the gear",
+    (Parameter("inertia", INERTIA, positive=True),),
+    axis="acceleration",
+    simulators={"mjcf": "armature", "srdf": "rotor_params"},
+    experiment="compare with the motor's data sheet: no motion tells rotor inertia from the link's own",
+)
+TORQUE_GAIN_FACTS = Effect(
+    "torque_gain_error",
+    "torque read too large or too small",
+    (Parameter("gain", "1", positive=True),),
+    prior_scale=0.2,
+    experiment="record the motion with and without a payload of known mass",
+)
+TORQUE_OFFSET_FACTS = Effect(
+    "torque_offset",
+    "constant torque",
+    (Parameter("offset", TORQUE),),
+    usual=True,
+    axis="time",
+    experiment="hold a variety of poses, each reached from both directions",
+)
+TORQUE_SATURATION_FACTS = Effect(
+    "torque_saturation",
+    "torque that stays below a limit",
+    (Parameter("limit", TORQUE, positive=True),),
+    prior_scale=1.0,
+    scanned=True,
+    experiment="repeat the motion at half the speed, where no torque comes near the limit",
+)
 
 KNEE_SHARES = (0.4, 0.6, 0.8)  # of the model's highest torque
 LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.97, 0.985)  # of the model's highest torque
@@ -19,7 +51,8 @@ LIMIT_SHARES = (0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95, 0.97, 0.9
 class RotorInertia(Term):
     """inertia qdd."""
 
-    effect = "rotor_inertia"
+    facts = ROTOR_INERTIA_FACTS
+    identical = ("inertial_parameter_error",)
     names = ("inertia",)
 
     def columns(self, scene: Scene) -> Array:
@@ -44,7 +77,8 @@ class RotorInertia(Term):
 class TorqueGain(Term):
     """(gain - 1) tau_model of one joint, friction included."""
 
-    effect = "torque_gain_error"
+    facts = TORQUE_GAIN_FACTS
+    identical = ("inertial_parameter_error",)
     names = ("gain",)
     follows_model = True
     of_channel = True
@@ -74,7 +108,7 @@ class TorqueGainBySign(Term):
     Two half-bridges of a current sensor, or a sensor that is bent at its zero.
     """
 
-    effect = "torque_gain_error"
+    facts = TORQUE_GAIN_FACTS
     form = "by sign"
     names = ("gain", "gain_below")
     follows_model = True
@@ -108,7 +142,7 @@ class TorqueGainBySign(Term):
 class TorqueOffset(Term):
     """A constant."""
 
-    effect = "torque_offset"
+    facts = TORQUE_OFFSET_FACTS
     names = ("offset",)
 
     def columns(self, scene: Scene) -> Array:
@@ -133,7 +167,7 @@ class TorqueOffset(Term):
 class TorqueSaturation(Term):
     """Torque cut at a limit; shape: the limit. Where it is this effect, its coefficient is one."""
 
-    effect = "torque_saturation"
+    facts = TORQUE_SATURATION_FACTS
     names = ("limit",)
     follows_model = True
     of_channel = True
@@ -175,7 +209,7 @@ class TorqueSaturation(Term):
 class TorqueBend(Term):
     """Torque that bends towards a limit: share sgn(tau) (|tau| - knee)^2 / knee less above a knee; shape: the knee."""
 
-    effect = "torque_saturation"
+    facts = TORQUE_SATURATION_FACTS
     form = "soft"
     names = ("limit", "knee")
     follows_model = True
@@ -221,7 +255,7 @@ class TorqueBend(Term):
         return cls.at(arm, joints[0], shape=(knee,), bounds=((knee / 2, knee * 2),)), np.array([bend])
 
 
-ROTOR_INERTIA = EveryJoint("rotor_inertia", (RotorInertia,))
-TORQUE_GAIN = EveryJoint("torque_gain_error", (TorqueGain, TorqueGainBySign), resting=True)
-TORQUE_OFFSET = EveryJoint("torque_offset", (TorqueOffset,), resting=True)
-TORQUE_SATURATION = EveryJoint("torque_saturation", (TorqueSaturation, TorqueBend), resting=True)
+ROTOR_INERTIA = EveryJoint(ROTOR_INERTIA_FACTS, (RotorInertia,))
+TORQUE_GAIN = EveryJoint(TORQUE_GAIN_FACTS, (TorqueGain, TorqueGainBySign), resting=True)
+TORQUE_OFFSET = EveryJoint(TORQUE_OFFSET_FACTS, (TorqueOffset,), resting=True)
+TORQUE_SATURATION = EveryJoint(TORQUE_SATURATION_FACTS, (TorqueSaturation, TorqueBend), resting=True)

@@ -7,10 +7,84 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Scene, Value
+from armlab.effects.contract import ANGLE, COULOMB_LEVEL, TORQUE, VISCOUS_COEFFICIENT, Effect, Parameter, Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number, format_sum, top_speed
-from armlab.recordings.vocabulary import VISCOUS
 from problem.arm import Arm
+
+COULOMB_FACTS = Effect(
+    "coulomb_friction",
+    "constant torque against the motion",
+    (COULOMB_LEVEL,),
+    title="Coulomb friction",
+    usual=True,
+    dissipates=True,
+    sticks=True,
+    axis="velocity",
+    simulators={"mjcf": "frictionloss", "urdf": "friction"},
+    experiment="record several constant speeds in both directions, slow ones too, with many reversals",
+)
+VISCOUS_FACTS = Effect(
+    "viscous_friction",
+    "torque proportional to velocity",
+    (VISCOUS_COEFFICIENT,),
+    usual=True,
+    dissipates=True,
+    axis="velocity",
+    simulators={"mjcf": "damping", "urdf": "damping"},
+    experiment="record the same speeds at different frequencies of motion, and several constant speeds",
+)
+NONLINEAR_VISCOUS_FACTS = Effect(
+    "nonlinear_viscous_friction",
+    "torque that grows with a power of velocity",
+    (
+        Parameter("coefficient", f"{TORQUE}/({ANGLE}/s)^exponent", positive=True),
+        Parameter("exponent", "1", positive=True),
+    ),
+    dissipates=True,
+    contains=("coulomb_friction", "viscous_friction"),
+    one_of="friction laws",
+    axis="velocity",
+    experiment="record constant speeds up to the top of the speed range",
+)
+STRIBECK_FACTS = Effect(
+    "stribeck_friction",
+    "friction that falls as slow motion gets faster",
+    (
+        COULOMB_LEVEL,
+        Parameter("static_level", TORQUE, positive=True),
+        Parameter("velocity", f"{ANGLE}/s", positive=True),
+        Parameter("exponent", "1", positive=True),
+    ),
+    title="Stribeck friction",
+    dissipates=True,
+    sticks=True,
+    contains=("coulomb_friction", "viscous_friction"),
+    one_of="friction laws",
+    axis="velocity",
+    experiment="record slow creeping below three times the Stribeck velocity, in both directions",
+)
+ASYMMETRIC_FACTS = Effect(
+    "asymmetric_friction",
+    "friction that differs by direction",
+    (Parameter("positive", TORQUE), Parameter("negative", TORQUE)),
+    dissipates=True,
+    sticks=True,
+    contains=("coulomb_friction", "viscous_friction"),
+    one_of="friction laws",
+    equal_sums=(("coulomb_friction", "torque_offset"), ("coulomb_friction", "cable_stiffness")),
+    axis="velocity",
+    experiment="pass the same poses in both directions at the same speeds",
+)
+LOAD_DEPENDENT_FACTS = Effect(
+    "load_dependent_friction",
+    "friction that grows with the transmitted torque",
+    (Parameter("coefficient", "1", positive=True),),
+    dissipates=True,
+    sticks=True,
+    contains=("coulomb_friction", "viscous_friction"),
+    prior_scale=0.3,
+    experiment="repeat one motion with two payloads, or one speed in two poses of different load",
+)
 
 PARTS_PER_SAMPLE = 4  # of a sample's interval, for friction with memory
 
@@ -56,7 +130,7 @@ POWER_EXPONENT_RANGE = (0.25, 4.0)
 class CoulombFriction(Term):
     """level sgn(qd)."""
 
-    effect = "coulomb_friction"
+    facts = COULOMB_FACTS
     names = ("level",)
 
     def columns(self, scene: Scene) -> Array:
@@ -81,7 +155,7 @@ class CoulombFriction(Term):
 class ViscousFriction(Term):
     """coefficient qd."""
 
-    effect = "viscous_friction"
+    facts = VISCOUS_FACTS
     names = ("coefficient",)
 
     def columns(self, scene: Scene) -> Array:
@@ -106,7 +180,7 @@ class ViscousFriction(Term):
 class PowerFriction(Term):
     """coefficient |qd|^exponent sgn(qd); shape: the exponent."""
 
-    effect = "nonlinear_viscous_friction"
+    facts = NONLINEAR_VISCOUS_FACTS
     names = ("coefficient", "exponent")
 
     @classmethod
@@ -141,11 +215,12 @@ def signed_power(velocity: Array, exponent: float) -> Array:
     return np.asarray(np.sign(velocity) * np.abs(velocity) ** exponent)
 
 
-COULOMB_FRICTION = EveryJoint("coulomb_friction", (CoulombFriction,))
-VISCOUS_FRICTION = EveryJoint("viscous_friction", (ViscousFriction,))
-NONLINEAR_VISCOUS = EveryJoint("nonlinear_viscous_friction", (PowerFriction,))
+COULOMB_FRICTION = EveryJoint(COULOMB_FACTS, (CoulombFriction,))
+VISCOUS_FRICTION = EveryJoint(VISCOUS_FACTS, (ViscousFriction,))
+NONLINEAR_VISCOUS = EveryJoint(NONLINEAR_VISCOUS_FACTS, (PowerFriction,))
 
 
+MAX_STATIC_RATIO = 4.0  # static over sliding friction (chosen by eye)
 STRIBECK_SPEEDS = (0.01, 0.03, 0.1)  # Stribeck velocities of a first look
 STRIBECK_SPEED_RANGE = (0.002, 0.3)  # of the top speed
 STRIBECK_EXPONENTS = (1.0, 2.0)  # Tustin's, and the Gaussian
@@ -156,7 +231,7 @@ STRIBECK_EXPONENT_RANGE = (0.5, 2.5)
 class StribeckFriction(Term):
     """(level + (static_level - level) exp(-(|qd| / velocity)^exponent)) sgn(qd); shape: velocity, exponent."""
 
-    effect = "stribeck_friction"
+    facts = STRIBECK_FACTS
     names = ("level", "static_level", "velocity", "exponent")
     replaces = ("coulomb_friction",)
 
@@ -189,6 +264,13 @@ class StribeckFriction(Term):
         inner = f"exp(-(|qd_{own}|/{format_number(scale)})^{format_number(exponent)})"
         return f"tau_{own} += ({format_sum((coefficients[0], ''), (coefficients[1], inner))}) sgn(qd_{own})"
 
+    def absurdity(self, coefficients: Array) -> str | None:
+        """Static friction many times sliding friction, or a size that no arm has."""
+        level, rise = (float(value) for value in coefficients)
+        if abs(level + rise) > MAX_STATIC_RATIO * abs(level):
+            return "friction that falls to a small part as the joint begins to move"
+        return super().absurdity(coefficients)
+
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
         """Friction that feeds energy in, or that rises from rest."""
         spread = 0.0 if covariance is None else SIGN_SIGMAS * float(np.sqrt(max(covariance[1, 1], 0.0)))
@@ -204,14 +286,14 @@ class StribeckFriction(Term):
         return cls.at(arm, joints[0], shape=(scale, exponent), bounds=bounds), np.array([level, static - level])
 
 
-STRIBECK = EveryJoint("stribeck_friction", (StribeckFriction,))
+STRIBECK = EveryJoint(STRIBECK_FACTS, (StribeckFriction,))
 
 
 @dataclass(frozen=True)
 class ByDirection(Term):
     """positive |qd|^exponent where qd > 0, -negative |qd|^exponent where qd < 0."""
 
-    effect = "asymmetric_friction"
+    facts = ASYMMETRIC_FACTS
     names = ("positive", "negative", "exponent")
     exponent: ClassVar[float]
 
@@ -274,6 +356,7 @@ class Levels(ByDirection):
     """Coulomb friction by direction."""
 
     form = "levels"
+    second_name = True
     exponent = 0.0
     replaces = ("coulomb_friction", "torque_offset")
 
@@ -282,7 +365,7 @@ class Levels(ByDirection):
 class LevelsAndSlopes(Term):
     """positive + positive_slope qd where qd > 0, -negative + negative_slope qd where qd < 0."""
 
-    effect = "asymmetric_friction"
+    facts = ASYMMETRIC_FACTS
     form = "levels and slopes"
     names = ("positive", "negative", "positive_slope", "negative_slope")
     replaces = ("coulomb_friction", "viscous_friction", "torque_offset")
@@ -300,7 +383,7 @@ class LevelsAndSlopes(Term):
     def unit(self, name: str) -> str:
         """Unit of a level or a slope."""
         if name.endswith("slope"):
-            return VISCOUS.unit_for(self.kind)
+            return VISCOUS_COEFFICIENT.unit_for(self.kind)
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
@@ -325,14 +408,14 @@ class LevelsAndSlopes(Term):
         return cls.at(arm, joints[0]), np.array([float(parameters[name]) for name in cls.names])
 
 
-ASYMMETRIC = EveryJoint("asymmetric_friction", (Levels, Slopes, LevelsAndSlopes))
+ASYMMETRIC = EveryJoint(ASYMMETRIC_FACTS, (Levels, Slopes, LevelsAndSlopes))
 
 
 @dataclass(frozen=True)
 class LoadFriction(Term):
     """coefficient |tau_rigid| sgn(qd): the load is what the links need, from the model, never measured."""
 
-    effect = "load_dependent_friction"
+    facts = LOAD_DEPENDENT_FACTS
     names = ("coefficient",)
     follows_model = True
 
@@ -356,4 +439,4 @@ class LoadFriction(Term):
         return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
 
 
-LOAD_DEPENDENT = EveryJoint("load_dependent_friction", (LoadFriction,))
+LOAD_DEPENDENT = EveryJoint(LOAD_DEPENDENT_FACTS, (LoadFriction,))

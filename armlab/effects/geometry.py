@@ -8,12 +8,36 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import ANGLE, Candidate, Effect, Family, Parameter, Scene, Value
 from armlab.effects.sensitivity import GEOMETRY_STEP, directional_derivative, geometry_derivative, gravity_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.transforms import rotation_x, translation
+
+BASE_TILT_FACTS = Effect(
+    "base_tilt",
+    "gravity in another direction",
+    (Parameter("gravity", "m/s2"),),
+    where="robot",
+    prior_scale=0.5,
+    simulators={"mjcf": "gravity", "urdf": "origin of the first joint"},
+    experiment="measure the base with a level, or turn joint 1 through its full range",
+)
+ENCODER_OFFSET_FACTS = Effect(
+    "encoder_offset",
+    "a joint's zero at another place",
+    (Parameter("offset", ANGLE),),
+    prior_scale=0.05,
+    experiment="check the joint's zero against its calibration mark",
+)
+GEOMETRY_ERROR_FACTS = Effect(
+    "geometry_error",
+    "a link of another length",
+    (Parameter("offset", "m"),),
+    prior_scale=0.02,
+    experiment="calibrate the geometry with a measuring arm or a laser tracker",
+)
 
 STEEPEST = 20.0  # degrees: more is no tilt but another way to mount the arm
 
@@ -25,7 +49,7 @@ class BaseTilt(Term):
     nominal: gravity of the robot file, across: the two directions; all in the base frame.
     """
 
-    effect = "base_tilt"
+    facts = BASE_TILT_FACTS
     names = ("gravity",)
     follows_model = True
     nominal: tuple[float, ...] = (0.0, 0.0, -9.81)
@@ -78,7 +102,7 @@ class BaseTilt(Term):
 class TiltFamily(Family):
     """One place: the whole robot."""
 
-    effect: str = "base_tilt"
+    facts: Effect = BASE_TILT_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """The tilt."""
@@ -112,7 +136,7 @@ PROBE_STATES = 50  # random states that show whether an error changes anything
 class EncoderOffset(Term):
     """recorded = q + offset: first order in the offset; all joints feel it."""
 
-    effect = "encoder_offset"
+    facts = ENCODER_OFFSET_FACTS
     names = ("offset",)
     follows_model = True
 
@@ -149,7 +173,7 @@ class GeometryError(Term):
     robot file is put right.
     """
 
-    effect = "geometry_error"
+    facts = GEOMETRY_ERROR_FACTS
     names = ("offset",)
     follows_model = True
     what: ClassVar[str]
@@ -245,7 +269,7 @@ GEOMETRY_FORMS = (LengthError, HeightError, TwistError, SideError)
 class GeometryFamily(Family):
     """Lengths and twists of each joint but the last, whose own belong to its body."""
 
-    effect: str = "geometry_error"
+    facts: Effect = GEOMETRY_ERROR_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Those that can change a torque; along y only where the arm has such a length."""
@@ -280,5 +304,5 @@ def _changes_torque(candidate: GeometryError, arm: Arm) -> bool:
     return bool(np.abs(candidate.columns(scene)).max() > MIN_VISIBLE_TORQUE * np.abs(scene.rigid_torque).max())
 
 
-ENCODER_OFFSET = EveryJoint("encoder_offset", (EncoderOffset,), resting=True)
+ENCODER_OFFSET = EveryJoint(ENCODER_OFFSET_FACTS, (EncoderOffset,), resting=True)
 GEOMETRY_ERROR = GeometryFamily()

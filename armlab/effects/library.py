@@ -1,10 +1,13 @@
 """All effects: the built-in families, and users' own of the entry-point group `armlab.effects`."""
 
+from importlib.metadata import EntryPoint, entry_points
+
+from armlab.common.errors import InputError
+from armlab.common.settings import suggest_name
 from armlab.effects.contact import EXTERNAL_CONTACT
-from armlab.effects.contract import Family
+from armlab.effects.contract import UNKNOWN, Effect, Family
 from armlab.effects.coupling import JOINT_COUPLING
 from armlab.effects.drive import ROTOR_INERTIA, TORQUE_GAIN, TORQUE_OFFSET, TORQUE_SATURATION
-from armlab.effects.extras import BrokenEffectError, registered_effects
 from armlab.effects.friction import (
     ASYMMETRIC,
     COULOMB_FRICTION,
@@ -48,24 +51,51 @@ BUILT_IN: tuple[Family, ...] = (
     EXTERNAL_CONTACT,
     TORQUE_SATURATION,
 )
+EFFECT_IDS = (*(family.effect for family in BUILT_IN), UNKNOWN.id)
+ENTRY_POINT_GROUP = "armlab.effects"
+
+
+class BrokenEffectError(InputError):
+    """An effect of a plug-in that cannot be used."""
 
 
 def library() -> tuple[Family, ...]:
-    """Built-in families in the order of the vocabulary, then users' own by name.
+    """Built-in families in the order of the documentation, then those of plug-ins by name.
 
-    An entry point is a Family, a class of one that takes no arguments, or a tuple of families. Raises
+    A plug-in's entry point is a Family, a class of one that takes no arguments, or a tuple of families. Raises
     BrokenEffectError, in one line, where one cannot be imported, is something else, or has the id of another.
     """
     families, origins = list(BUILT_IN), {family.effect: "armlab" for family in BUILT_IN}
-    for origin, family in registered_effects():
-        if any(family is own for own in BUILT_IN):  # armlab's own entry point, by which `predict` finds them
-            continue
-        if not isinstance(family, Family):
-            raise BrokenEffectError(f"effect {family.effect!r} ({origin}) is no armlab.effects.contract.Family")
-        if family.effect in origins:
-            raise BrokenEffectError(
-                f"effect {family.effect!r} is registered by {origins[family.effect]} and by {origin}"
-            )
-        origins[family.effect] = origin
-        families.append(family)
+    for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda entry: entry.name):
+        for family in _load_families(entry):
+            if family.effect in origins:
+                both = f"{origins[family.effect]} and by {entry.value}"
+                raise BrokenEffectError(f"effect {family.effect!r} is registered by {both}")
+            origins[family.effect] = entry.value
+            families.append(family)
     return tuple(families)
+
+
+def _load_families(entry: EntryPoint) -> tuple[Family, ...]:
+    try:
+        found = entry.load()
+    except (ImportError, AttributeError, SyntaxError) as error:
+        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) cannot be imported: {error}") from error
+    found = found() if isinstance(found, type) else found
+    families = found if isinstance(found, tuple) else (found,)
+    if not all(isinstance(each, Family) for each in families):
+        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) is no armlab.effects.contract.Family")
+    return families
+
+
+def family_named(name: str) -> Family:
+    """The family of an effect; ValueError, with the nearest id, for an unknown one."""
+    known = {family.effect: family for family in library()}
+    if name not in known:
+        raise ValueError(f"unknown effect '{name}': {suggest_name(name, list(known))}")
+    return known[name]
+
+
+def effect_named(name: str) -> Effect:
+    """The facts of an effect, or of `unknown`; ValueError, with the nearest id, for another name."""
+    return UNKNOWN if name == UNKNOWN.id else family_named(name).facts

@@ -10,12 +10,30 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import Candidate, Effect, Family, Parameter, Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, Term, format_number
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
 from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis
 from problem.regressor import observation_matrix, rigid_body_torque
+
+BODY_PARAMETERS = (Parameter("mass", "kg"), Parameter("centre", "m"), Parameter("inertia", "kg.m2"))
+PAYLOAD_FACTS = Effect(
+    "payload",
+    "a body carried by a link",
+    BODY_PARAMETERS,
+    where="link",
+    simulators={"mjcf": "inertial", "urdf": "inertial"},
+    experiment="repeat the motion without the payload",
+)
+INERTIAL_ERROR_FACTS = Effect(
+    "inertial_parameter_error",
+    "a link that is not as the simulation has it",
+    BODY_PARAMETERS,
+    where="link",
+    simulators={"mjcf": "inertial", "urdf": "inertial"},
+    experiment="weigh the link, or repeat the motion with a payload of known mass",
+)
 
 LINK_PROBES = 100  # random states that show which parameters an arm feels
 MIN_INDEPENDENT_SHARE = 1e-8  # of a column's length: below is rounding; its root for a smallest singular value
@@ -150,7 +168,7 @@ class Body(LinkTerm):
 class LinkFamily(Family):
     """One place a form and link that shows it."""
 
-    effect: str
+    facts: Effect
     terms: tuple[type[LinkTerm], ...]
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
@@ -170,6 +188,9 @@ class LinkFamily(Family):
         raise ValueError(f"{self.effect} has the forms {', '.join(term.form for term in self.terms)}, not {wanted}")
 
 
+BODY_SIZE_M = 0.1  # the size of a body, which brings its pseudo-inertia to kilograms
+EIGENVALUE_TOLERANCE = 0.1  # of the largest eigenvalue: a point has no spread, and its fit may have a little less
+MAX_PAYLOAD_RATIO = 3.0  # times the mean mass of the links: in the mean square (chosen by eye)
 MAX_CENTRE_M = 0.5  # m: a payload's centre is no further from its link's frame
 POINT_CENTRES = tuple(product((0.0, 0.15), repeat=3))  # m, of a first look
 
@@ -178,8 +199,9 @@ POINT_CENTRES = tuple(product((0.0, 0.15), repeat=3))  # m, of a first look
 class Payload(Body):
     """A body carried by a link: a body has a positive semidefinite pseudo-inertia (Wensing, Kim and Slotine 2018)."""
 
-    effect = "payload"
+    facts = PAYLOAD_FACTS
     form = "body"
+    identical = ("inertial_parameter_error",)
 
     @classmethod
     def is_visible(cls, arm: Arm, link: int) -> bool:
@@ -204,8 +226,9 @@ class Payload(Body):
 class PointPayload(LinkTerm):
     """A mass at one point of a link; shape: the point in the link's frame, m."""
 
-    effect = "payload"
+    facts = PAYLOAD_FACTS
     form = "point"
+    identical = ("inertial_parameter_error",)
     names = ("mass", "centre")
 
     @classmethod
@@ -219,6 +242,10 @@ class PointPayload(LinkTerm):
         return [
             cls.at(arm, joint, shape=centre, bounds=((-MAX_CENTRE_M, MAX_CENTRE_M),) * 3) for centre in POINT_CENTRES
         ]
+
+    def prior_scale(self, inertial: Array | None) -> float:
+        """A few times the mass of the links that carry it: the root mean square of a payload."""
+        return float("inf") if inertial is None else MAX_PAYLOAD_RATIO * float(np.mean(inertial[::10]))
 
     def columns(self, scene: Scene) -> Array:
         """Torque of one kilogram there."""
@@ -253,14 +280,15 @@ def _negative_mass(mass: float, covariance: Array | None, place: int) -> str | N
     return "a negative mass" if mass + spread < 0 else None
 
 
-PAYLOAD = LinkFamily("payload", (Payload, PointPayload))
+PAYLOAD = LinkFamily(PAYLOAD_FACTS, (Payload, PointPayload))
 
 
 @dataclass(frozen=True)
 class InertialError(Body):
     """What has to be added to a link's parameters, of either sign."""
 
-    effect = "inertial_parameter_error"
+    facts = INERTIAL_ERROR_FACTS
+    second_name = True
 
     @classmethod
     def is_visible(cls, arm: Arm, link: int) -> bool:
@@ -272,4 +300,36 @@ class InertialError(Body):
         return None
 
 
-INERTIAL_ERROR = LinkFamily("inertial_parameter_error", (InertialError,))
+INERTIAL_ERROR = LinkFamily(INERTIAL_ERROR_FACTS, (InertialError,))
+
+
+@dataclass(frozen=True)
+class LinkLaw:
+    """What a link has more than its simulation, as a law; rivals: effects that no motion tells from it."""
+
+    candidate: Candidate
+    rivals: tuple[str, ...]
+
+
+def link_law(arm: Arm, link: int, mean: Array, spread: Array, added: bool) -> LinkLaw:
+    """The first name for what a link (from 1) has more than its simulation.
+
+    A payload where it can be a body, the link is the last one, and `added` says that no other link is off as far;
+    else an error of the link. mean (10,), spread (10, 10): of its ten parameters.
+    """
+    body = _may_be_body(mean, spread)
+    names = (PAYLOAD_FACTS.id, INERTIAL_ERROR_FACTS.id)
+    if body and added and link == len(arm):
+        return LinkLaw(Payload.at(arm, link), names[1:])
+    return LinkLaw(InertialError.at(arm, link), names[:1] if body else ())
+
+
+def _may_be_body(ten: Array, covariance: Array) -> bool:
+    """Whether ten parameters could be a body: positive mass, and a positive semidefinite pseudo-inertia."""
+    to_kilograms = np.array([1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1.0])
+    parts = pseudo_inertia_basis() * np.outer(to_kilograms, to_kilograms)
+    values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", ten, parts))
+    slopes = np.einsum("a,pab,b->p", vectors[:, 0], parts, vectors[:, 0])
+    doubt = 1.5 * SIGN_SIGMAS * np.sqrt(max(float(slopes @ covariance @ slopes), 0.0))
+    tolerance = EIGENVALUE_TOLERANCE * float(np.abs(values).max())
+    return bool(ten[0] > 0 and values[0] + doubt + tolerance >= 0)

@@ -9,9 +9,21 @@ from scipy.linalg.lapack import dtbtrs
 from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import (
+    ANGLE,
+    COULOMB_LEVEL,
+    STIFFNESS,
+    TORQUE,
+    Candidate,
+    Effect,
+    Family,
+    Parameter,
+    Scene,
+    Value,
+)
 from armlab.effects.friction import (
     PARTS_PER_SAMPLE,
+    STRIBECK_FACTS,
     STRIBECK_SPEED_RANGE,
     STRIBECK_SPEEDS,
     direction_of_motion,
@@ -19,8 +31,32 @@ from armlab.effects.friction import (
     positions_within_samples,
 )
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number, joint_moves, top_speed
-from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
+
+PRESLIDING_FACTS = Effect(
+    "presliding_hysteresis",
+    "friction that follows the way since a reversal",
+    (COULOMB_LEVEL, STIFFNESS),
+    dissipates=True,
+    sticks=True,
+    contains=("coulomb_friction", "viscous_friction"),
+    one_of="friction laws",
+    axis="velocity",
+    experiment="record micro-motions about zero velocity, smaller than the presliding range",
+)
+FRICTION_DRIFT_FACTS = Effect(
+    "friction_drift",
+    "viscous friction that changes as the joint warms",
+    (
+        Parameter("initial", f"{TORQUE}.s/{ANGLE}", positive=True),
+        Parameter("final", f"{TORQUE}.s/{ANGLE}", positive=True),
+        Parameter("time_constant", "s", positive=True),
+    ),
+    dissipates=True,
+    contains=("coulomb_friction", "viscous_friction"),
+    axis="time",
+    experiment="record the same loop cold and after half an hour of motion",
+)
 
 PRESLIDING_WAYS = (
     1e-3,
@@ -36,7 +72,7 @@ STATIC_RATIO, STATIC_RATIO_RANGE = 1.4, (1.0, 4.0)  # static over sliding fricti
 class DahlFriction(Term):
     """level z with dz/dq = (stiffness / level) (1 - z sgn(qd)); shape: the way level / stiffness, rad (m)."""
 
-    effect = "presliding_hysteresis"
+    facts = PRESLIDING_FACTS
     form = "Dahl"
     names = ("level", "stiffness")
 
@@ -77,7 +113,7 @@ class LuGreFriction(Term):
     shape: the way level / stiffness, rad (m); the static over the sliding level; Stribeck's velocity, rad/s (m/s).
     """
 
-    effect = "presliding_hysteresis"
+    facts = PRESLIDING_FACTS
     form = "LuGre"
     names = ("level", "stiffness", "static_level", "velocity")
 
@@ -114,7 +150,7 @@ class LuGreFriction(Term):
     def unit(self, name: str) -> str:
         """Unit of a parameter; what Stribeck friction has, too, has the unit that it has there."""
         if name in ("static_level", "velocity"):
-            return effect_named("stribeck_friction").parameter(name).unit_for(self.kind)
+            return STRIBECK_FACTS.parameter(name).unit_for(self.kind)
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
@@ -174,7 +210,7 @@ def lugre_state(position: Array, curve: Array, way: float) -> Array:
     return np.asarray(solved[:, 0])
 
 
-PRESLIDING = EveryJoint("presliding_hysteresis", (DahlFriction, LuGreFriction))
+PRESLIDING = EveryJoint(PRESLIDING_FACTS, (DahlFriction, LuGreFriction))
 
 
 @dataclass(frozen=True)
@@ -185,7 +221,7 @@ class Drift(Term):
     them follows the others. Empty where each run begins cold.
     """
 
-    effect = "friction_drift"
+    facts = FRICTION_DRIFT_FACTS
     names: ClassVar[tuple[str, ...]] = ("initial", "final", "time_constant")
     coulomb: ClassVar[bool] = False
     began: tuple[tuple[str, float], ...] = ()
@@ -334,7 +370,7 @@ DRIFT_FORMS = (ViscousDrift, CoulombDrift, HeatedFriction, ThermometerFriction)
 class DriftFamily(Family):
     """Drift by time and heat at each joint, runs cold or following one another; by temperature where recorded."""
 
-    effect: str = "friction_drift"
+    facts: Effect = FRICTION_DRIFT_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """Several forms a joint."""

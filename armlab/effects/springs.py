@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import ANGLE, STIFFNESS, TORQUE, Candidate, Effect, Family, Parameter, Scene, Value
 from armlab.effects.term import (
     SIGN_SIGMAS,
     EveryJoint,
@@ -21,6 +21,43 @@ from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
+TORQUE_RIPPLE_FACTS = Effect(
+    "torque_ripple",
+    "torque that waves with the joint angle",
+    (
+        Parameter("order", "1/rev", positive=True),
+        Parameter("amplitude", TORQUE, positive=True),
+        Parameter("phase", "rad"),
+    ),
+    scanned=True,
+    axis="cycle",
+    experiment="turn the joint slowly at constant speed, sampled well above the ripple",
+)
+GRAVITY_COMPENSATOR_FACTS = Effect(
+    "gravity_compensator",
+    "a spring, linkage or gas cylinder against gravity",
+    (
+        STIFFNESS,
+        Parameter("rest", ANGLE),
+        Parameter("amplitude", TORQUE),
+        Parameter("phase", "rad"),
+        Parameter("offset", TORQUE),
+    ),
+    contains=("torque_offset",),
+    axis="position",
+    simulators={"mjcf": "stiffness, springref"},
+    experiment="record two payloads over the full range of the joint",
+)
+CABLE_STIFFNESS_FACTS = Effect(
+    "cable_stiffness",
+    "hoses and cables that pull the joint to a rest position",
+    (STIFFNESS, Parameter("rest", ANGLE)),
+    contains=("torque_offset",),
+    axis="position",
+    simulators={"mjcf": "stiffness, springref"},
+    experiment="move the joint slowly over its full range in both directions",
+)
+
 MIN_ORDER = 4.0  # cycles a turn: slower waves are gravity and springs
 MAX_ORDER = 400.0
 GRID_ORDERS = 150  # of a plain grid
@@ -32,7 +69,7 @@ KEPT_PEAKS = 3  # peaks of a scan
 class TorqueRipple(Term):
     """amplitude sin(order q + phase); shape: the order, cycles a turn (rad/m)."""
 
-    effect = "torque_ripple"
+    facts = TORQUE_RIPPLE_FACTS
     names = ("order", "amplitude", "phase")
 
     def columns(self, scene: Scene) -> Array:
@@ -78,7 +115,7 @@ def sine_and_cosine(amplitude: float, phase: float) -> Array:
 class RippleFamily(Family):
     """Orders that the motion can tell apart, up to where it passes them faster than the samples follow."""
 
-    effect: str = "torque_ripple"
+    facts: Effect = TORQUE_RIPPLE_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """At most ORDERS orders a joint, coarser where there would be more: use `scan` for all of them."""
@@ -159,6 +196,7 @@ def _peaks(power: Array, apart: int) -> list[int]:
 TORQUE_RIPPLE = RippleFamily()
 
 
+COMPENSATOR_SHARE = 0.5  # of the scatter of the joint's gravity torque: a spring that carries more is no cable
 REST_POSITIONS = (0.25, 0.5, 0.75)  # of the travel: rest positions of a first look
 
 
@@ -166,9 +204,24 @@ REST_POSITIONS = (0.25, 0.5, 0.75)  # of the travel: rest positions of a first l
 class LinearSpring(Term):
     """stiffness (q - rest), fitted as a q + b."""
 
-    effect = "cable_stiffness"
+    facts = CABLE_STIFFNESS_FACTS
     form = "linear"
     names = ("stiffness", "rest")
+    identical = ("gravity_compensator",)
+
+    def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> Candidate:
+        """A spring that carries a good part of gravity is a compensator: no cable does."""
+        springs, weights = [], []
+        for scene in scenes:
+            position = scene.motion.position
+            still = Motion(position, np.zeros_like(position), np.zeros_like(position))
+            springs.append(self.columns(scene)[:, 0] @ coefficients)
+            weights.append(rigid_body_torque(scene.arm, still, scene.inertial)[:, self.own])
+        spring, weight = np.concatenate(springs), np.concatenate(weights)
+        carries = float(np.std(spring)) > COMPENSATOR_SHARE * float(np.std(weight))
+        against = float(np.mean(spring * weight)) < 0
+        joint = self.joints[0]
+        return SpringCompensator.at(scenes[0].arm, joint) if carries and against else self
 
     def columns(self, scene: Scene) -> Array:
         """Position and a constant: neither alone is a spring."""
@@ -199,7 +252,7 @@ class LinearSpring(Term):
 class HardeningSpring(Term):
     """stiffness x + cubic x^3, x = q - rest; shape: the rest position."""
 
-    effect = "cable_stiffness"
+    facts = CABLE_STIFFNESS_FACTS
     form = "cubic"
     names = ("stiffness", "rest", "cubic")
 
@@ -244,7 +297,7 @@ class HardeningSpring(Term):
         return spring, np.array([parameters["stiffness"], parameters["cubic"]], dtype=float)
 
 
-CABLE_STIFFNESS = EveryJoint("cable_stiffness", (LinearSpring, HardeningSpring))
+CABLE_STIFFNESS = EveryJoint(CABLE_STIFFNESS_FACTS, (LinearSpring, HardeningSpring))
 
 
 LINKAGE_PHASES = tuple((np.pi / 4 * np.arange(-3, 5)).tolist())  # of a first look
@@ -256,8 +309,14 @@ LINKAGE_RATIO, LINKAGE_RATIO_RANGE = 0.6, (0.05, 0.98)
 class SpringCompensator(LinearSpring):
     """A linear spring."""
 
-    effect = "gravity_compensator"
+    facts = GRAVITY_COMPENSATOR_FACTS
     form = "linear spring"
+    identical = ("cable_stiffness",)
+    second_name = True
+
+    def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> Candidate:
+        """Itself: it has its name already."""
+        return self
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -272,7 +331,7 @@ class Compensator(Term):
     gravity: sine and cosine part of the model's gravity torque over this angle, N m; zeros where unknown.
     """
 
-    effect = "gravity_compensator"
+    facts = GRAVITY_COMPENSATOR_FACTS
     gravity: tuple[float, float] = (0.0, 0.0)
 
     def _wave(self, coefficients: Array) -> Array:
@@ -411,4 +470,4 @@ def gravity_wave(scenes: Sequence[Scene], joint: int) -> tuple[float, float]:
     return sine, cosine
 
 
-GRAVITY_COMPENSATOR = EveryJoint("gravity_compensator", (SineCompensator, LinkageCompensator, SpringCompensator))
+GRAVITY_COMPENSATOR = EveryJoint(GRAVITY_COMPENSATOR_FACTS, (SineCompensator, LinkageCompensator, SpringCompensator))

@@ -8,8 +8,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
-from armlab.recordings.vocabulary import Kind, effect_named
+from armlab.effects.contract import Candidate, Effect, Family, Kind, Scene, Value
 from problem.arm import Arm
 
 SIGN_SIGMAS = 2.0  # standard errors beyond which a sign counts as wrong
@@ -59,12 +58,12 @@ class Term(Candidate):
         return replace(self, shape=shape)
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter, from the vocabulary."""
-        return effect_named(self.effect).parameter(name).unit_for(self.kind)
+        """Unit of a parameter."""
+        return self.facts.parameter(name).unit_for(self.kind)
 
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
         """Names the parameter that should be positive and is not."""
-        positive = {each.name for each in effect_named(self.effect).parameters if each.positive}
+        positive = {each.name for each in self.facts.parameters if each.positive}
         for name, value in self.parameters(coefficients).items():
             if (
                 name in positive
@@ -96,7 +95,7 @@ class EveryJoint(Family):
     resting: whether a joint that never moves can show it, too.
     """
 
-    effect: str
+    facts: Effect
     terms: tuple[type[Term], ...]
     resting: bool = False
 
@@ -122,9 +121,9 @@ def form_from_parameters(
         if set(term.names) <= set(parameters):
             return term.from_parameters(arm, joints, parameters)
     if not named:
-        raise ValueError(f"{terms[0].effect} has the forms {', '.join(term.form for term in terms)}, not {form}")
+        raise ValueError(f"{terms[0].facts.id} has the forms {', '.join(term.form for term in terms)}, not {form}")
     wanted = " or ".join(", ".join(term.names) for term in named)
-    raise ValueError(f"{terms[0].effect} has parameters {wanted}, not {', '.join(parameters) or 'none'}")
+    raise ValueError(f"{terms[0].facts.id} has parameters {wanted}, not {', '.join(parameters) or 'none'}")
 
 
 def joint_moves(scenes: Sequence[Scene], joint: int) -> bool:

@@ -10,11 +10,28 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Family, Scene, Value
+from armlab.effects.contract import Candidate, Effect, Family, Parameter, Scene, Value
 from armlab.effects.sensitivity import delay_signal, directional_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
 from problem.arm import Arm
 from problem.motion import Motion
+
+TIME_DELAY_FACTS = Effect(
+    "time_delay",
+    "torque recorded later than the motion",
+    (Parameter("seconds", "s"),),
+    where="robot",
+    at_most_beside={"channel_skew": 1},
+    prior_scale=0.01,
+    experiment="record a multisine of high frequency: delay grows with frequency, viscous friction does not",
+)
+CHANNEL_SKEW_FACTS = Effect(
+    "channel_skew",
+    "one channel recorded later than the others",
+    (Parameter("seconds", "s"),),
+    prior_scale=0.01,
+    experiment="correlate the channels on a fast motion, or trigger them from one clock",
+)
 
 SHIFTS = (1e-3, 4e-3, -4e-3)  # s, of a first look
 LONGEST = 0.03  # s
@@ -62,7 +79,7 @@ class LateTorque(Term):
 class TimeDelay(LateTorque):
     """Torque of all joints late."""
 
-    effect = "time_delay"
+    facts = TIME_DELAY_FACTS
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
@@ -78,7 +95,7 @@ class TimeDelay(LateTorque):
 class TorqueSkew(LateTorque):
     """Torque of one joint late."""
 
-    effect = "channel_skew"
+    facts = CHANNEL_SKEW_FACTS
     form = "torque"
 
     def equation(self, coefficients: Array) -> str:
@@ -90,7 +107,7 @@ class TorqueSkew(LateTorque):
 class PositionSkew(Term):
     """Position of one joint early by `seconds` against everything else: its torque seems late."""
 
-    effect = "channel_skew"
+    facts = CHANNEL_SKEW_FACTS
     form = "position"
     names = ("seconds",)
     follows_model = True
@@ -130,7 +147,7 @@ class PositionSkew(Term):
 class DelayFamily(Family):
     """One place: the whole robot."""
 
-    effect: str = "time_delay"
+    facts: Effect = TIME_DELAY_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
         """The delay with each shift of a first look."""
@@ -144,4 +161,4 @@ class DelayFamily(Family):
 
 
 TIME_DELAY = DelayFamily()
-CHANNEL_SKEW = EveryJoint("channel_skew", (TorqueSkew, PositionSkew))
+CHANNEL_SKEW = EveryJoint(CHANNEL_SKEW_FACTS, (TorqueSkew, PositionSkew))

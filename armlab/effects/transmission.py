@@ -14,12 +14,28 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects._drive_train import ffi, lib
-from armlab.effects.contract import Candidate, Scene, Value
+from armlab.effects.contract import ANGLE, STIFFNESS, Candidate, Effect, Parameter, Scene, Value
 from armlab.effects.sensitivity import directional_derivative, joint_displacement
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
 from problem.arm import Arm
 from problem.kernel import pointer
 from problem.motion import Motion
+
+JOINT_ELASTICITY_FACTS = Effect(
+    "joint_elasticity",
+    "a spring in the drive train",
+    (STIFFNESS,),
+    prior_scale=1e-3,
+    experiment="excite the joint with a chirp past its resonance, or read an encoder on the link side",
+)
+BACKLASH_FACTS = Effect(
+    "backlash",
+    "a dead zone in the drive train",
+    (Parameter("gap", ANGLE, positive=True),),
+    prior_scale=0.01,
+    axis="position",
+    experiment="let the load change its sign slowly, or read an encoder on the link side",
+)
 
 PHASE_STEP = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
@@ -143,7 +159,7 @@ class JointElasticity(Transmission):
     shape: the stiffness that its resonance has, N m/rad.
     """
 
-    effect = "joint_elasticity"
+    facts = JOINT_ELASTICITY_FACTS
     names = ("stiffness",)
 
     @property
@@ -189,7 +205,7 @@ class Backlash(Transmission):
     shape: the gap that is crossed, rad.
     """
 
-    effect = "backlash"
+    facts = BACKLASH_FACTS
     names = ("gap",)
     closely = True
 
@@ -242,7 +258,7 @@ class Backlash(Transmission):
 class BacklashFamily(EveryJoint):
     """Play at every joint, its gap by a scan of what is left."""
 
-    effect: str = "backlash"
+    facts: Effect = BACKLASH_FACTS
     terms: tuple[type[Term], ...] = (Backlash,)
 
     def scan(self, arm: Arm, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[list[Candidate]]:
@@ -274,5 +290,5 @@ def _resemblance(
     return np.asarray(np.maximum(products[0], 0) ** 2 / np.maximum(products[1] * products[2], 1e-300))
 
 
-JOINT_ELASTICITY = EveryJoint("joint_elasticity", (JointElasticity,))
+JOINT_ELASTICITY = EveryJoint(JOINT_ELASTICITY_FACTS, (JointElasticity,))
 BACKLASH = BacklashFamily()

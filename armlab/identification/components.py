@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.recordings.vocabulary import effect_named
+from armlab.effects.library import effect_named
 from problem.arm import Arm
 from problem.motion import Motion
 

@@ -28,7 +28,7 @@ from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.effects.springs import Cable, Compensator, Ripple
 from armlab.concealed.outside import OUTSIDE
-from armlab.recordings.vocabulary import EFFECT_IDS
+from armlab.effects.library import EFFECT_IDS
 from problem.arm import link_poses
 from problem.motion import Motion
 

@@ -13,9 +13,8 @@ from armlab.effects import extras
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.extras import BrokenEffectError
 from armlab.effects.friction import CoulombFriction
-from armlab.effects.library import BUILT_IN, library
+from armlab.effects.library import BUILT_IN, EFFECT_IDS, effect_named, library
 from armlab.effects.term import EveryJoint, Term
-from armlab.recordings.vocabulary import EFFECT_IDS, effect_named
 from problem.arm import PARAMETER_NAMES
 
 KINDS = ("RRR", "P", "PRR")

@@ -3,11 +3,11 @@ import pytest
 from numpy.testing import assert_allclose
 from simulated_arm import arm, motion, structure, truth
 
+from armlab.effects.library import effect_named
 from armlab.identification.components import FORMS, Component, every_joint, neighbour_couplings, usual_components
 from armlab.identification.identifier import Identifier
 from armlab.identification.structure import Structure
 from armlab.recordings.recording import Run
-from armlab.recordings.vocabulary import effect_named
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 

@@ -13,9 +13,7 @@ from armlab.diagnosis.claims import MAX_DEFICIT
 from armlab.diagnosis.next.moments import Index, draw_coefficients, solve_least_squares
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.question import Law, Question, Rival
-from armlab.diagnosis.search import SPECIAL_FRICTION
 from armlab.diagnosis.settings import Settings
-from armlab.diagnosis.solver import USUAL_EFFECTS
 
 MIN_SEPARATION = 1e-9  # standard errors
 
@@ -87,7 +85,7 @@ def required_lead(right: Law, other: Law, rows: float) -> float:
 
 def required_held_out_gain(right: Law, other: Law, rows: float) -> float:
     """What a special law of friction has to gain on usual friction: a share of the held-out error at its joint."""
-    if right.candidate.effect in SPECIAL_FRICTION and other.candidate.effect in USUAL_EFFECTS:
+    if other.candidate.facts.usual and other.candidate.effect in right.candidate.facts.contains:
         return 0.5 * Settings().least_gain * rows * right.share
     return -np.inf
 

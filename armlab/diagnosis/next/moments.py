@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
-from armlab.effects.plausible import prior_scale, reason_implausible
 
 RELATIVE_RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
 ROUNDING_SHARE = 1e-6  # of a squared length: what less of it is left is not seen
@@ -77,7 +76,7 @@ def draw_coefficients(
     """
     chosen = np.append(free, own)
     gram = seen.gram.copy()
-    gram[own, own] += 1 / prior_scale(candidate, None) ** 2
+    gram[own, own] += 1 / candidate.prior_scale(None) ** 2
     mean = solve_least_squares(gram, chosen, seen.vector)
     part = gram[np.ix_(chosen, chosen)]
     lengths = np.sqrt(np.maximum(np.diag(part), 1e-300))
@@ -91,4 +90,4 @@ def draw_coefficients(
 
 
 def _is_possible(candidate: Candidate, values: Array) -> bool:
-    return candidate.objection(values) is None and reason_implausible(candidate, values) is None
+    return candidate.objection(values) is None and candidate.absurdity(values) is None

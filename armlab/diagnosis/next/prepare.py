@@ -38,9 +38,8 @@ from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_nois
 from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictFile
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
-from armlab.effects.library import library
+from armlab.effects.library import effect_named, library
 from armlab.recordings.recording import Recording
-from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters, base_parameters
 from problem.trajectories import Trajectory

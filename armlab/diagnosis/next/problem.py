@@ -19,7 +19,7 @@ from armlab.diagnosis.next.motion import Budget, build_excitation_problem
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
 from armlab.diagnosis.next.question import Name
 from armlab.diagnosis.next.verdict_file import Finding, VerdictFile
-from armlab.recordings.vocabulary import EFFECT_IDS
+from armlab.effects.library import EFFECT_IDS
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
 from problem.motion import Motion

@@ -20,11 +20,9 @@ from armlab.diagnosis.next.moments import (
 )
 from armlab.diagnosis.next.question import Law, Name, Rival, is_in_free_links
 from armlab.diagnosis.next.verdict_file import Finding
-from armlab.diagnosis.solver import USUAL_EFFECTS
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.drive import TORQUE_OFFSET
 from armlab.effects.friction import COULOMB_FRICTION, VISCOUS_FRICTION
-from armlab.effects.naming import is_first_name
 from problem.arm import Arm
 
 MAX_SHAPES = 24  # of a law that are looked at
@@ -71,7 +69,7 @@ def alternative_laws(name: Name, offered: OfferedLaws) -> list[Candidate]:
         raise InputError(f"{name} leaves no trace in the torques of this arm")
     thinned = [[shapes[at] for at in _evenly_spaced(len(shapes))] for shapes in places]
     found = [each for shapes in thinned for each in shapes]
-    return [each for each in found if is_first_name(each)] or found
+    return [each for each in found if not each.second_name] or found
 
 
 def _offered_places(name: Name, offered: OfferedLaws) -> list[list[Candidate]]:
@@ -211,6 +209,6 @@ def _fit_size(columns: Index, free: Index, seen: Moments, rich: Array, signal: _
 def _build_law(candidate: Candidate, columns: Index, free: Index, gram: Array, library_places: int, joints: int) -> Law:
     """A law; what every arm has is no surprise, everything else was looked for in many places, if in any."""
     own = count_independent(gram, columns, free) if library_places else 0
-    looks = 1 if candidate.effect in USUAL_EFFECTS else library_places * candidate.looks
+    looks = 1 if candidate.facts.usual else library_places * candidate.looks
     freedom = own + len(candidate.shape) if own else 0
     return Law(candidate, columns, freedom, looks, len(candidate.rows) / joints)

@@ -15,7 +15,7 @@ from armlab.common.errors import InputError
 from armlab.common.settings import read_yaml
 from armlab.diagnosis.next.question import Name
 from armlab.diagnosis.verdict_files import VERDICT_SCHEMA
-from armlab.recordings.vocabulary import EFFECT_IDS, effect_named
+from armlab.effects.library import EFFECT_IDS, effect_named
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 

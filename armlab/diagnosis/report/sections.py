@@ -21,7 +21,7 @@ from armlab.diagnosis.report.words import (
 )
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.simulator_export import effects_without_place
-from armlab.recordings.vocabulary import EFFECT_IDS, effect_named
+from armlab.effects.library import EFFECT_IDS, effect_named
 
 
 def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> str:
