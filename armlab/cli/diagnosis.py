@@ -87,7 +87,7 @@ def diagnose(
 @click.argument("out", type=click.Path(path_type=Path))
 def export_model(model: Path, out: Path) -> None:
     """Write MODEL, a model.yaml with links, as OUT: a .urdf or an MJCF .xml file."""
-    from armlab.diagnosis.simulator_export import export_model as write
+    from armlab.identification.export import export_model as write
 
     for line in write(model, out):
         click.echo(line)

@@ -8,13 +8,14 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
-from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes, parameter_half_widths
+from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.result import Claim, Interval, Parameter, Rival
+from armlab.diagnosis.result import Claim, Rival
 from armlab.diagnosis.search import Search
 from armlab.diagnosis.solver import State
 from armlab.effects.contract import Candidate, Effect
 from armlab.effects.links import LinkLaw, felt_values, link_law
+from armlab.effects.parameters import parameter_values
 
 MAX_DEFICIT = 2.0  # units of log likelihood: a difference that may be chance
 HELD_OUT_TOLERANCE = 0.01  # of the held-out error
@@ -66,7 +67,7 @@ def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evi
         effect=candidate.effect,
         joint=candidate.joint,
         joints=candidate.joints,
-        parameters=named_parameters(candidate, coefficients, covariance, wide.factor),
+        parameters=parameter_values(candidate, coefficients, covariance, wide.factor),
         equation=candidate.equation(coefficients),
         evidence=evidence,
         prediction=found.columns.torque_of(own),
@@ -107,22 +108,6 @@ def _predicts_as_well(found: FittedModel, other: State, full: Array) -> bool:
     return bool(np.all(error <= (1 + HELD_OUT_TOLERANCE) * full))
 
 
-def named_parameters(
-    candidate: Candidate, coefficients: Array, covariance: Array, factor: float
-) -> tuple[Parameter, ...]:
-    """Named parameters with their intervals."""
-    out = []
-    for name, value, half in parameter_half_widths(candidate, coefficients, covariance, factor):
-        interval: Interval | None = None
-        if isinstance(value, tuple) and isinstance(half, tuple):
-            interval = tuple((each - by, each + by) for each, by in zip(value, half, strict=True))
-        elif isinstance(value, float) and isinstance(half, float):
-            interval = (value - half, value + half)
-        finite = interval is not None and bool(np.isfinite(np.array(interval)).all())
-        out.append(Parameter(name, value, interval if finite else None, candidate.unit(name)))
-    return tuple(out)
-
-
 def _link_claims(found: FittedModel, wide: ShapedFit, links: dict[int, Evidence]) -> list[Claim]:
     """One claim for each link that is off: its ten parameters, given what the joints feel of all links."""
     bench, widths = found.bench, found.fit.state.widths
@@ -156,7 +141,7 @@ def _link_claim(
         effect=candidate.effect,
         joint=link,
         joints=(),
-        parameters=named_parameters(candidate, coefficients, covariance, factor),
+        parameters=parameter_values(candidate, coefficients, covariance, factor),
         equation=candidate.equation(coefficients),
         evidence=evidence,
         prediction=found.columns.torque_of(torque),

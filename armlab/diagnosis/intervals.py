@@ -1,6 +1,5 @@
 """Named parameters with intervals: robust covariance, nonlinear parameters included, by the delta method."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +9,12 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import BlockCovariance, block_covariance, whitened_rows
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.refine import prior_precision
-from armlab.effects.contract import Candidate, Value
 
 CONFIDENCE = 0.95
 INTERVAL_FACTOR = (
     1.45  # what no law of friction has at a reversal is no noise: measured on development sets, 0.81 held without
 )
 SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
-COEFFICIENT_STEP = 1e-6  # of a coefficient
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,51 +89,3 @@ def _shape_derivative(found: FittedModel, group: int, which: int) -> Array:
         ends.append((shape[which], found.bench.block(candidate.with_shape(tuple(shape)), 0).values @ values))
     width = ends[0][0] - ends[1][0]
     return np.asarray((ends[0][1] - ends[1][1]) / (width or 1.0))
-
-
-Numbers = list[tuple[str, Value, Value | None]]
-
-
-def parameter_half_widths(candidate: Candidate, coefficients: Array, covariance: Array, factor: float) -> Numbers:
-    """Names, values and standard errors times `factor`, in the candidate's order.
-
-    covariance: of the coefficients, or of the coefficients and then the shapes.
-    """
-    shapes = len(covariance) - len(coefficients)
-    values = candidate.parameters(coefficients)
-    slopes = _jacobian(candidate, coefficients, shapes)
-    out: Numbers = []
-    for name, value in values.items():
-        spread = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", slopes[name], covariance, slopes[name]), 0)) * factor
-        half: Value = tuple(spread.tolist()) if isinstance(value, tuple) else float(spread[0])
-        out.append((name, value, half))
-    return out
-
-
-def _jacobian(candidate: Candidate, coefficients: Array, shapes: int) -> dict[str, Array]:
-    """Derivatives (components, coefficients + shapes) of each named parameter."""
-    columns: dict[str, list[Array]] = {name: [] for name in candidate.parameters(coefficients)}
-
-    def add(at: Callable[[float], dict[str, Value]], step: float) -> None:
-        after, before = at(step), at(-step)
-        for name, column in columns.items():
-            column.append((np.atleast_1d(after[name]) - np.atleast_1d(before[name])) / (2 * step))
-
-    for index, value in enumerate(coefficients):
-        unit = np.eye(len(coefficients))[index]
-        step = COEFFICIENT_STEP * max(abs(float(value)), 1e-9)
-
-        def moved(by: float, unit: Array = unit) -> dict[str, Value]:
-            return candidate.parameters(coefficients + by * unit)
-
-        add(moved, step)
-    for index in range(shapes):
-        low, high = candidate.bounds[index]
-
-        def shaped(by: float, index: int = index) -> dict[str, Value]:
-            shape = list(candidate.shape)
-            shape[index] += by
-            return candidate.with_shape(tuple(shape)).parameters(coefficients)
-
-        add(shaped, COEFFICIENT_STEP * (high - low))
-    return {name: np.column_stack(column) for name, column in columns.items()}

@@ -21,8 +21,9 @@ from armlab.diagnosis.report.words import (
     place_in_words,
     verdict_sentences,
 )
-from armlab.diagnosis.result import Claim, Diagnosis, Parameter
+from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.verdict_files import write_texts
+from armlab.effects.parameters import ParameterValue
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE
 from armlab.identification.real.study import RECIPES
@@ -181,9 +182,9 @@ def _claims_table(diagnosis: Diagnosis) -> Iterator[str]:
 def _run_lines(found: RealStudy) -> Iterator[str]:
     """What each run by itself says of the links: the same load should come out of each."""
     yield "Each run by itself (blocks of time held out), what it says of the links:\n"
-    masses: list[Parameter] = []
+    masses: list[ParameterValue] = []
     for run, diagnosis in found.alone:
-        told_masses, own = [], list[Parameter]()
+        told_masses, own = [], list[ParameterValue]()
         for claim in mass_claims(diagnosis):
             for parameter in (each for each in claim.parameters if each.name == "mass"):
                 own.append(parameter)
@@ -195,11 +196,11 @@ def _run_lines(found: RealStudy) -> Iterator[str]:
     yield f"\n{mass_agreement(masses)}\n"
 
 
-def _interval_width(parameter: Parameter) -> float:
+def _interval_width(parameter: ParameterValue) -> float:
     return float(np.ptp(np.array(parameter.interval, dtype=float)))
 
 
-def mass_agreement(masses: Sequence[Parameter]) -> str:
+def mass_agreement(masses: Sequence[ParameterValue]) -> str:
     """Whether masses with intervals can be one mass: chi-square of their weighted mean."""
     sized = [each for each in masses if each.interval]
     if len(sized) < 2:

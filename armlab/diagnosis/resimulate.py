@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.result import Diagnosis
+from armlab.effects.drive import RotorInertia
+from armlab.identification.torque_model import joint_fields
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion
@@ -161,8 +163,8 @@ def _new_body(diagnosis: Diagnosis) -> Body:
     assert diagnosis.inertial is not None
     rotors = _given_rotors(diagnosis)
     for claim in diagnosis.claims:
-        if claim.effect == "rotor_inertia" and claim.coefficients is not None and claim.joint is not None:
-            rotors[claim.joint - 1] += float(claim.coefficients[0])
+        if isinstance(claim.candidate, RotorInertia) and claim.coefficients is not None:
+            rotors[claim.candidate.rows[0]] += float(claim.coefficients[0])
     return Body(diagnosis.simulation.arm, diagnosis.inertial, rotors)
 
 
@@ -184,10 +186,8 @@ def _old_body(diagnosis: Diagnosis) -> Body:
 def _given_rotors(diagnosis: Diagnosis) -> Array:
     """Rotor inertias that the simulation has, (joints,)."""
     simulation = diagnosis.simulation
-    out = np.zeros(len(simulation.arm))
-    if simulation.model is None:
-        return out + (np.asarray(simulation.arm.rotor_inertia) if simulation.arm.rotor_inertia else 0.0)
-    for part, place in zip(simulation.model.structure.components, simulation.model.structure.slices, strict=True):
-        if part.effect == "rotor_inertia":
-            out[part.joint - 1] += float(simulation.model.values[place][0])
-    return out
+    if simulation.model is not None:
+        return joint_fields(simulation.model).get("armature", np.zeros(len(simulation.arm))).copy()
+    return np.zeros(len(simulation.arm)) + (
+        np.asarray(simulation.arm.rotor_inertia) if simulation.arm.rotor_inertia else 0.0
+    )

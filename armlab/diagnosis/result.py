@@ -8,21 +8,11 @@ from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.simulation import Simulation
-from armlab.effects.contract import Candidate, Value
+from armlab.effects.contract import Candidate
+from armlab.effects.parameters import ParameterValue
 from armlab.recordings.recording import Recording
 
 Status = Literal["mismatch", "none", "inconclusive"]
-Interval = tuple[float, float] | tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A named parameter, SI units, with its 95 % interval: one pair, or one a component of a vector."""
-
-    name: str
-    value: Value
-    interval: Interval | None
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -51,7 +41,7 @@ class Claim:
     effect: str
     joint: int | None
     joints: tuple[int, ...]
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ParameterValue, ...]
     equation: str
     evidence: Evidence
     prediction: Array

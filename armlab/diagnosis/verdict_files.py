@@ -5,24 +5,20 @@ import math
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Parameter, Unexplained
-from armlab.effects.library import effect_named
-from armlab.identification.model_file import SCHEMA
+from armlab.diagnosis.found_model import model_found
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
+from armlab.effects.parameters import ParameterValue
+from armlab.identification.model_file import model_text
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Recording
-from problem.arm import Arm
-from problem.base_parameters import base_parameters
-from problem.robot_file import built_in_arms
 
 MODEL = "model.yaml"
 
@@ -31,8 +27,7 @@ def verdict_texts(diagnosis: Diagnosis, folder: Path) -> dict[str, str]:
     """verdict.json and, where something was fitted, model.yaml, as they are to stand in a folder."""
     texts = {"verdict.json": json.dumps(verdict_content(diagnosis), indent=1, allow_nan=False) + "\n"}
     if diagnosis.inertial is not None:
-        model = augmented_model(diagnosis, folder)
-        texts[MODEL] = yaml.safe_dump(model, sort_keys=False, default_flow_style=None, width=110)
+        texts[MODEL] = model_text(model_found(diagnosis), folder)
     return texts
 
 
@@ -123,7 +118,7 @@ def _finding_entry(claim: Claim) -> dict[str, Any]:
     }
 
 
-def _parameter(each: Parameter) -> dict[str, Any]:
+def _parameter(each: ParameterValue) -> dict[str, Any]:
     value = list(each.value) if isinstance(each.value, tuple) else _finite(each.value)
     interval = None if each.interval is None else [list(x) if isinstance(x, tuple) else x for x in each.interval]
     return {"value": value, "ci95": interval, "unit": each.unit}
@@ -145,115 +140,6 @@ def _fit_entry(each: JointFit) -> dict[str, Any]:
         "noise_floor": each.noise_floor,
         "gap_closed": each.gap_closed,
     }
-
-
-def augmented_model(diagnosis: Diagnosis, folder: Path) -> dict[str, Any]:
-    """The content of `model.yaml` in a folder.
-
-    What could not be named is no component: its surrogate belongs to this recording, and the provenance tells of it,
-    as of what the links hold already.
-    """
-    content: dict[str, Any] = {"schema": SCHEMA, "robot": _robot_from(diagnosis, folder)}
-    inertial = diagnosis.inertial
-    if inertial is not None:
-        arm = diagnosis.simulation.arm
-        base = base_parameters(arm)
-        if diagnosis.simulation.inertial is not None:
-            content["links"] = [
-                {"mass": float(ten[0]), "first_moment": ten[1:4].tolist(), "inertia": ten[4:].tolist()}
-                for ten in inertial.reshape(-1, 10)
-            ]
-        content["base_parameters"] = {"names": list(base.sums), "values": base.values(inertial).tolist()}
-        if diagnosis.base_covariance is not None:
-            content["base_parameters"]["covariance"] = diagnosis.base_covariance.tolist()
-    own = [_component_entry(claim) for claim in diagnosis.claims if claim.candidate is not None and not claim.in_links]
-    content["components"] = _simulated_components(diagnosis) + own
-    content["provenance"] = _provenance(diagnosis)
-    return content
-
-
-def _component_entry(claim: Claim) -> dict[str, Any]:
-    joints = list(claim.joints)
-    return {
-        "effect": claim.effect,
-        "joint": claim.joint,
-        "joints": joints,
-        "parameters": {each.name: _parameter_entry(each) for each in claim.parameters},
-        **({"form": claim.candidate.form} if claim.candidate and claim.candidate.form else {}),
-    }
-
-
-def _parameter_entry(each: Parameter) -> dict[str, Any]:
-    value = list(each.value) if isinstance(each.value, tuple) else each.value
-    interval = None
-    if each.interval is not None:
-        interval = [list(x) if isinstance(x, tuple) else x for x in each.interval]
-    return {"value": value, "ci95": interval, "unit": each.unit}
-
-
-def _simulated_components(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Components that the simulation has already."""
-    model = diagnosis.simulation.model
-    if model is None:
-        return _rotor_components(diagnosis.simulation.arm)
-    linear = [
-        {
-            "effect": part.effect,
-            "joint": part.joint,
-            "joints": list(part.joints),
-            "parameters": {
-                each.name: {
-                    "value": each.value,
-                    "ci95": list(each.interval) if each.interval else None,
-                    "unit": each.unit,
-                }
-                for each in model.component_parameters(index)
-            },
-        }
-        for index, part in enumerate(model.structure.components)
-    ]
-    return linear + [dict(each.told) for each in model.extras]
-
-
-def _rotor_components(arm: Arm) -> list[dict[str, Any]]:
-    """Rotor inertias of a robot file: a model has them as components."""
-    rotor = effect_named("rotor_inertia")
-    return [
-        {
-            "effect": rotor.id,
-            "joint": number,
-            "joints": [number],
-            "parameters": {
-                "inertia": {"value": value, "ci95": None, "unit": rotor.parameter("inertia").unit_for(kind)}
-            },
-        }
-        for number, (value, kind) in enumerate(
-            zip(arm.rotor_inertia, (each.kind for each in arm.joints), strict=False), 1
-        )
-        if value
-    ]
-
-
-def _provenance(diagnosis: Diagnosis) -> dict[str, Any]:
-    unknown = [claim.equation for claim in diagnosis.claims if claim.candidate is None]
-    out: dict[str, Any] = {
-        "recording": diagnosis.recording.name,
-        "runs": [run.name for run in diagnosis.recording.runs if run.role == "identify"],
-        "settings": dict(diagnosis.settings),
-        "version": version("armlab"),
-    }
-    if diagnosis.observed is not None:
-        out["cutoff_hz"] = diagnosis.observed.cutoff_hz
-    in_links = [f"{claim.effect}: {claim.equation}" for claim in diagnosis.claims if claim.in_links]
-    return out | ({"unknown": unknown} if unknown else {}) | ({"in_links": in_links} if in_links else {})
-
-
-def _robot_from(diagnosis: Diagnosis, folder: Path) -> str:
-    """The robot as a file in this folder names it: a built-in name, or a path."""
-    robot = diagnosis.recording.robot
-    if robot in built_in_arms():
-        return robot
-    return Path(os.path.relpath(diagnosis.recording.folder / robot, folder)).as_posix()
 
 
 PREDICTED_FOLDER = "predicted"

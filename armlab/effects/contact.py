@@ -34,6 +34,7 @@ class Contact(Term):
     facts = EXTERNAL_CONTACT_FACTS
     form = "half sine"
     names = ("start", "end", "peak")
+    of_time = True
     run: str = field(default="", kw_only=True)
 
     def columns(self, scene: Scene) -> Array:

@@ -60,7 +60,6 @@ class Effect:
     scanned: its places are found by a look at the residual, not by columns alone.
     axis: the variable against which a figure shows it; `cycle` is the position within one wave.
     experiment: the next experiment that separates it from its rivals.
-    simulators: how simulators express it: the name of a format, and the field that holds it.
     """
 
     id: str
@@ -80,7 +79,6 @@ class Effect:
     scanned: bool = False
     axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
     experiment: str = ""
-    simulators: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def words(self) -> str:
@@ -119,6 +117,8 @@ class Candidate(ABC):
     or they would act on themselves. replaces: effects at the same joint that its columns contain (Stribeck friction
     those of Coulomb's); a model has either them or it. identical: effects that no motion tells from this law.
     second_name: another effect names the same columns first, so that a search does not look for this law.
+    names: of its parameters, in the order of `parameters`. size: number of its coefficients. of_time: its columns
+    depend on the order of the samples in time, so that single instants do not tell its torque.
     looks: among how many alternatives a scan of the residual has picked it, for the correction of what was tried.
     """
 
@@ -134,6 +134,8 @@ class Candidate(ABC):
     replaces: tuple[str, ...] = ()
     identical: tuple[str, ...] = ()
     second_name: bool = False
+    names: ClassVar[tuple[str, ...]] = ()
+    of_time: bool = False
     of_channel: bool = False
     looks: int = 1
 
@@ -141,6 +143,21 @@ class Candidate(ABC):
     def effect(self) -> str:
         """The id of its effect."""
         return self.facts.id
+
+    @property
+    def size(self) -> int:
+        """Number of its coefficients."""
+        return 1
+
+    @property
+    def label(self) -> str:
+        """Effect, law and place, for a table."""
+        details = [*([self.form] if self.form else []), *(f"{value:.4g}" for value in self.shape)]
+        law = f" ({', '.join(details)})" if details else ""
+        if self.joint is None:
+            return f"{self.effect}{law}"
+        driver = f" from {self.joints[1]}" if len(self.joints) > 1 else ""
+        return f"{self.effect}{law}, {'link' if self.facts.where == 'link' else 'joint'} {self.joint}{driver}"
 
     @abstractmethod
     def columns(self, scene: Scene) -> Array:
@@ -177,6 +194,21 @@ class Candidate(ABC):
     def prior_scale(self, inertial: Array | None) -> float:
         """Standard deviation of its coefficients; infinite where nothing is known. inertial: (10 * joints,)."""
         return self.facts.prior_scale
+
+    def joint_fields(self, coefficients: Array) -> dict[str, float]:
+        """Fields of a simulator's joint that hold this law exactly, in SI units; empty where none does.
+
+        Names as in MJCF: damping, frictionloss, armature, stiffness, springref.
+        """
+        return {}
+
+    def added_body(self, coefficients: Array) -> Array | None:
+        """Inertial parameters (10,) that it adds to its link, about the link's frame; None for what is no body."""
+        return None
+
+    def changed_gravity(self, coefficients: Array) -> Array | None:
+        """Gravity (3,) in the base frame that it stands for, m/s2; None for another effect."""
+        return None
 
     def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> "Candidate":
         """The law under the name that comes first for these coefficients; itself where there is no other."""

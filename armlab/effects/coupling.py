@@ -75,6 +75,11 @@ class JointCoupling(Term):
         """The coefficients by their names."""
         return dict(zip(self.names, coefficients.tolist(), strict=True))
 
+    @property
+    def size(self) -> int:
+        """One coefficient for each name."""
+        return len(self.names)
+
     def equation(self, coefficients: Array) -> str:
         """The law with its numbers."""
         own, other = self.joints

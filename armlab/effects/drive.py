@@ -16,7 +16,6 @@ ROTOR_INERTIA_FACTS = Effect(
     "inertia of the motor behind the gear",
     (Parameter("inertia", INERTIA, positive=True),),
     axis="acceleration",
-    simulators={"mjcf": "armature", "srdf": "rotor_params"},
     experiment="compare with the motor's data sheet: no motion tells rotor inertia from the link's own",
 )
 TORQUE_GAIN_FACTS = Effect(
@@ -62,6 +61,10 @@ class RotorInertia(Term):
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """The inertia on the joint side."""
         return {"inertia": float(coefficients[0])}
+
+    def joint_fields(self, coefficients: Array) -> dict[str, float]:
+        """`armature` of a simulator's joint."""
+        return {"armature": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
         """The law with its number."""
@@ -111,6 +114,7 @@ class TorqueGainBySign(Term):
     facts = TORQUE_GAIN_FACTS
     form = "by sign"
     names = ("gain", "gain_below")
+    size = 2
     follows_model = True
     of_channel = True
 

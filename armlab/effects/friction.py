@@ -20,7 +20,6 @@ COULOMB_FACTS = Effect(
     dissipates=True,
     sticks=True,
     axis="velocity",
-    simulators={"mjcf": "frictionloss", "urdf": "friction"},
     experiment="record several constant speeds in both directions, slow ones too, with many reversals",
 )
 VISCOUS_FACTS = Effect(
@@ -30,7 +29,6 @@ VISCOUS_FACTS = Effect(
     usual=True,
     dissipates=True,
     axis="velocity",
-    simulators={"mjcf": "damping", "urdf": "damping"},
     experiment="record the same speeds at different frequencies of motion, and several constant speeds",
 )
 NONLINEAR_VISCOUS_FACTS = Effect(
@@ -141,6 +139,10 @@ class CoulombFriction(Term):
         """The level."""
         return {"level": float(coefficients[0])}
 
+    def joint_fields(self, coefficients: Array) -> dict[str, float]:
+        """`frictionloss` of a simulator's joint."""
+        return {"frictionloss": float(coefficients[0])}
+
     def equation(self, coefficients: Array) -> str:
         """The law with its number."""
         return f"tau_{self.joint} += {format_number(coefficients[0])} sgn(qd_{self.joint})"
@@ -165,6 +167,10 @@ class ViscousFriction(Term):
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """The coefficient."""
         return {"coefficient": float(coefficients[0])}
+
+    def joint_fields(self, coefficients: Array) -> dict[str, float]:
+        """`damping` of a simulator's joint."""
+        return {"damping": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
         """The law with its number."""
@@ -233,6 +239,7 @@ class StribeckFriction(Term):
 
     facts = STRIBECK_FACTS
     names = ("level", "static_level", "velocity", "exponent")
+    size = 2
     replaces = ("coulomb_friction",)
 
     @classmethod
@@ -295,6 +302,7 @@ class ByDirection(Term):
 
     facts = ASYMMETRIC_FACTS
     names = ("positive", "negative", "exponent")
+    size = 2
     exponent: ClassVar[float]
 
     def columns(self, scene: Scene) -> Array:
@@ -368,6 +376,7 @@ class LevelsAndSlopes(Term):
     facts = ASYMMETRIC_FACTS
     form = "levels and slopes"
     names = ("positive", "negative", "positive_slope", "negative_slope")
+    size = 4
     replaces = ("coulomb_friction", "viscous_friction", "torque_offset")
 
     def columns(self, scene: Scene) -> Array:

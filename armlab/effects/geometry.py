@@ -21,7 +21,6 @@ BASE_TILT_FACTS = Effect(
     (Parameter("gravity", "m/s2"),),
     where="robot",
     prior_scale=0.5,
-    simulators={"mjcf": "gravity", "urdf": "origin of the first joint"},
     experiment="measure the base with a level, or turn joint 1 through its full range",
 )
 ENCODER_OFFSET_FACTS = Effect(
@@ -51,6 +50,7 @@ class BaseTilt(Term):
 
     facts = BASE_TILT_FACTS
     names = ("gravity",)
+    size = 2
     follows_model = True
     nominal: tuple[float, ...] = (0.0, 0.0, -9.81)
     across: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
@@ -76,6 +76,10 @@ class BaseTilt(Term):
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """Gravity in the base frame."""
         return {"gravity": tuple(self.gravity(coefficients).tolist())}
+
+    def changed_gravity(self, coefficients: Array) -> Array:
+        """Gravity in the base frame."""
+        return self.gravity(coefficients)
 
     def equation(self, coefficients: Array) -> str:
         """Gravity, and the angle to the nominal one."""

@@ -23,7 +23,6 @@ PAYLOAD_FACTS = Effect(
     "a body carried by a link",
     BODY_PARAMETERS,
     where="link",
-    simulators={"mjcf": "inertial", "urdf": "inertial"},
     experiment="repeat the motion without the payload",
 )
 INERTIAL_ERROR_FACTS = Effect(
@@ -31,7 +30,6 @@ INERTIAL_ERROR_FACTS = Effect(
     "a link that is not as the simulation has it",
     BODY_PARAMETERS,
     where="link",
-    simulators={"mjcf": "inertial", "urdf": "inertial"},
     experiment="weigh the link, or repeat the motion with a payload of known mass",
 )
 
@@ -146,6 +144,15 @@ class Body(LinkTerm):
         """Unit of a parameter."""
         return PARAMETER_UNITS[PARAMETER_NAMES.index(name)] if name in PARAMETER_NAMES else super().unit(name)
 
+    @property
+    def size(self) -> int:
+        """One coefficient for each felt parameter."""
+        return len(self.felt)
+
+    def added_body(self, coefficients: Array) -> Array:
+        """All ten parameters about the link's frame."""
+        return self.ten(coefficients)
+
     def equation(self, coefficients: Array) -> str:
         """The parameters with their numbers."""
         named = zip(self.felt, coefficients.tolist(), strict=True)
@@ -249,13 +256,20 @@ class PointPayload(LinkTerm):
 
     def columns(self, scene: Scene) -> Array:
         """Torque of one kilogram there."""
+        return torque_of_parameters(scene, self.link, self._unit_mass()[None])
+
+    def _unit_mass(self) -> Array:
+        """Parameters (10,) of one kilogram at the point."""
         x, y, z = self.shape
-        ten = [1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
-        return torque_of_parameters(scene, self.link, np.array([ten]))
+        return np.array([1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """Mass and centre."""
         return {"mass": float(coefficients[0]), "centre": self.shape}
+
+    def added_body(self, coefficients: Array) -> Array:
+        """A point mass about the link's frame."""
+        return float(coefficients[0]) * self._unit_mass()
 
     def equation(self, coefficients: Array) -> str:
         """The mass and where it is."""

@@ -75,6 +75,7 @@ class DahlFriction(Term):
     facts = PRESLIDING_FACTS
     form = "Dahl"
     names = ("level", "stiffness")
+    of_time = True
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -116,6 +117,7 @@ class LuGreFriction(Term):
     facts = PRESLIDING_FACTS
     form = "LuGre"
     names = ("level", "stiffness", "static_level", "velocity")
+    of_time = True
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -223,6 +225,8 @@ class Drift(Term):
 
     facts = FRICTION_DRIFT_FACTS
     names: ClassVar[tuple[str, ...]] = ("initial", "final", "time_constant")
+    of_time = True
+    size = 2
     coulomb: ClassVar[bool] = False
     began: tuple[tuple[str, float], ...] = ()
 

@@ -49,10 +49,20 @@ class Scene:
     @property
     def step(self) -> float:
         """Time from sample to sample, s."""
-        return float((self.time[-1] - self.time[0]) / (len(self.time) - 1))
+        return float((self.time[-1] - self.time[0]) / max(len(self.time) - 1, 1))
 
 
 def scene_of(run: Run, motion: Motion, arm: Arm) -> Scene:
     """The scene of a run that is even in time and of its motion, before any model: links and torque are zeros."""
     zero, time = np.zeros(motion.position.shape), run.time - run.time[0]
     return Scene(run.name, time, motion, arm, np.zeros(10 * len(arm)), zero, run.temperature, run.link_position)
+
+
+def instants(arm: Arm, motion: Motion, inertial: Array | None = None) -> Scene:
+    """States that do not follow one another, as a scene of no duration: friction has the sign of each velocity.
+
+    inertial: (10 * joints,), the links; zeros where it is left out.
+    """
+    samples, joints = motion.position.shape
+    links = np.zeros(10 * joints) if inertial is None else inertial
+    return Scene("", np.zeros(samples), motion, arm, links, np.zeros((samples, joints)))

@@ -45,7 +45,6 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
     ),
     contains=("torque_offset",),
     axis="position",
-    simulators={"mjcf": "stiffness, springref"},
     experiment="record two payloads over the full range of the joint",
 )
 CABLE_STIFFNESS_FACTS = Effect(
@@ -54,7 +53,6 @@ CABLE_STIFFNESS_FACTS = Effect(
     (STIFFNESS, Parameter("rest", ANGLE)),
     contains=("torque_offset",),
     axis="position",
-    simulators={"mjcf": "stiffness, springref"},
     experiment="move the joint slowly over its full range in both directions",
 )
 
@@ -71,6 +69,7 @@ class TorqueRipple(Term):
 
     facts = TORQUE_RIPPLE_FACTS
     names = ("order", "amplitude", "phase")
+    size = 2
 
     def columns(self, scene: Scene) -> Array:
         """Sine and cosine."""
@@ -207,6 +206,7 @@ class LinearSpring(Term):
     facts = CABLE_STIFFNESS_FACTS
     form = "linear"
     names = ("stiffness", "rest")
+    size = 2
     identical = ("gravity_compensator",)
 
     def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> Candidate:
@@ -232,6 +232,12 @@ class LinearSpring(Term):
         slope, constant = (float(value) for value in coefficients)
         return {"stiffness": slope, "rest": -constant / slope if slope else 0.0}
 
+    def joint_fields(self, coefficients: Array) -> dict[str, float]:
+        """`stiffness` and `springref` of a simulator's joint, for a spring that pushes back."""
+        named = self.parameters(coefficients)
+        stiffness, rest = (float(np.sum(named[name])) for name in self.names)
+        return {"stiffness": stiffness, "springref": rest} if stiffness > 0 else {}
+
     def equation(self, coefficients: Array) -> str:
         """The law with its numbers."""
         named = self.parameters(coefficients)
@@ -255,6 +261,7 @@ class HardeningSpring(Term):
     facts = CABLE_STIFFNESS_FACTS
     form = "cubic"
     names = ("stiffness", "rest", "cubic")
+    size = 2
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -355,6 +362,7 @@ class SineCompensator(Compensator):
 
     form = "sine"
     names = ("amplitude", "phase")
+    size = 2
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -394,6 +402,7 @@ class LinkageCompensator(Compensator):
 
     form = "linkage"
     names = ("amplitude", "force", "phase", "ratio")
+    size = 2
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:

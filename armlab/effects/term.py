@@ -3,7 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -31,7 +31,6 @@ class Term(Candidate):
     shape: tuple[float, ...] = ()
     bounds: tuple[tuple[float, float], ...] = ()
     looks: int = 1
-    names: ClassVar[tuple[str, ...]]
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:

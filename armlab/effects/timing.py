@@ -46,6 +46,7 @@ class LateTorque(Term):
     """
 
     follows_model = True
+    of_time = True
     of_channel = True
     names = ("seconds",)
 
@@ -110,6 +111,7 @@ class PositionSkew(Term):
     facts = CHANNEL_SKEW_FACTS
     form = "position"
     names = ("seconds",)
+    of_time = True
     follows_model = True
 
     @classmethod

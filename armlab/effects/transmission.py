@@ -108,6 +108,7 @@ class Transmission(Term):
     """
 
     follows_model = True
+    of_time = True
     measured: float | None = None
 
     @classmethod

@@ -15,6 +15,7 @@ from scipy.stats import norm
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.effects.scene import instants
 from armlab.identification.components import usual_components
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
@@ -64,7 +65,7 @@ class Experiment:
         """A recorded motion of random harmonics."""
         time = np.arange(round(self.seconds * self.rate_hz)) / self.rate_hz
         motion = fourier_motion(time, len(self.arm), rng)
-        clean = (self.structure.matrix(motion) @ self.truth).reshape(len(time), -1)
+        clean = (self.structure.matrix(instants(self.structure.arm, motion)) @ self.truth).reshape(len(time), -1)
         shocks = rng.standard_normal(clean.shape) * self.noise.torque * np.sqrt(1 - self.noise.colour**2)
         torque = clean + lfilter([1.0], [1.0, -self.noise.colour], shocks, axis=0)
         position = motion.position + self.noise.encoder * rng.standard_normal(clean.shape)
@@ -83,7 +84,7 @@ def fourier_motion(time: Array, joints: int, rng: np.random.Generator) -> Motion
 def three_joint_experiment(noise: Noise) -> Experiment:
     """The built-in three-joint arm with friction, rotors and offsets."""
     arm = load_arm("irb120-arm")
-    structure = Structure(arm, usual_components(len(arm))).separable()[0]
+    structure = Structure(arm, usual_components(arm)).separable()[0]
     own = [TRUE_COEFFICIENTS[part.effect] for part in structure.components]
     return Experiment(arm, structure, np.concatenate([structure.base.values(arm.parameters), own]), noise)
 

@@ -1,13 +1,16 @@
 """Writes a model as a file of a simulator: URDF, with an SRDF beside it, or MJCF.
 
-Both write the model as a chain of bodies on joints that turn about or slide along z. URDF has no place for the
+Payloads and link errors go into the links, a tilt of the base into gravity, and laws that a simulator's joint has to
+the joints (see `Candidate.joint_fields`); effects without a place in the file are listed.
+
+Both formats write the model as a chain of bodies on joints that turn about or slide along z. URDF has no place for the
 armature, which goes to the SRDF that Pinocchio reads (`loadRotorParameters`), and takes gravity as -z of the root: a
-fixed first joint turns the arm into it. MJCF, the format of MuJoCo, holds armature, damping and frictionloss.
+fixed first joint turns the arm into it. MJCF, the format of MuJoCo, holds armature, damping, frictionloss and springs.
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +18,79 @@ from scipy.spatial.transform import Rotation
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.identification.model import Model
-from armlab.identification.torque_model import TorqueModel
+from armlab.effects.contract import Candidate
+from armlab.identification.model_file import read_model
+from armlab.identification.structure import Structure
+from armlab.identification.torque_model import TorqueModel, joint_fields
+from problem.arm import Arm
 from problem.inertia import pseudo_inertia_of, transform_pseudo_inertia
-from problem.pseudo_inertia import link_of
+from problem.pseudo_inertia import link_of, links_of, parameters_of, pseudo_inertias, regular_nominal
 from problem.transforms import inverse, turn_z_to
 
 MIN_EXTENT_SHARE = 1e-12  # of a body's size: simulators refuse points, rods and plates
-EXPORTED_EFFECTS = {"viscous_friction": "damping", "coulomb_friction": "friction", "rotor_inertia": "armature"}
+MAX_FLAT_SHARE = 1e-9  # of a link's size: rounding tells no more of a point or a rod
+SPRING_FIELDS = ("stiffness", "springref")
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatorModel:
+    """What a simulator can hold of a model.
+
+    model: links with the bodies that were added, gravity as tilted. fields: of the joints, (joints,) each. missing:
+    labels of the effects without a place. thickened_links: links, from 1, that were points or rods, which no simulator
+    takes, and have been given a little extent.
+    """
+
+    model: TorqueModel
+    fields: dict[str, Array]
+    missing: tuple[str, ...]
+    thickened_links: tuple[int, ...] = ()
+
+
+def has_place_in_simulator(candidate: Candidate, coefficients: Array) -> bool:
+    """Whether an MJCF file can hold an effect: in a joint, a link, or gravity."""
+    return bool(candidate.joint_fields(coefficients)) or any(
+        each is not None for each in (candidate.added_body(coefficients), candidate.changed_gravity(coefficients))
+    )
+
+
+def build_simulator_model(known: TorqueModel) -> SimulatorModel:
+    """Sorts the effects of a model into links, gravity and fields of joints; the rest is named as missing."""
+    arm, inertial, missing = known.arm, known.inertial, list[str]()
+    for effect in known.effects:
+        candidate, values = effect.candidate, effect.coefficients
+        body, gravity = candidate.added_body(values), candidate.changed_gravity(values)
+        if body is not None and inertial is not None:
+            inertial = inertial.copy()
+            inertial[10 * candidate.joints[0] - 10 : 10 * candidate.joints[0]] += body
+        elif gravity is not None:
+            x, y, z = gravity.tolist()
+            arm = replace(arm, gravity=(x, y, z))
+        elif not candidate.joint_fields(values):
+            missing.append(candidate.label)
+    thickened: tuple[int, ...] = ()
+    if inertial is not None:
+        inertial, thickened = _thicken_links(arm, inertial)
+    rigid = _model_with_links(known, arm, inertial)
+    return SimulatorModel(rigid, joint_fields(known), tuple(missing), thickened)
+
+
+def _thicken_links(arm: Arm, inertial: Array) -> tuple[Array, tuple[int, ...]]:
+    """Links with extent in space, and which of them (from 1) had none; what no body could have stays as it is."""
+    pseudos = pseudo_inertias(inertial)
+    lowest = np.linalg.eigvalsh(pseudos)[:, 0] / np.maximum(np.trace(pseudos, axis1=1, axis2=2), 1e-300)
+    flat = np.abs(lowest) <= MAX_FLAT_SHARE
+    raised = regular_nominal(replace(arm, links=links_of(inertial)))
+    whole = parameters_of(np.where(flat[:, None, None], raised, pseudos))
+    return whole, tuple((np.flatnonzero(flat) + 1).tolist())
+
+
+def _model_with_links(known: TorqueModel, arm: Arm, inertial: Array | None) -> TorqueModel:
+    """The model with other links and gravity: another gravity may have other base parameters."""
+    if inertial is None:
+        return known
+    structure = Structure(arm)
+    return TorqueModel(known.robot, structure, structure.base.values(inertial), inertial=inertial)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +115,13 @@ class Body:
     armature: float
 
 
-def bodies(model: TorqueModel) -> tuple[Body, ...]:
+def bodies(found: SimulatorModel) -> tuple[Body, ...]:
     """The bodies of a model; InputError where it has no links or one that no simulator takes."""
+    model = found.model
     if model.inertial is None:
         raise InputError("the model has base parameters only: identify it with --method physical to export links")
     origin, out = np.eye(4), []
-    own = joint_values(model)
+    zeros = np.zeros(len(model.arm))
     for index, (joint, ten) in enumerate(zip(model.arm.joints, model.inertial.reshape(-1, 10), strict=True)):
         pseudo = transform_pseudo_inertia(pseudo_inertia_of(link_of(ten)), joint.after)
         if np.linalg.eigvalsh(pseudo)[0] <= MIN_EXTENT_SHARE * np.trace(pseudo):
@@ -72,25 +141,11 @@ def bodies(model: TorqueModel) -> tuple[Body, ...]:
                 limits.position,
                 limits.velocity,
                 limits.torque,
-                **{name: float(values[index]) for name, values in own.items()},
+                *(float(found.fields.get(name, zeros)[index]) for name in ("damping", "frictionloss", "armature")),
             )
         )
         origin = joint.after
     return tuple(out)
-
-
-def joint_values(model: TorqueModel) -> dict[str, Array]:
-    """damping, friction and armature of each joint, (joints,)."""
-    values = {name: np.zeros(len(model.arm)) for name in EXPORTED_EFFECTS.values()}
-    for part, place in zip(model.structure.components, model.structure.slices, strict=True):
-        if part.effect in EXPORTED_EFFECTS:
-            values[EXPORTED_EFFECTS[part.effect]][part.joint - 1] += model.values[place][0]
-    return values
-
-
-def unsupported_components(model: TorqueModel) -> tuple[str, ...]:
-    """Components for which these formats have no place."""
-    return tuple(part.label for part in model.structure.components if part.effect not in EXPORTED_EFFECTS)
 
 
 def format_numbers(values: Array | tuple[float, ...]) -> str:
@@ -98,11 +153,12 @@ def format_numbers(values: Array | tuple[float, ...]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def srdf_document(model: TorqueModel) -> str:
+def srdf_document(found: SimulatorModel) -> str:
     """Rotor inertias on the joint side: `mass` is the format's word for the inertia of a rotor, kg m2 (kg)."""
-    root = ElementTree.Element("robot", name=model.arm.name)
+    arm = found.model.arm
+    root = ElementTree.Element("robot", name=arm.name)
     rotors = ElementTree.SubElement(root, "rotor_params")
-    for joint, inertia in zip(model.arm.joints, joint_values(model)["armature"].tolist(), strict=True):
+    for joint, inertia in zip(arm.joints, found.fields["armature"].tolist(), strict=True):
         ElementTree.SubElement(rotors, "joint", name=joint.name, mass=repr(inertia), gear_ratio="1.0")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -112,15 +168,15 @@ MIN_PITCH_COSINE = 1e-12  # cosine of the pitch, below which roll and yaw are on
 UNLIMITED = 1e9  # what a reader takes for no limit, where the format wants a number
 
 
-def urdf_document(model: TorqueModel) -> str:
+def urdf_document(found: SimulatorModel) -> str:
     """The model as a URDF document; InputError for a model without links."""
-    root = ElementTree.Element("robot", name=model.arm.name)
+    root = ElementTree.Element("robot", name=found.model.arm.name)
     ElementTree.SubElement(root, "link", name="world")
     ElementTree.SubElement(root, "link", name="base")
     mount = ElementTree.SubElement(root, "joint", name="mount", type="fixed")
-    _add_ends(mount, "world", "base", _rotation_to_upright(model.arm.gravity))
+    _add_ends(mount, "world", "base", _rotation_to_upright(found.model.arm.gravity))
     previous = "base"
-    for index, body in enumerate(bodies(model)):
+    for index, body in enumerate(bodies(found)):
         previous = _add_link(root, body, previous, f"link{index + 1}")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -177,14 +233,15 @@ def _format_finite(value: float) -> str:
 MJCF_JOINT_TYPES = {"revolute": "hinge", "prismatic": "slide"}
 
 
-def mjcf_document(model: TorqueModel) -> str:
+def mjcf_document(found: SimulatorModel) -> str:
     """The model as an MJCF document; InputError for a model without links."""
-    root = ElementTree.Element("mujoco", model=model.arm.name)
+    root = ElementTree.Element("mujoco", model=found.model.arm.name)
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ElementTree.SubElement(root, "option", gravity=format_numbers(model.arm.gravity))
+    ElementTree.SubElement(root, "option", gravity=format_numbers(found.model.arm.gravity))
     parent = ElementTree.SubElement(root, "worldbody")
-    for index, body in enumerate(bodies(model)):
+    for index, body in enumerate(bodies(found)):
         parent = _add_body(parent, body, index + 1)
+    _set_springs(root, found)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -208,30 +265,34 @@ def _add_body(parent: ElementTree.Element, body: Body, number: int) -> ElementTr
     return node
 
 
+def _set_springs(root: ElementTree.Element, found: SimulatorModel) -> None:
+    joints = {node.get("name", ""): node for node in root.iter("joint")}
+    for number, joint in enumerate(found.model.arm.joints):
+        if "stiffness" in found.fields and found.fields["stiffness"][number]:
+            for name in SPRING_FIELDS:
+                joints[joint.name].set(name, format_numbers((found.fields[name][number],)))
+
+
 WRITERS = {".urdf": urdf_document, ".xml": mjcf_document}
 
 
 def export_model(path: Path, out: Path) -> Iterator[str]:
-    """Writes the file and tells what it does not hold; InputError where the ending or the model does not fit."""
-    check_ending(out)
-    model = Model.load(path)
-    yield from write_files(model, out, WRITERS[out.suffix](model), unsupported_components(model))
-
-
-def check_ending(out: Path) -> None:
-    """InputError for a file of another format."""
+    """Writes the file and says what it does not hold; InputError where the ending or the model does not fit."""
     if out.suffix not in WRITERS:
         raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
-
-
-def write_files(model: TorqueModel, out: Path, text: str, missing: Sequence[str]) -> Iterator[str]:
-    """Writes the text of a model, and rotor inertias beside a URDF. missing: what the file does not hold."""
-    yield from _write_text(out, text)
-    if out.suffix == ".urdf" and joint_values(model)["armature"].any():
-        yield from _write_text(out.with_suffix(".srdf"), srdf_document(model))
-        yield "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
+    found = build_simulator_model(read_model(path))
+    yield from _write_text(out, WRITERS[out.suffix](found))
+    missing = list(found.missing)
+    if out.suffix == ".urdf":
+        stiffness = found.fields.get("stiffness", np.zeros(0))
+        missing = [f"spring of joint {number}" for number, each in enumerate(stiffness, 1) if each] + missing
+        if "armature" in found.fields and found.fields["armature"].any():
+            yield from _write_text(out.with_suffix(".srdf"), srdf_document(found))
+            yield "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
     if missing:
         yield "not in the file: " + "; ".join(missing)
+    if found.thickened_links:
+        yield f"given a little extent, as simulators want it: link {', '.join(map(str, found.thickened_links))}"
 
 
 def _write_text(path: Path, text: str) -> Iterator[str]:

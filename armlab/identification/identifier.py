@@ -6,7 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.identification.components import Component, usual_components
+from armlab.effects.contract import Candidate
+from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.cross_validation import held_out_error
 from armlab.identification.estimators.least_squares import (
@@ -87,7 +88,7 @@ class Identifier:
     """
 
     arm: Arm
-    components: tuple[Component, ...] | None = None
+    components: tuple[Candidate, ...] | None = None
     method: str = "weighted"
     pull: Pull = NO_PULL
     cutoff_hz: float | None = None
@@ -95,7 +96,7 @@ class Identifier:
     position_factor: float = 1.0
     model_: Model = field(init=False)
     condition_number_: float = field(init=False)
-    absorbed_: tuple[Component, ...] = field(init=False, default=())
+    absorbed_: tuple[Candidate, ...] = field(init=False, default=())
     estimate_: Estimate = field(init=False)
 
     def fit(self, runs: Sequence[Run]) -> "Identifier":
@@ -127,7 +128,7 @@ class Identifier:
         return held_out_error(fitted[2], fitted[2], METHODS[self.method](fitted, self.pull))
 
     def _structure(self) -> Structure:
-        components = usual_components(len(self.arm)) if self.components is None else self.components
+        components = usual_components(self.arm) if self.components is None else self.components
         whole = Structure(self.arm, components)
         if self.pull.kind == "nominal":  # the prior tells apart what no motion does
             return whole

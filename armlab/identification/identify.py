@@ -98,7 +98,7 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
     pull = Pull("nominal", options.tolerance) if options.tolerance else NO_PULL
     if not options.choose:
         return Identifier(arm, None, options.method, pull, options.cutoff_hz, robot), []
-    groups = candidate_groups(len(arm))
+    groups = candidate_groups(arm)
     candidates = (pull,) if options.tolerance else candidate_pulls(arm)
     choice = select_structure(arm, recording.with_role("identify"), groups, candidates).choice
     line = f"chosen: {describe_choice(choice)}; held-out error {100 * choice.held_out:.2f} % of the torque"

@@ -5,10 +5,8 @@ from typing import Any
 
 from armlab.identification.model_file import read_model, write_model
 from armlab.identification.pictures import residual_figure
-from armlab.identification.torque_model import Parameter, TorqueModel
+from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Run
-
-__all__ = ["Model", "Parameter"]
 
 
 class Model(TorqueModel):

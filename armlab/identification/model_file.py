@@ -1,6 +1,7 @@
 """`model.yaml` (schema model/1): read and written so that a model predicts the same after a round trip."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -8,16 +9,16 @@ import numpy as np
 import yaml
 from annotated_types import Gt
 from pydantic import Field
-from scipy.linalg import block_diag
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
-from armlab.effects.extras import Extra, extra_from_file, registered_effects
-from armlab.identification.components import FORMS, Component
+from armlab.effects.contract import Candidate
+from armlab.effects.library import family_named
+from armlab.effects.parameters import Interval, ParameterValue
 from armlab.identification.structure import Structure
-from armlab.identification.torque_model import Parameter, TorqueModel, parameter_jacobian
+from armlab.identification.torque_model import TorqueModel, joint_fields
 from problem.arm import Arm
 from problem.pseudo_inertia import links_of
 from problem.robot_file import LinkEntry, built_in_arms, load_arm
@@ -35,12 +36,17 @@ class ParameterEntry(Settings):
 
 
 class ComponentEntry(Settings):
-    """One component; form: which of an effect's laws, where its parameters do not tell."""
+    """One component.
+
+    form: which of an effect's laws, where its parameters do not tell. claimed: false for what is in the model because
+    every arm has it, and is not sure enough to be a finding.
+    """
 
     effect: str
     joint: int | None
     joints: tuple[int, ...] = ()
     form: str = ""
+    claimed: bool = True
     parameters: dict[str, ParameterEntry]
 
 
@@ -76,7 +82,16 @@ NUMBER_KEYS = tuple(Numbers.model_fields)
 
 def write_model(model: TorqueModel, path: Path) -> Path:
     """Writes a model and returns the path; InputError where it cannot be written."""
-    content: dict[str, Any] = {"schema": SCHEMA, "robot": _robot_as_written(model.robot, path.parent)}
+    try:
+        path.write_text(model_text(model, path.parent), encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    return path
+
+
+def model_text(model: TorqueModel, folder: Path) -> str:
+    """The text of `model.yaml` as it is to stand in a folder."""
+    content: dict[str, Any] = {"schema": SCHEMA, "robot": _robot_as_written(model.robot, folder)}
     if model.inertial is not None:
         content |= {"links": [_link_entry(ten) for ten in model.inertial.reshape(-1, 10)]}
     base: dict[str, Any] = {"names": list(model.structure.base.sums), "values": model.base_values.tolist()}
@@ -88,11 +103,7 @@ def write_model(model: TorqueModel, path: Path) -> Path:
     factor = {"interval_factor": None if model.covariance is None else model.factor}
     provenance = {**model.provenance, **filters, **factor}
     content["provenance"] = {key: value for key, value in provenance.items() if value is not None}
-    try:
-        path.write_text(yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    return path
+    return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
 
 
 def _robot_as_written(robot: str, folder: Path) -> str:
@@ -105,28 +116,30 @@ def _link_entry(ten: Array) -> dict[str, Any]:
 
 
 def _component_entries(model: TorqueModel) -> list[dict[str, Any]]:
-    linear = [
+    return [
         {
             "effect": part.effect,
             "joint": part.joint,
             "joints": list(part.joints),
             "parameters": {each.name: _parameter_entry(each) for each in model.component_parameters(index)},
+            **({"form": part.form} if part.form else {}),
         }
         for index, part in enumerate(model.structure.components)
     ]
-    return linear + [dict(each.told) for each in model.extras]
 
 
-def _parameter_entry(parameter: Parameter) -> dict[str, Any]:
-    interval = list(parameter.interval) if parameter.interval else None
-    return {"value": parameter.value, "ci95": interval, "unit": parameter.unit}
+def _parameter_entry(parameter: ParameterValue) -> dict[str, Any]:
+    value = list(parameter.value) if isinstance(parameter.value, tuple) else parameter.value
+    interval = None
+    if parameter.interval is not None:
+        interval = [list(each) if isinstance(each, tuple) else each for each in parameter.interval]
+    return {"value": value, "ci95": interval, "unit": parameter.unit}
 
 
 def read_model(path: Path) -> TorqueModel:
     """The model of a file; InputError, in one line, for what is wrong in it.
 
-    Its covariance is that of the base parameters and, component by component, what the intervals tell: the file
-    holds no ties between components.
+    Its covariance is that of the base parameters; what the file says of a component's intervals is kept as it stands.
     """
     return model_of(read_model_file(path), path)
 
@@ -140,66 +153,53 @@ def model_of(file: ModelFile, path: Path) -> TorqueModel:
     """The model that the content of a file describes; path: where it stands, for its robot and for messages."""
     arm = load_arm(file.robot, path.parent)
     robot = file.robot if file.robot in built_in_arms() else str(path.parent / file.robot)
-    places = [f"{path}, components[{index}] ({entry.effect})" for index, entry in enumerate(file.components)]
-    linear = [_is_linear(entry) for entry in file.components]
-    rows = list(zip(file.components, places, linear, strict=True))
-    parts = [_read_component(entry, where, len(arm)) for entry, where, own in rows if own]
-    extras = tuple(_read_extra(entry, where, arm) for entry, where, own in rows if not own)
+    components, coefficients = list[Candidate](), list[Array]()
+    for index, entry in enumerate(file.components):
+        candidate, values = _read_component(entry, f"{path}, components[{index}] ({entry.effect})", arm)
+        components.append(candidate)
+        coefficients.append(values)
     inertial = _read_inertial(file, arm, path)
-    structure = Structure(arm, tuple(part for part, _ in parts))
+    structure = Structure(arm, tuple(components))
     base = _read_base_values(file, structure, inertial, path)
-    structure = Structure(arm, structure.components, structure.full(base))
-    values = np.concatenate([base, *(part.coefficients(named) for part, named in parts)])
     numbers = validate(Numbers, {key: file.provenance[key] for key in NUMBER_KEYS if key in file.provenance}, str(path))
-    file = file.model_copy(update={"components": tuple(entry for entry, _, own in rows if own)})
-    covariance = _read_covariance(file, structure, values, numbers.interval_factor, path)
-    others = {key: value for key, value in file.provenance.items() if key not in NUMBER_KEYS}
     return TorqueModel(
-        robot,
-        structure,
-        values,
-        covariance,
-        numbers.interval_factor,
-        inertial,
-        numbers.cutoff_hz,
-        numbers.position_factor,
-        others,
-        extras,
+        robot=robot,
+        structure=replace(structure, load=structure.full(base)),
+        values=np.concatenate([base, *coefficients]),
+        covariance=_read_covariance(file, structure, path),
+        factor=numbers.interval_factor,
+        inertial=inertial,
+        cutoff_hz=numbers.cutoff_hz,
+        position_factor=numbers.position_factor,
+        provenance={key: value for key, value in file.provenance.items() if key not in NUMBER_KEYS},
+        stated=tuple(_stated_parameters(entry) for entry in file.components),
     )
 
 
-def _is_linear(entry: ComponentEntry) -> bool:
-    """Whether a component has exactly these parameters, or no plug-in could have the effect."""
-    names, forms = set(entry.parameters), FORMS.get(entry.effect, ())
-    if any(names in ({*form.names}, {*form.names, form.held}) for form in forms):
-        return True
-    return bool(forms) and entry.effect not in {each.effect for _, each in registered_effects()}
-
-
-def _read_extra(entry: ComponentEntry, where: str, arm: Arm) -> Extra:
-    told = entry.model_dump(mode="json")
+def _read_component(entry: ComponentEntry, where: str, arm: Arm) -> tuple[Candidate, Array]:
+    joints = entry.joints or (() if entry.joint is None else (entry.joint,))
+    if any(not 1 <= each <= len(arm) for each in joints):
+        raise InputError(f"{where}: joints {list(joints)} should be from 1 to {len(arm)}")
+    parameters = {name: each.value for name, each in entry.parameters.items()}
     try:
-        return extra_from_file(arm, told, {name: each.value for name, each in entry.parameters.items()})
+        return family_named(entry.effect).from_parameters(arm, joints, parameters, entry.form)
     except (ValueError, KeyError) as error:
         raise InputError(f"{where}: {error}") from None
 
 
-def _read_component(entry: ComponentEntry, where: str, joints: int) -> tuple[Component, dict[str, float]]:
-    named = {name: each.value for name, each in entry.parameters.items() if isinstance(each.value, float)}
-    if entry.joint is None or not 1 <= entry.joint <= joints:
-        raise InputError(f"{where}: joint {entry.joint} should be one from 1 to {joints}")
-    forms = FORMS.get(entry.effect, ())
-    fits = [number for number, form in enumerate(forms) if set(form.names) <= set(named)]
-    if not fits:
-        wanted = " or ".join(", ".join(form.names) for form in forms) or "no effect that a model can compute"
-        raise InputError(f"{where}: parameters {', '.join(named) or 'none'} should be {wanted}")
-    held = forms[fits[0]].held
-    driver = entry.joints[1] if len(entry.joints) > 1 else None
-    try:
-        part = Component(entry.effect, entry.joint, driver, named.get(held) if held else None, fits[0])
-    except ValueError as error:
-        raise InputError(f"{where}: {error}") from None
-    return part, named
+def _stated_parameters(entry: ComponentEntry) -> tuple[ParameterValue, ...]:
+    return tuple(
+        ParameterValue(name, each.value, _stated_interval(each), each.unit) for name, each in entry.parameters.items()
+    )
+
+
+def _stated_interval(entry: ParameterEntry) -> Interval | None:
+    if not entry.ci95:
+        return None
+    if isinstance(entry.value, tuple):
+        return tuple((each[0], each[1]) for each in entry.ci95 if isinstance(each, tuple))
+    low, high = (float(np.sum(each)) for each in entry.ci95)
+    return low, high
 
 
 def _read_inertial(file: ModelFile, arm: Arm, path: Path) -> Array | None:
@@ -220,35 +220,27 @@ def _read_base_values(file: ModelFile, structure: Structure, inertial: Array | N
     return np.array(file.base_parameters.values)
 
 
-def _read_covariance(file: ModelFile, structure: Structure, values: Array, factor: float, path: Path) -> Array | None:
-    """Covariance (columns, columns), NaN where the file gives no interval; None where it gives none at all."""
-    count = len(structure.base)
-    blocks = [np.full((count, count), np.nan)]
-    if file.base_parameters is not None and file.base_parameters.covariance is not None:
-        given = file.base_parameters.covariance
-        if len(given) != count or any(len(row) != count for row in given):
-            raise InputError(f"{path}: base_parameters.covariance should be {count} x {count}")
-        blocks = [np.array(given)]
-    for entry, part, place in zip(file.components, structure.components, structure.slices, strict=True):
-        half = np.array([_half_width(entry.parameters[name]) for name in part.names])
-        inverse = np.linalg.pinv(parameter_jacobian(part, values[place]))
-        blocks.append(inverse @ np.diag((half / factor) ** 2) @ inverse.T)
-    known = any(np.isfinite(block).any() for block in blocks)
-    return np.asarray(block_diag(*blocks)) if known else None
+def _read_covariance(file: ModelFile, structure: Structure, path: Path) -> Array | None:
+    """Covariance (columns, columns) of the base parameters, NaN for the components; None where the file has none."""
+    if file.base_parameters is None or file.base_parameters.covariance is None:
+        return None
+    given, count = file.base_parameters.covariance, len(structure.base)
+    if len(given) != count or any(len(row) != count for row in given):
+        raise InputError(f"{path}: base_parameters.covariance should be {count} x {count}")
+    return base_covariance(np.array(given), structure)
 
 
-def _half_width(entry: ParameterEntry) -> float:
-    low, high = entry.ci95 if entry.ci95 and len(entry.ci95) == 2 else (np.nan, np.nan)
-    return (high - low) / 2 if isinstance(low, float) and isinstance(high, float) else np.nan
+def base_covariance(base: Array, structure: Structure) -> Array:
+    """Covariance (columns, columns) with that of the base parameters, and NaN where components are concerned."""
+    out = np.full((structure.size, structure.size), np.nan)
+    out[: len(base), : len(base)] = base
+    return out
 
 
 def arm_of_model(model: TorqueModel) -> Arm:
     """The model's arm with its identified links and rotors; ValueError for a model without physical links."""
     if model.inertial is None:
         raise ValueError("the model has base parameters only: identify it with physically consistent links")
-    rotors = np.zeros(len(model.arm))
-    for part, place in zip(model.structure.components, model.structure.slices, strict=True):
-        if part.effect == "rotor_inertia":
-            rotors[part.joint - 1] += model.values[place][0]
+    rotors = joint_fields(model).get("armature", np.zeros(len(model.arm)))
     arm = model.arm
     return Arm(arm.name, arm.joints, links_of(model.inertial), arm.gravity, tuple(rotors.tolist()))

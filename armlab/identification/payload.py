@@ -15,6 +15,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.effects.drive import RotorInertia, TorqueOffset
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.estimators.least_squares import WeightedLeastSquares, joint_weights
@@ -187,7 +188,7 @@ def _unloaded_regression(structure: Structure, without: Sequence[Signals], loade
 def _nominal_torque(structure: Structure, motion: Motion) -> Array:
     """Torque of the arm's own links, and of its rotors where the structure does not seek them."""
     arm = structure.arm
-    sought = any(part.effect == "rotor_inertia" for part in structure.components)
+    sought = any(isinstance(part, RotorInertia) for part in structure.components)
     rotors = np.zeros(len(arm)) if sought or not arm.rotor_inertia else np.array(arm.rotor_inertia)
     return rigid_body_torque(arm, motion, arm.parameters) + motion.acceleration * rotors
 
@@ -258,10 +259,10 @@ def _identification_runs(recording: Recording) -> tuple[Run, ...]:
 def _payload_structure(arm: Arm, setting: PayloadSetting, nominal: bool) -> Structure:
     """The usual components; rotors that the nominal arm names are not sought beside its links."""
     known = nominal and arm.rotor_inertia
-    usual = tuple(part for part in usual_components(len(arm)) if not (known and part.effect == "rotor_inertia"))
-    spring = counterbalance_groups(setting.counterbalanced)["spring"] if setting.counterbalanced else ()
+    usual = tuple(part for part in usual_components(arm) if not (known and isinstance(part, RotorInertia)))
+    spring = counterbalance_groups(arm, setting.counterbalanced)["spring"] if setting.counterbalanced else ()
     sprung = [part.joint for part in spring]  # the spring's rest angle takes the offset in
-    taken = tuple(part for part in usual if part.effect != "torque_offset" or part.joint not in sprung)
+    taken = tuple(part for part in usual if not isinstance(part, TorqueOffset) or part.joint not in sprung)
     return Structure(arm, (*taken, *spring)).separable()[0]
 
 

@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.effects.drive import RotorInertia
 from armlab.identification.estimators.least_squares import Prior
 from armlab.identification.regression import Regression
 from armlab.identification.structure import Structure
@@ -89,9 +90,9 @@ def nominal_rotors(structure: Structure) -> list[tuple[int, float]]:
     """Column and nominal value of each rotor inertia that the arm names."""
     known = structure.arm.rotor_inertia
     return [
-        (place.start, known[part.joint - 1])
+        (place.start, known[part.rows[0]])
         for part, place in zip(structure.components, structure.slices, strict=True)
-        if part.effect == "rotor_inertia" and known and known[part.joint - 1] > 0
+        if isinstance(part, RotorInertia) and known and known[part.rows[0]] > 0
     ]
 
 
@@ -104,6 +105,6 @@ def shrinkage_prior(structure: Structure, data: Regression, share: float) -> Pri
     drawn = np.zeros(structure.size)
     drawn[: len(structure.base)] = 1.0
     for part, place in zip(structure.components, structure.slices, strict=True):
-        drawn[place] = float(part.effect == "rotor_inertia")
+        drawn[place] = float(isinstance(part, RotorInertia))
     power = np.sum(data.matrix**2, axis=0) / float(np.var(data.torque))
     return Prior(np.zeros(structure.size), np.diag(share * drawn * power))

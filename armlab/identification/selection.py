@@ -8,7 +8,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armlab.identification.components import Component, every_joint, neighbour_couplings
+from armlab.effects.contract import Candidate
+from armlab.effects.drive import RotorInertia, TorqueOffset
+from armlab.effects.friction import (
+    POWER_EXPONENT_RANGE,
+    CoulombFriction,
+    LoadFriction,
+    PowerFriction,
+    Slopes,
+    ViscousFriction,
+)
+from armlab.effects.scene import instants
+from armlab.effects.springs import SineCompensator, SpringCompensator
+from armlab.identification.components import every_joint, wrist_couplings
 from armlab.identification.cross_validation import FoldMoments, fold_moments
 from armlab.identification.estimators.least_squares import Prior, WeightedLeastSquares
 from armlab.identification.priors import Pull
@@ -18,7 +30,7 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 
-Groups = Mapping[str, tuple[Component, ...]]
+Groups = Mapping[str, tuple[Candidate, ...]]
 USUAL_GROUPS = ("viscous", "coulomb", "rotor", "offset")
 EXCLUSIVE_GROUPS = {  # one holds the other's columns, or what a few seconds of motion cannot tell from them
     "direction": "viscous",
@@ -28,30 +40,31 @@ EXCLUSIVE_GROUPS = {  # one holds the other's columns, or what a few seconds of 
 }
 
 
-def candidate_groups(joints: int) -> dict[str, tuple[Component, ...]]:
-    """The groups that may matter on any arm with this number of joints."""
+def candidate_groups(arm: Arm) -> dict[str, tuple[Candidate, ...]]:
+    """The groups that may matter on any arm."""
+
+    def power(exponent: float) -> tuple[Candidate, ...]:
+        return every_joint(arm, PowerFriction, shape=(exponent,), bounds=(POWER_EXPONENT_RANGE,))
+
     groups = {
-        "viscous": every_joint("viscous_friction", joints),
-        "coulomb": every_joint("coulomb_friction", joints),
-        "rotor": every_joint("rotor_inertia", joints),
-        "offset": every_joint("torque_offset", joints),
-        "direction": every_joint("asymmetric_friction", joints, 1.0),
-        "square root": every_joint("nonlinear_viscous_friction", joints, 0.5),
-        "cube root": every_joint("nonlinear_viscous_friction", joints, 1 / 3),
-        "square": every_joint("nonlinear_viscous_friction", joints, 2.0),
-        "load": every_joint("load_dependent_friction", joints),
+        "viscous": every_joint(arm, ViscousFriction),
+        "coulomb": every_joint(arm, CoulombFriction),
+        "rotor": every_joint(arm, RotorInertia),
+        "offset": every_joint(arm, TorqueOffset),
+        "direction": every_joint(arm, Slopes),
+        "square root": power(0.5),
+        "cube root": power(1 / 3),
+        "square": power(2.0),
+        "load": every_joint(arm, LoadFriction),
     }
-    if joints > 1:
-        groups["wrist coupling"] = neighbour_couplings(joints)
+    if len(arm) > 1:
+        groups["wrist coupling"] = wrist_couplings(arm)
     return groups
 
 
-def counterbalance_groups(joint: int) -> dict[str, tuple[Component, ...]]:
+def counterbalance_groups(arm: Arm, joint: int) -> dict[str, tuple[Candidate, ...]]:
     """A counterbalance at a joint that is known to have one: a torsion spring, or a linkage on a crank."""
-    return {
-        "spring": (Component("gravity_compensator", joint),),
-        "crank": (Component("gravity_compensator", joint, form=1),),
-    }
+    return {"spring": (SpringCompensator.at(arm, joint),), "crank": (SineCompensator.at(arm, joint),)}
 
 
 def toggle_group(names: tuple[str, ...], name: str) -> tuple[str, ...]:
@@ -61,7 +74,7 @@ def toggle_group(names: tuple[str, ...], name: str) -> tuple[str, ...]:
     return (*(other for other in names if other != EXCLUSIVE_GROUPS.get(name)), name)
 
 
-def components_of(groups: Groups, names: tuple[str, ...]) -> tuple[Component, ...]:
+def components_of(groups: Groups, names: tuple[str, ...]) -> tuple[Candidate, ...]:
     """The components of the chosen groups, in the groups' order."""
     return tuple(part for name, parts in groups.items() if name in names for part in parts)
 
@@ -188,9 +201,9 @@ def describe_choice(choice: Choice) -> str:
 
 def with_load(structure: Structure, signals: Sequence[Signals]) -> Structure:
     """The structure with inertial parameters that load-dependent friction can follow: those of a first fit."""
-    if not any(part.effect == "load_dependent_friction" for part in structure.components):
+    if not structure.follows_load:
         return structure
-    rest = tuple(part for part in structure.components if part.effect != "load_dependent_friction")
+    rest = tuple(part for part in structure.components if not part.follows_model)
     first = structure.with_components(rest)
     values = WeightedLeastSquares()(regression(first, signals)).values
     return replace(structure, load=first.full(values[: len(first.base)]))
@@ -201,7 +214,7 @@ def unfiltered_regression(structure: Structure, signals: Sequence[Signals], data
     matrices, torques = [], []
     for each in signals:
         rows = each.filter.rows
-        whole = structure.matrix(each.motion).reshape(each.motion.samples, data.joints, -1)
+        whole = structure.matrix(instants(structure.arm, each.motion)).reshape(each.motion.samples, data.joints, -1)
         matrices.append(whole[rows].reshape(-1, structure.size))
         torques.append(each.run.torque[rows].ravel())
     return replace(data, matrix=np.vstack(matrices), torque=np.concatenate(torques))

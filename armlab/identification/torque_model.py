@@ -1,4 +1,4 @@
-"""A structure with values: predicts torque and tells its parameters with intervals; knows no files or pictures."""
+"""A structure with values: predicts torque and states its parameters with intervals; knows no files or pictures."""
 
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -7,37 +7,26 @@ import numpy as np
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
-from armlab.effects.extras import Extra, torque_with_extras
-from armlab.effects.scene import Scene, scene_of
-from armlab.identification.components import Component
+from armlab.effects.model import FittedEffect, torque_of_model
+from armlab.effects.parameters import ParameterValue, parameter_values
+from armlab.effects.scene import Scene, instants, scene_of
 from armlab.identification.regression import signals_of
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
-
-DERIVATIVE_STEP = 1e-6  # of a coefficient: for the derivatives of named parameters
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """A named parameter with its 95 % interval; None where the model gives none."""
-
-    name: str
-    value: float
-    interval: tuple[float, float] | None
-    unit: str
+from problem.regressor import rigid_body_torque
 
 
 @dataclass(frozen=True, eq=False)
 class TorqueModel:
     """A structure with values.
 
-    robot: as recordings name it. values: (columns,), covariance: (columns, columns) or None. factor: from a
-    standard error to half an interval. inertial: (10 * joints,) of physically consistent links, or None.
-    cutoff_hz, position_factor: of the filters that it was identified with, see `signals_of`. extras: effects that
-    plug-ins compute.
+    robot: as recordings name it. values: (columns,), covariance: (columns, columns) or None; NaN where nothing is
+    known. factor: from a standard error to half an interval. inertial: (10 * joints,) of physically consistent links,
+    or None. cutoff_hz, position_factor: of the filters that it was identified with, see `signals_of`.
+    stated: the parameters of each component as a file states them; empty for a model that was fitted.
     """
 
     robot: str
@@ -49,7 +38,7 @@ class TorqueModel:
     cutoff_hz: float | None = None
     position_factor: float = 1.0
     provenance: dict[str, Any] = field(default_factory=dict)
-    extras: tuple[Extra, ...] = ()
+    stated: tuple[tuple[ParameterValue, ...], ...] = ()
 
     @property
     def arm(self) -> Arm:
@@ -61,32 +50,38 @@ class TorqueModel:
         """Base parameters, (base,)."""
         return self.values[: len(self.structure.base)]
 
+    @property
+    def effects(self) -> tuple[FittedEffect, ...]:
+        """The components with their coefficients."""
+        pairs = zip(self.structure.components, self.structure.slices, strict=True)
+        return tuple(FittedEffect(part, self.values[place]) for part, place in pairs)
+
+    @property
+    def links(self) -> Array:
+        """Inertial parameters (10 * joints,): of the links, or the base parameters and zeros elsewhere."""
+        return self.inertial if self.inertial is not None else self.structure.full(self.base_values)
+
     def torque(self, motion: Motion, run: Run | None = None) -> Array:
         """Torque of a motion, (samples, joints), N m (N).
 
-        run: where the motion comes from, sample by sample, for extras: ValueError where they lack it.
+        run: where the motion comes from, sample by sample. Without it the samples count as single instants; ValueError
+        where an effect depends on their order in time.
         """
-        return self.torque_in(self._scene(motion, run)) if self.extras else self._linear(motion)
+        if run is not None:
+            return self.torque_in(scene_of(run, motion, self.arm))
+        in_time = [part.label for part in self.structure.components if part.of_time]
+        if in_time:
+            raise ValueError(f"torque of {', '.join(in_time)} needs the run of the motion, for its times")
+        return self.torque_in(instants(self.arm, motion))
 
     def torque_in(self, scene: Scene) -> Array:
         """Torque of the motion of a scene, (samples, joints), N m (N); the scene's links and torque do not matter."""
-        inertial = self.inertial if self.inertial is not None else self.structure.full(self.base_values)
-        return torque_with_extras(self.extras, replace(scene, inertial=inertial, torque=self._linear(scene.motion)))
-
-    def _linear(self, motion: Motion) -> Array:
-        return (self.structure.matrix(motion) @ self.values).reshape(motion.samples, -1)
+        rigid = rigid_body_torque(self.arm, scene.motion, self.links)
+        return torque_of_model(self.effects, replace(scene, inertial=self.links, torque=rigid))
 
     def filtered_torque(self, signals: Signals) -> Array:
         """Torque that passed the filter of the recorded one, (kept, joints)."""
-        if self.extras:
-            return np.asarray(signals.filter(self.torque(signals.motion, signals.run)))
-        return (self.structure.filtered(signals) @ self.values).reshape(-1, len(self.arm))
-
-    def _scene(self, motion: Motion, run: Run | None) -> Scene:
-        if run is None:
-            effects = ", ".join(each.told["effect"] for each in self.extras)
-            raise ValueError(f"torque of {effects} needs the run of the motion, for its times")
-        return scene_of(run, motion, self.arm)
+        return np.asarray(signals.filter(self.torque(signals.motion, signals.run)))
 
     def signals(self, run: Run) -> Signals:
         """A run that passed the filters of the identification."""
@@ -98,61 +93,54 @@ class TorqueModel:
         return self.torque(signals.motion, signals.run)
 
     @property
-    def base_parameters(self) -> tuple[Parameter, ...]:
+    def base_parameters(self) -> tuple[ParameterValue, ...]:
         """The base parameters as sums."""
         base = self.structure.base
-        half = self._half_widths(slice(0, len(base)))
-        rows = zip(base.sums, self.base_values, half, self.structure.base_units, strict=True)
-        return tuple(
-            Parameter(name, float(value), _interval_around(value, width), unit) for name, value, width, unit in rows
-        )
+        half = np.full(len(base), np.nan)
+        if self.covariance is not None:
+            half = self.factor * np.sqrt(np.maximum(np.diag(self.covariance)[: len(base)], 0))
+        rows = zip(base.sums, self.base_values.tolist(), half.tolist(), self.structure.base_units, strict=True)
+        return tuple(ParameterValue(name, value, _around(value, width), unit) for name, value, width, unit in rows)
 
-    def component_parameters(self, index: int) -> tuple[Parameter, ...]:
-        """Named parameters of one component, those that are held included."""
+    def component_parameters(self, index: int) -> tuple[ParameterValue, ...]:
+        """Named parameters of one component, those that are held included, which have no interval."""
+        if self.stated:
+            return self.stated[index]
         part, place = self.structure.components[index], self.structure.slices[index]
-        values = part.parameters(self.values[place])
-        half = self._half_widths(place, parameter_jacobian(part, self.values[place]))
-        found = [
-            Parameter(name, float(value), _interval_around(value, width), part.unit(name, self.arm))
-            for name, value, width in zip(part.names, values, half, strict=True)
-        ]
-        if part.shape.held:
-            found.append(Parameter(part.shape.held, part.held_value, None, part.unit(part.shape.held, self.arm)))
-        return tuple(found)
-
-    def _half_widths(self, place: slice, derivatives: Array | None = None) -> Array:
-        """Half widths of the intervals, NaN without covariance."""
-        if self.covariance is None:
-            return np.full(place.stop - place.start, np.nan)
-        block = self.covariance[place, place]
-        if derivatives is not None:
-            block = derivatives @ block @ derivatives.T
-        return np.asarray(self.factor * np.sqrt(np.maximum(np.diag(block), 0)))
+        covariance = None if self.covariance is None else self.covariance[place, place]
+        found = parameter_values(part, self.values[place], covariance, self.factor)
+        return tuple(replace(each, interval=None) if _is_held(each) else each for each in found)
 
     def __str__(self) -> str:
         """A table of all parameters."""
         rows = [("base parameters", each) for each in self.base_parameters]
         for index, part in enumerate(self.structure.components):
             rows += [(part.label, each) for each in self.component_parameters(index)]
-        return "\n".join(
-            [*(f"{what}: {_parameter_line(each)}" for what, each in rows), *(str(each) for each in self.extras)]
-        )
+        return "\n".join(f"{what}: {_parameter_line(each)}" for what, each in rows)
 
 
-def _interval_around(value: float, half: float) -> tuple[float, float] | None:
-    return None if np.isnan(half) else (float(value - half), float(value + half))
+def joint_fields(model: TorqueModel) -> dict[str, Array]:
+    """What a simulator's joints hold of a model, (joints,) for each field: see `Candidate.joint_fields`."""
+    out: dict[str, Array] = {}
+    for effect in model.effects:
+        for name, value in effect.candidate.joint_fields(effect.coefficients).items():
+            out.setdefault(name, np.zeros(len(model.arm)))[effect.candidate.rows[0]] += value
+    return out
 
 
-def parameter_jacobian(part: Component, coefficients: Array) -> Array:
-    """Derivatives of the named parameters by the coefficients, by central differences."""
-    steps = DERIVATIVE_STEP * np.maximum(np.abs(coefficients), 1e-3)
-    columns = [
-        (part.parameters(coefficients + step) - part.parameters(coefficients - step)) / (2 * step.sum())
-        for step in np.diag(steps)
-    ]
-    return np.column_stack(columns)
+def _around(value: float, half: float) -> tuple[float, float] | None:
+    return None if np.isnan(half) else (value - half, value + half)
 
 
-def _parameter_line(parameter: Parameter) -> str:
-    spread = "" if parameter.interval is None else f" [{parameter.interval[0]:.4g}, {parameter.interval[1]:.4g}]"
-    return f"{parameter.name} = {parameter.value:.4g}{spread} {parameter.unit}"
+def _is_held(parameter: ParameterValue) -> bool:
+    """Whether no fitted coefficient changes a parameter."""
+    return parameter.interval is not None and parameter.interval[0] == parameter.interval[-1]
+
+
+def _parameter_line(parameter: ParameterValue) -> str:
+    values = parameter.value if isinstance(parameter.value, tuple) else (parameter.value,)
+    numbers = ", ".join(f"{value:.4g}" for value in values)
+    spread = ""
+    if parameter.interval is not None and not isinstance(parameter.value, tuple):
+        spread = f" [{parameter.interval[0]:.4g}, {parameter.interval[1]:.4g}]"
+    return f"{parameter.name} = {numbers}{spread} {parameter.unit}"

@@ -18,7 +18,7 @@ def test_nothing_is_missing_of_the_model_that_a_diagnosis_found(tmp_path: Path, 
     folder = recording_in(tmp_path / "first", *runs)
     list(diagnose_recording(folder, tmp_path / "out", None, 0))
     _with_upright_base(tmp_path / "out" / "model.yaml")
-    assert read_model(tmp_path / "out" / "model.yaml").extras
+    assert read_model(tmp_path / "out" / "model.yaml").effects[-1].candidate.effect == "base_tilt"
     content = yaml.safe_load((folder / "recording.yaml").read_text())
     (folder / "recording.yaml").write_text(yaml.safe_dump(content | {"simulation": "../out/model.yaml"}))
     again = diagnose(load_recording(folder))

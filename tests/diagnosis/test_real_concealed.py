@@ -22,6 +22,7 @@ from armlab.diagnosis.real_concealed.examine import open_outcomes
 from armlab.diagnosis.real_concealed.plan import INJECTED, WITHHELD, Case, Disturbance, Piece, cases_of
 from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_cases, study_recording
+from armlab.effects.friction import CoulombFriction, ViscousFriction
 from armlab.identification.components import every_joint
 from armlab.identification.identifier import Identifier
 from armlab.identification.real.looks import Looks
@@ -42,7 +43,7 @@ CASES = (
 def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
     folder = recording_in(tmp_path_factory.mktemp("recordings") / "told", frame(0), frame(1))
     recording = load_recording(folder)
-    friction = (*every_joint("coulomb_friction", 3), *every_joint("viscous_friction", 3))
+    friction = (*every_joint(recording.arm, CoulombFriction), *every_joint(recording.arm, ViscousFriction))
     found = Identifier(recording.arm, friction, "physical", cutoff_hz=20.0).fit(recording.with_role("identify"))
     return Reference(recording, found.model_, "as told")
 

@@ -10,11 +10,10 @@ from told_recordings import TORQUE, frame, motion_at, recording_in
 
 from armlab.common.errors import InputError
 from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.simulator_export import export_model
 from armlab.diagnosis.verdict_files import write_verdict
+from armlab.identification.export import export_model
 from armlab.identification.model_file import read_model
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Run
 from problem.motion import Motion
 from problem.robot_file import load_arm
 
@@ -44,9 +43,8 @@ def states(count: int = 20) -> Motion:
 
 
 def torque(path: Path, motion: Motion) -> np.ndarray:
-    """Of a model file, as `predict` computes it."""
-    run = Run("run.csv", "identify", np.arange(motion.samples) * 0.01, motion.position, np.zeros(motion.position.shape))
-    return read_model(path).torque(motion, run)
+    """Of a model file at single instants."""
+    return read_model(path).torque(motion)
 
 
 def mujoco_torque(path: Path, motion: Motion) -> np.ndarray:
@@ -91,7 +89,7 @@ def test_effects_without_a_place_in_the_simulator_are_named_in_one_line(tmp_path
     stribeck = component("stribeck_friction", 1, level=2.0, static_level=3.0, velocity=0.1, exponent=2.0)
     path = model_with(tmp_path, stribeck, component("time_delay", None, seconds=0.004))
     lines = list(export_model(path, tmp_path / "arm.xml"))
-    assert lines[1] == "not in the file: stribeck_friction, joint 1; time_delay"
+    assert lines[1] == "not in the file: stribeck_friction (0.1, 2), joint 1; time_delay (0.004)"
 
 
 def test_a_model_read_again_adds_each_effect_once(tmp_path: Path) -> None:
@@ -104,7 +102,7 @@ def test_a_model_read_again_adds_each_effect_once(tmp_path: Path) -> None:
 
 def test_an_effect_that_nobody_knows_is_refused_in_one_line(tmp_path: Path) -> None:
     path = model_with(tmp_path, component("phlogiston", 1, level=2.0))
-    with pytest.raises(InputError, match=r"components\[0\] \(phlogiston\): no effect that a model can compute"):
+    with pytest.raises(InputError, match=r"components\[0\] \(phlogiston\): unknown effect"):
         list(export_model(path, tmp_path / "arm.xml"))
 
 

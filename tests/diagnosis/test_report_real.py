@@ -8,7 +8,7 @@ import pytest
 from told_recordings import frame, recording_in
 
 from armlab.diagnosis.real_arms import diagnose_public_recordings, mass_agreement, study_recording
-from armlab.diagnosis.result import Parameter
+from armlab.effects.parameters import ParameterValue
 from armlab.identification.real.looks import Looks
 
 
@@ -55,8 +55,8 @@ def test_recordings_that_were_not_asked_for_are_left_alone(recordings: Path, tmp
 
 
 def test_masses_agree_where_their_intervals_allow_one_mass() -> None:
-    def mass(value: float, half: float) -> Parameter:
-        return Parameter("mass", value, (value - half, value + half), "kg")
+    def mass(value: float, half: float) -> ParameterValue:
+        return ParameterValue("mass", value, (value - half, value + half), "kg")
 
     assert "they agree" in mass_agreement([mass(150.0, 10.0), mass(155.0, 10.0), mass(149.0, 8.0)])
     assert "they do not agree" in mass_agreement([mass(100.0, 10.0), mass(180.0, 10.0)])

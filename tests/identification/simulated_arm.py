@@ -3,7 +3,8 @@
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.identification.components import Component, usual_components
+from armlab.effects.contract import Candidate, Scene
+from armlab.identification.components import usual_components
 from armlab.identification.structure import Structure
 from armlab.recordings.recording import Role, Run
 from problem.arm import Arm
@@ -17,14 +18,14 @@ def arm() -> Arm:
     return load_arm("irb120-arm")
 
 
-def structure(components: tuple[Component, ...] | None = None) -> Structure:
-    return Structure(arm(), usual_components(3) if components is None else components).separable()[0]
+def structure(components: tuple[Candidate, ...] | None = None) -> Structure:
+    return Structure(arm(), usual_components(arm()) if components is None else components).separable()[0]
 
 
 def truth(model: Structure) -> Array:
     """Base parameters of the arm's links and plausible friction."""
     sizes = {"viscous_friction": 1.5, "coulomb_friction": 2.0, "rotor_inertia": 0.05, "torque_offset": 0.4}
-    own = [np.full(len(part.names), sizes.get(part.effect, 0.3)) for part in model.components]
+    own = [np.full(part.size, sizes.get(part.effect, 0.3)) for part in model.components]
     return np.concatenate([model.base.values(model.arm.parameters), *own])
 
 
@@ -41,11 +42,16 @@ def motion(seed: int, seconds: float = 10.0, rate_hz: float = RATE_HZ) -> tuple[
     return time, Motion(position, velocity, acceleration)
 
 
+def scene(time: Array, moved: Motion) -> Scene:
+    """A run with these times and motion."""
+    return Scene("run.csv", np.zeros(len(time)), moved, arm(), np.zeros(30), np.zeros(moved.position.shape))
+
+
 def run(
     model: Structure, values: Array, seed: int = 0, noise: float = 0.0, role: Role = "identify", seconds: float = 10.0
 ) -> Run:
     """A recorded run with white torque noise, N m."""
     time, moved = motion(seed, seconds)
-    torque = (model.matrix(moved) @ values).reshape(-1, len(model.arm))
+    torque = (model.matrix(scene(time, moved)) @ values).reshape(-1, len(model.arm))
     torque = torque + noise * np.random.default_rng(seed + 1000).standard_normal(torque.shape)
     return Run(f"run-{seed}.csv", role, time, moved.position, torque)

@@ -9,7 +9,13 @@ from numpy.testing import assert_allclose
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.identification.components import usual_components
-from armlab.identification.export import export_model, mjcf_document, srdf_document, urdf_document
+from armlab.identification.export import (
+    build_simulator_model,
+    export_model,
+    mjcf_document,
+    srdf_document,
+    urdf_document,
+)
 from armlab.identification.model import Model
 from armlab.identification.structure import Structure
 from problem.motion import Motion
@@ -22,7 +28,7 @@ SMOOTH = ("viscous_friction", "rotor_inertia")
 
 def model_of(name: str, effects: tuple[str, ...] = SMOOTH) -> Model:
     arm = load_arm(name)
-    chosen = tuple(part for part in usual_components(len(arm)) if part.effect in effects)
+    chosen = tuple(part for part in usual_components(arm) if part.effect in effects)
     structure = Structure(arm, chosen)
     own = np.random.default_rng(3).uniform(0.1, 1.0, len(chosen))
     inertial = parameters_of(regular_nominal(arm))
@@ -50,14 +56,14 @@ def mujoco_torque(document: str, motion: Motion) -> Array:
 def test_mujoco_reproduces_rigid_armature_and_viscous_torque_of_the_mjcf(name: str) -> None:
     model = model_of(name)
     motion = states(len(model.arm))
-    assert_allclose(mujoco_torque(mjcf_document(model), motion), model.torque(motion), atol=1e-9)
+    assert_allclose(mujoco_torque(mjcf_document(build_simulator_model(model)), motion), model.torque(motion), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ARMS)
 def test_mujoco_reproduces_rigid_and_viscous_torque_of_the_urdf(name: str) -> None:
     model = model_of(name, ("viscous_friction",))
     motion = states(len(model.arm))
-    assert_allclose(mujoco_torque(urdf_document(model), motion), model.torque(motion), atol=1e-9)
+    assert_allclose(mujoco_torque(urdf_document(build_simulator_model(model)), motion), model.torque(motion), atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ARMS)
@@ -67,8 +73,14 @@ def test_pinocchio_reproduces_the_exported_torque(name: str, form: str, tmp_path
     model = model_of(name)
     motion = states(len(model.arm))
     path = tmp_path / ("arm.xml" if form == "mjcf" else "arm.srdf")
-    path.write_text(mjcf_document(model) if form == "mjcf" else srdf_document(model))
-    read = pin.buildModelFromMJCF(str(path)) if form == "mjcf" else pin.buildModelFromXML(urdf_document(model))
+    path.write_text(
+        mjcf_document(build_simulator_model(model)) if form == "mjcf" else srdf_document(build_simulator_model(model))
+    )
+    read = (
+        pin.buildModelFromMJCF(str(path))
+        if form == "mjcf"
+        else pin.buildModelFromXML(urdf_document(build_simulator_model(model)))
+    )
     if form == "urdf":
         pin.loadRotorParameters(read, str(path), False)
     read.gravity.linear[:] = model.arm.gravity
@@ -96,7 +108,7 @@ def test_gravity_along_any_direction_survives_the_urdf() -> None:
     inertial = np.concatenate([[10, 1, 2, 0.5, 2.0, 2.0, 2.0, 0, 0, 0] for _ in range(6)]).astype(float)
     model = Model("kuka-kr300", structure, structure.base.values(inertial), inertial=inertial)
     motion = states(6)
-    assert_allclose(mujoco_torque(urdf_document(model), motion), model.torque(motion), atol=1e-7)
+    assert_allclose(mujoco_torque(urdf_document(build_simulator_model(model)), motion), model.torque(motion), atol=1e-7)
 
 
 def test_a_model_without_links_cannot_be_exported(tmp_path: Path) -> None:

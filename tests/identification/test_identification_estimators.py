@@ -6,6 +6,8 @@ from numpy.testing import assert_allclose
 from simulated_arm import arm, run, structure, truth
 
 from armlab.common.arrays import Array
+from armlab.effects.friction import ViscousFriction
+from armlab.effects.scene import instants
 from armlab.identification.components import every_joint
 from armlab.identification.estimators.least_squares import (
     BayesianLeastSquares,
@@ -92,7 +94,7 @@ def test_methods_for_noisy_columns_have_less_bias_than_least_squares(method: str
 
 
 def _torque(noisy: Run) -> Array:
-    return (MODEL.matrix(signals_of(noisy).motion) @ TRUTH).reshape(-1, 3)
+    return (MODEL.matrix(instants(arm(), signals_of(noisy).motion)) @ TRUTH).reshape(-1, 3)
 
 
 def test_physical_estimates_are_bodies_that_can_exist_and_friction_that_brakes() -> None:
@@ -115,7 +117,7 @@ def braking(model: Model, of: Run) -> Array:
     friction = np.zeros_like(speeds)
     for part, place in zip(model.structure.components, model.structure.slices, strict=True):
         if part.effect in ("viscous_friction", "coulomb_friction"):
-            friction[:, part.joint - 1] += part.columns(motion) @ model.values[place]
+            friction[:, part.joint - 1] += part.columns(instants(arm(), motion))[:, 0] @ model.values[place]
     return np.asarray(friction * np.sign(speeds))
 
 
@@ -129,7 +131,7 @@ def test_a_tight_nominal_prior_gives_back_the_nominal_links() -> None:
 
 
 def test_a_payload_of_any_mass_costs_the_prior_nothing() -> None:
-    model = structure(every_joint("viscous_friction", 3))
+    model = structure(every_joint(arm(), ViscousFriction))
     prior = nominal_prior(model, 0.1, (0.0, 0.0, 0.1))
     load = np.zeros(model.size)
     load[: len(model.base)] = model.base.values(point_mass(3, (0.0, 0.0, 0.1)))
@@ -149,7 +151,7 @@ def test_positions_with_a_higher_cut_off_leave_the_columns_what_the_torque_has()
 
 def test_the_smoothing_of_positions_is_chosen_by_what_predicts_held_out_blocks() -> None:
     clean = run(MODEL, TRUTH)
-    choice = select_structure(arm(), [clean], candidate_groups(3), (Pull(),), cutoffs=(0.2,)).choice
+    choice = select_structure(arm(), [clean], candidate_groups(arm()), (Pull(),), cutoffs=(0.2,)).choice
     assert choice.position_factor == 2.0
 
 

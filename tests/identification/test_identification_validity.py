@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from simulated_arm import arm, motion, run, structure, truth
 
 from armlab.common.arrays import Array
+from armlab.effects.friction import ViscousFriction
 from armlab.identification.components import every_joint
 from armlab.identification.covariance import uncertainty
 from armlab.identification.coverage import Noise, three_joint_experiment
@@ -81,7 +82,7 @@ def test_moments_fit_like_the_rows_themselves() -> None:
 
 
 def test_selection_finds_the_square_root_that_is_there_and_leaves_out_what_is_not() -> None:
-    groups = candidate_groups(3)
+    groups = candidate_groups(arm())
     model = Structure(arm(), components_of(groups, ("coulomb", "square root", "viscous"))).separable()[0]
     values = truth(model)
     values[model.slices[6].start :] = 6.0  # the square roots
@@ -111,7 +112,7 @@ LOAD = np.array([2.0, 0.1, -0.06, 0.3, 0.08, 0.07, 0.03, 0.002, -0.01, 0.006])
 
 def six_joint_run(load: Array, seed: int, gains: Array) -> tuple[Structure, Signals]:
     six = load_arm("irb120")
-    model = Structure(six, every_joint("viscous_friction", 6))
+    model = Structure(six, every_joint(six, ViscousFriction))
     halves = [motion(seed + part, 20.0)[1] for part in (0, 100)]
     time = motion(seed, 20.0)[0]
     position = np.hstack([half.position for half in halves])

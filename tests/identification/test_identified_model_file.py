@@ -10,19 +10,23 @@ from numpy.testing import assert_allclose
 from simulated_arm import arm, motion, run, structure, truth
 
 from armlab.common.errors import InputError
-from armlab.identification.components import Component, every_joint, neighbour_couplings
+from armlab.effects.drive import RotorInertia
+from armlab.effects.friction import Levels, LoadFriction, PowerFriction, ViscousFriction
+from armlab.effects.scene import instants
+from armlab.effects.springs import SpringCompensator, TorqueRipple
+from armlab.identification.components import every_joint, wrist_couplings
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 
 PARTS = (
-    *every_joint("viscous_friction", 3),
-    *every_joint("asymmetric_friction", 3, 0.0),
-    *every_joint("nonlinear_viscous_friction", 3, 0.5),
-    *neighbour_couplings(3),
-    Component("rotor_inertia", 3),
-    Component("gravity_compensator", 2),
-    Component("torque_ripple", 1, held=7.0),
-    Component("load_dependent_friction", 2),
+    *every_joint(arm(), ViscousFriction),
+    *every_joint(arm(), Levels),
+    *every_joint(arm(), PowerFriction, shape=(0.5,)),
+    *wrist_couplings(arm()),
+    RotorInertia.at(arm(), 3),
+    SpringCompensator.at(arm(), 2),
+    TorqueRipple.at(arm(), 1, shape=(7.0,)),
+    LoadFriction.at(arm(), 2),
 )
 
 
@@ -102,8 +106,11 @@ def test_a_coupling_names_where_the_torque_is_and_where_the_motion_is(tmp_path: 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"joint": 7}, "joint 7 should be one from 1 to 3"),
-        ({"parameters": {"level": {"value": 1.0, "ci95": None, "unit": "N.m"}}}, "coefficient, not level"),
+        ({"joint": 7, "joints": [7]}, r"joints \[7\] should be from 1 to 3"),
+        (
+            {"parameters": {"level": {"value": 1.0, "ci95": None, "unit": "N.m"}}},
+            "viscous_friction has parameters coefficient, not level",
+        ),
         ({"effect": "stribeck_friction"}, "stribeck_friction has parameters level, static_level, velocity, exponent"),
     ],
 )
@@ -133,7 +140,7 @@ def test_links_alone_are_enough_for_a_model(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(content))
     moved = motion(3)[1]
     loaded = Model.load(path)
-    expected = structure(()).matrix(moved) @ loaded.structure.base.values(arm().parameters)
+    expected = structure(()).matrix(instants(arm(), moved)) @ loaded.structure.base.values(arm().parameters)
     assert_allclose(loaded.torque(moved).ravel(), expected)
 
 

@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 from public_copies import needs_copies
 
-from armlab.identification.components import neighbour_couplings, usual_components
+from armlab.identification.components import usual_components, wrist_couplings
 from armlab.identification.model import Model
 from armlab.identification.real.published import Comparison, sum_weights
 from armlab.identification.real.report import LOOKS_FILE, identify_public
@@ -18,7 +18,7 @@ from problem.robot_file import load_arm
 
 def tx40() -> Model:
     arm = load_arm("staubli-tx40")
-    structure = Structure(arm, usual_components(6) + neighbour_couplings(6)).separable()[0]
+    structure = Structure(arm, usual_components(arm) + wrist_couplings(arm)).separable()[0]
     own = np.arange(1.0, structure.size - len(structure.base) + 1)
     return Model("staubli-tx40", structure, np.concatenate([structure.base.values(arm.parameters), own]))
 

@@ -9,11 +9,12 @@ from typing import Literal
 import numpy as np
 
 from armlab.common.errors import InputError
-from armlab.diagnosis.compare.structure import Change, changes_between, predict_torque
+from armlab.diagnosis.compare.structure import Change, changes_between
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Guards, Settings
-from armlab.effects.contract import Scene
+from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
@@ -95,18 +96,6 @@ def _arm_with_found_links(old: Diagnosis) -> Arm:
 def _run_with_prediction(run: Run, old: Diagnosis) -> Run:
     signals = differentiate(run)
     time = signals.run.time
-    assert old.inertial is not None
-    zero = np.zeros(signals.motion.position.shape)
-    scene = Scene(
-        run.name,
-        time - time[0],
-        signals.motion,
-        old.simulation.arm,
-        old.inertial,
-        zero,
-        signals.run.temperature,
-        signals.run.link_position,
-    )
-    torque = predict_torque(old, scene)
+    torque = model_found(old).torque_in(scene_of(signals.run, signals.motion, old.simulation.arm))
     columns = [np.interp(run.time, time, torque[:, joint]) for joint in range(torque.shape[1])]
     return replace(run, simulated_torque=np.column_stack(columns))

@@ -12,15 +12,14 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.diagnosis.columns import base_columns
 from armlab.diagnosis.data import rows_in
-from armlab.diagnosis.intervals import parameter_half_widths
+from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Diagnosis
 from armlab.effects.contract import Candidate, Scene
-from armlab.effects.extras import Extra, torque_with_extras
+from armlab.effects.parameters import half_widths, parameter_slopes
 from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals
 from problem.arm import PARAMETER_UNITS, Arm
 from problem.base_parameters import BaseParameters, base_parameters
-from problem.regressor import rigid_body_torque
 
 BLOCK_S = 1.0  # s: errors this far apart count as independent
 MIN_VISIBLE_SHARE = 0.05  # of a column's length outside the span of the base parameters: less is theirs
@@ -60,32 +59,15 @@ def _contains(one: Candidate, other: Candidate) -> bool:
     return one.joints == other.joints and other.effect in one.replaces
 
 
-def predict_torque(diagnosis: Diagnosis, scene: Scene) -> Array:
-    """Torque of the model found, (samples, joints): links as fitted, the simulation's own terms, every named effect."""
-    simulation = diagnosis.simulation
-    inertial = diagnosis.inertial if diagnosis.inertial is not None else np.zeros(10 * len(scene.arm))
-    nominal = simulation.inertial if simulation.inertial is not None else np.zeros(len(inertial))
-    rigid = simulation.torque(scene) + rigid_body_torque(scene.arm, scene.motion, inertial - nominal)
-    return torque_with_extras(_model_extras(diagnosis), replace(scene, inertial=inertial, torque=rigid))
-
-
-def _model_extras(diagnosis: Diagnosis) -> list[Extra]:
-    return [
-        Extra({"effect": claim.effect}, claim.candidate, claim.coefficients)
-        for claim in diagnosis.claims
-        if claim.candidate is not None and claim.coefficients is not None and not claim.in_links
-    ]
-
-
 def scenes_of(diagnosis: Diagnosis) -> list[Scene]:
     """The runs with the model found."""
     observed, arm = diagnosis.observed, diagnosis.simulation.arm
     assert observed is not None
     assert diagnosis.inertial is not None
-    out = []
+    model, out = model_found(diagnosis), []
     for signals in observed.signals:
         bare = replace(scene_of(signals.run, signals.motion, arm), inertial=diagnosis.inertial)
-        out.append(replace(bare, torque=predict_torque(diagnosis, bare)))
+        out.append(replace(bare, torque=model.torque_in(bare)))
     return out
 
 
@@ -209,26 +191,22 @@ def _effect_changes(candidates: tuple[Candidate, ...], old: StructureFit, new: S
     rows = []
     degrees = _degrees_of_freedom(old, new)
     for candidate, place in zip(candidates, old.places, strict=True):
-        sides = [
-            parameter_half_widths(candidate, fit.values[place], fit.covariance[place, place], 1.0) for fit in (old, new)
-        ]
-        for (name, one, spread), (_, other, more) in zip(*sides, strict=True):
+        before, after = (candidate.parameters(fit.values[place]) for fit in (old, new))
+        spreads = [_standard_errors(candidate, fit, place) for fit in (old, new)]
+        for name, one in before.items():
+            other = after[name]
             if isinstance(one, float) and isinstance(other, float):
-                error = float(np.hypot(float(np.asarray(spread)), float(np.asarray(more))))
-                rows.append(
-                    _build_change(
-                        candidate.effect,
-                        candidate.joint,
-                        candidate.joints,
-                        name,
-                        one,
-                        other,
-                        error,
-                        candidate.unit(name),
-                        degrees,
-                    )
-                )
+                error = float(np.hypot(spreads[0][name], spreads[1][name]))
+                where = candidate.effect, candidate.joint, candidate.joints
+                rows.append(_build_change(*where, name, one, other, error, candidate.unit(name), degrees))
     return rows
+
+
+def _standard_errors(candidate: Candidate, fit: StructureFit, place: slice) -> dict[str, float]:
+    """Standard error of the first component of each parameter."""
+    values = fit.values[place]
+    slopes = parameter_slopes(candidate, values, len(values))
+    return {name: float(half_widths(each, fit.covariance[place, place], 1.0)[0]) for name, each in slopes.items()}
 
 
 def _base_changes(old: Diagnosis, base: BaseParameters, first: StructureFit, second: StructureFit) -> list[Change]:

@@ -9,7 +9,8 @@ from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.real_concealed.plan import Disturbance, Piece, PieceKind
-from armlab.identification.components import Component
+from armlab.effects.contract import Candidate
+from armlab.effects.parameters import ParameterValue
 from armlab.identification.identifier import Identifier
 from armlab.identification.real.study import Recipe
 from armlab.identification.selection import Groups, components_of, describe_choice, select_structure
@@ -100,7 +101,8 @@ def withhold_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> TorqueMode
     kept = np.concatenate([np.arange(base), *(np.arange(places[each].start, places[each].stop) for each in stay)])
     covariance = None if model.covariance is None else model.covariance[np.ix_(kept, kept)]
     structure = model.structure.with_components(tuple(parts[each] for each in stay))
-    less = replace(model, structure=structure, values=model.values[kept], covariance=covariance)
+    stated = tuple(model.stated[each] for each in stay) if model.stated else ()
+    less = replace(model, structure=structure, values=model.values[kept], covariance=covariance, stated=stated)
     return _without_load(less) if any(piece.kind == "payload" for piece in pieces) else less
 
 
@@ -126,9 +128,16 @@ def _sought_laws(model: TorqueModel, piece: Piece) -> tuple[SoughtEffect, ...]:
     parts = model.structure.components
     found: dict[tuple[int, ...], dict[str, dict[str, KnownNumber]]] = {}
     for index in _part_indices(model, piece):
-        told = {each.name: (each.value, each.interval) for each in model.component_parameters(index)}
+        told = dict(_known_number(each) for each in model.component_parameters(index))
         found.setdefault(parts[index].joints, {})[parts[index].effect] = told
     return tuple(_build_sought(_piece_label(piece, joints), joints, told) for joints, told in found.items())
+
+
+def _known_number(parameter: ParameterValue) -> tuple[str, KnownNumber]:
+    """Name, value and interval of a parameter that is one number, as those of all components here are."""
+    interval = parameter.interval
+    pair = None if interval is None else (float(np.sum(interval[0])), float(np.sum(interval[1])))
+    return parameter.name, (float(np.sum(parameter.value)), pair)
 
 
 def _build_sought(label: str, joints: tuple[int, ...], told: dict[str, dict[str, KnownNumber]]) -> SoughtEffect:
@@ -161,7 +170,7 @@ def _model_links(model: TorqueModel) -> Array:
 
 
 def _part_indices(model: TorqueModel, piece: Piece) -> list[int]:
-    def lost(part: Component) -> bool:
+    def lost(part: Candidate) -> bool:
         return part.effect in LAWS_BY_KIND[piece.kind] and piece.joint in (None, part.joint)
 
     return [index for index, part in enumerate(model.structure.components) if lost(part)]

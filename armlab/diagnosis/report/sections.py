@@ -20,8 +20,8 @@ from armlab.diagnosis.report.words import (
     verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.diagnosis.simulator_export import effects_without_place
 from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.identification.export import has_place_in_simulator
 
 
 def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> str:
@@ -251,11 +251,15 @@ def next_steps_section(diagnosis: Diagnosis) -> str:
 def _export_text(diagnosis: Diagnosis) -> str:
     if diagnosis.simulation.inertial is None:
         return "It has base parameters, which simulators do not take: they need nominal `links` to start from."
-    missing = effects_without_place(
-        (claim.effect, frozenset(p.name for p in claim.parameters)) for claim in diagnosis.claims
-    )
+    missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""
     return f"Where a simulator needs it: `armlab export-model model.yaml model.xml` writes MJCF.{lost}"
+
+
+def _has_place_in_simulator(claim: Claim) -> bool:
+    if claim.candidate is None or claim.coefficients is None:
+        return False
+    return claim.in_links or has_place_in_simulator(claim.candidate, claim.coefficients)
 
 
 def method_section(diagnosis: Diagnosis, held_out_blocks: bool) -> str:

@@ -10,7 +10,8 @@ from textwrap import wrap
 import numpy as np
 
 from armlab.diagnosis.report.residuals import is_white, select_residuals
-from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Parameter, Rival
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Rival
+from armlab.effects.parameters import ParameterValue
 from problem.arm import Arm
 
 LINK_EFFECTS = ("payload", "inertial_parameter_error")
@@ -81,7 +82,7 @@ class ParameterRow:
     unit: str
 
 
-def parameter_rows(parameter: Parameter) -> list[ParameterRow]:
+def parameter_rows(parameter: ParameterValue) -> list[ParameterRow]:
     """A parameter as rows, a vector's components one by one."""
     values = np.atleast_1d(np.array(parameter.value, dtype=float)).tolist()
     found = parameter.interval

@@ -14,6 +14,8 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.effects.drive import RotorInertia
+from armlab.effects.scene import instants
 from armlab.identification.estimators.least_squares import (
     Estimate,
     WeightedLeastSquares,
@@ -27,7 +29,6 @@ from armlab.identification.structure import Structure
 from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis, pseudo_inertias, regular_nominal
 
-DISSIPATIVE_EFFECTS = ("viscous_friction", "coulomb_friction", "nonlinear_viscous_friction", "asymmetric_friction")
 SPEED_SHARES = np.geomspace(0.01, 1, 12)  # of the fastest
 
 
@@ -38,14 +39,14 @@ def dissipation_rows(structure: Structure, fastest: Array) -> Array:
     """
     joints = len(structure.arm)
     speeds = np.concatenate([-SPEED_SHARES[::-1], SPEED_SHARES])[:, None] * fastest
-    motion = Motion(np.zeros_like(speeds), speeds, np.ones_like(speeds))
+    scene = instants(structure.arm, Motion(np.zeros_like(speeds), speeds, np.ones_like(speeds)))
     against = np.zeros((len(speeds), joints, structure.size))
     inertia = np.zeros((joints, structure.size))
     for part, place in zip(structure.components, structure.slices, strict=True):
-        joint = part.joint - 1
-        if part.effect in DISSIPATIVE_EFFECTS:
-            against[:, joint, place] = part.columns(motion) * np.sign(speeds[:, joint, None])
-        elif part.effect == "rotor_inertia":
+        joint = part.rows[0]
+        if part.facts.dissipates and not part.follows_model:
+            against[:, joint, place] = part.columns(scene)[:, 0] * np.sign(speeds[:, joint, None])
+        elif isinstance(part, RotorInertia):
             inertia[joint, place] = 1.0
     rows = np.vstack([against.reshape(-1, structure.size), inertia])
     return np.asarray(rows[np.any(rows != 0, axis=1)])

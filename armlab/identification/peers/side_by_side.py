@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from armlab.common.errors import InputError
-from armlab.identification.export import mjcf_document, urdf_document
+from armlab.identification.export import build_simulator_model, mjcf_document, urdf_document
 from armlab.identification.identifier import Identifier
 from armlab.identification.peers.exchange import PeerRun, write_runs
 from armlab.identification.real.looks import Looks
@@ -83,8 +83,9 @@ def _write_inputs(arm: Arm, signals: list[Signals], folder: Path) -> None:
     inertial = parameters_of(regular_nominal(whole))
     structure = Structure(whole, ())
     model = TorqueModel(arm.name, structure, structure.base.values(inertial), inertial=inertial)
-    (folder / "arm.urdf").write_text(urdf_document(model), encoding="utf-8")
-    (folder / "arm.xml").write_text(mjcf_document(model), encoding="utf-8")
+    exported = build_simulator_model(model)
+    (folder / "arm.urdf").write_text(urdf_document(exported), encoding="utf-8")
+    (folder / "arm.xml").write_text(mjcf_document(exported), encoding="utf-8")
 
 
 def _with_position_limits(joint: Joint) -> Joint:

@@ -7,7 +7,8 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
-from armlab.identification.components import Component, neighbour_couplings, usual_components
+from armlab.effects.contract import Candidate
+from armlab.identification.components import usual_components, wrist_couplings
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 from armlab.recordings.public import PUBLIC_RECORDINGS, STAUBLI, RemoteFile, find_raw_file
@@ -59,8 +60,7 @@ def compare_with_published(model: Model) -> tuple[Comparison, ...]:
 
 def fit_published_structure(recording: Recording, cutoff_hz: float, position_factor: float) -> Model:
     """The model with the terms of the published one, from the runs that identify."""
-    joints = len(recording.arm)
-    components = usual_components(joints) + neighbour_couplings(joints)
+    components = usual_components(recording.arm) + wrist_couplings(recording.arm)
     identifier = Identifier(recording.arm, components, cutoff_hz=cutoff_hz, position_factor=position_factor)
     return identifier.fit(recording.with_role("identify")).model_
 
@@ -98,7 +98,7 @@ def _joint_term_weights(model: Model, name: str, joint: int) -> Array:
     return weights
 
 
-def _matching_parameter(part: Component, name: str, joint: int) -> str | None:
+def _matching_parameter(part: Candidate, name: str, joint: int) -> str | None:
     if name in COUPLING_TERMS:
         return COUPLING_TERMS[name] if part.effect == "joint_coupling" and joint in part.joints else None
     effect, parameter = JOINT_TERMS[name]

@@ -6,7 +6,7 @@ A recipe is what is given to this procedure for each recording before it looks a
 from dataclasses import dataclass
 from pathlib import Path
 
-from armlab.identification.components import Component
+from armlab.effects.contract import Candidate
 from armlab.identification.identifier import Identifier
 from armlab.identification.priors import Pull
 from armlab.identification.real.looks import Looks
@@ -49,8 +49,8 @@ class Recipe:
 
     def groups(self, arm: Arm) -> Groups:
         """Components to choose from."""
-        usual = candidate_groups(len(arm))
-        return usual if self.counterbalanced is None else usual | counterbalance_groups(self.counterbalanced)
+        usual = candidate_groups(arm)
+        return usual if self.counterbalanced is None else usual | counterbalance_groups(arm, self.counterbalanced)
 
     def pulls(self, arm: Arm) -> tuple[Pull, ...]:
         """Priors to choose from."""
@@ -105,7 +105,7 @@ def study_recording(recipe: Recipe, folder: Path, looks: Looks) -> Study:
     choice = selection.choice
     chosen = components_of(groups, choice.groups)
     method = _choose_method(recipe, recording, choice, chosen)
-    tasks: tuple[tuple[str, tuple[Component, ...], str, Pull], ...] = (
+    tasks: tuple[tuple[str, tuple[Candidate, ...], str, Pull], ...] = (
         ("rigid", (), "ordinary", Pull()),
         ("friction", components_of(groups, USUAL_GROUPS), "ordinary", Pull()),
         ("chosen", chosen, method, choice.pull),
@@ -118,7 +118,7 @@ def study_recording(recipe: Recipe, folder: Path, looks: Looks) -> Study:
     return Study(recipe, recording, selection, tuple(models))
 
 
-def _choose_method(recipe: Recipe, recording: Recording, choice: Choice, components: tuple[Component, ...]) -> str:
+def _choose_method(recipe: Recipe, recording: Recording, choice: Choice, components: tuple[Candidate, ...]) -> str:
     """Physically consistent, or free of that: what predicts held-out blocks of the identification data better."""
     free = "weighted" if choice.by_joint else "alike"
     runs = recording.with_role("identify")
