@@ -15,7 +15,7 @@ from scipy.stats import norm
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.effects.scene import instants
+from armlab.effects.scene import Scene
 from armlab.identification.components import usual_components
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
@@ -65,7 +65,9 @@ class Experiment:
         """A recorded motion of random harmonics."""
         time = np.arange(round(self.seconds * self.rate_hz)) / self.rate_hz
         motion = fourier_motion(time, len(self.arm), rng)
-        clean = (self.structure.matrix(instants(self.structure.arm, motion)) @ self.truth).reshape(len(time), -1)
+        zero = np.zeros(motion.position.shape)
+        scene = Scene("experiment", time, motion, self.arm, np.zeros(10 * len(self.arm)), zero)
+        clean = (self.structure.matrix(scene) @ self.truth).reshape(len(time), -1)
         shocks = rng.standard_normal(clean.shape) * self.noise.torque * np.sqrt(1 - self.noise.colour**2)
         torque = clean + lfilter([1.0], [1.0, -self.noise.colour], shocks, axis=0)
         position = motion.position + self.noise.encoder * rng.standard_normal(clean.shape)

@@ -18,7 +18,7 @@ from armlab.effects.friction import (
     Slopes,
     ViscousFriction,
 )
-from armlab.effects.scene import instants
+from armlab.effects.scene import scene_of
 from armlab.effects.springs import SineCompensator, SpringCompensator
 from armlab.identification.components import every_joint, wrist_couplings
 from armlab.identification.cross_validation import FoldMoments, fold_moments
@@ -214,7 +214,9 @@ def unfiltered_regression(structure: Structure, signals: Sequence[Signals], data
     matrices, torques = [], []
     for each in signals:
         rows = each.filter.rows
-        whole = structure.matrix(instants(structure.arm, each.motion)).reshape(each.motion.samples, data.joints, -1)
+        whole = structure.matrix(scene_of(each.run, each.motion, structure.arm)).reshape(
+            each.motion.samples, data.joints, -1
+        )
         matrices.append(whole[rows].reshape(-1, structure.size))
         torques.append(each.run.torque[rows].ravel())
     return replace(data, matrix=np.vstack(matrices), torque=np.concatenate(torques))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Scene
-from armlab.effects.scene import instants
+from armlab.effects.scene import instants, scene_of
 from armlab.recordings.differentiate import Signals
 from problem.arm import PARAMETER_UNITS, Arm
 from problem.base_parameters import BaseParameters, base_parameters
@@ -108,7 +108,7 @@ class Structure:
         for joint in range(joints):
             loading = np.flatnonzero(columns >= 10 * joint)  # links before a joint do not load it
             out[:, joint, loading] = signals.filter(rigid[:, joint, columns[loading]])
-        scene = self._with_load(instants(self.arm, signals.motion))
+        scene = self._with_load(scene_of(signals.run, signals.motion, self.arm))
         for part, place in zip(self.components, self.slices, strict=True):
             values = part.columns(scene)
             for number, joint in enumerate(part.rows):

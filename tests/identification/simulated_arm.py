@@ -44,7 +44,7 @@ def motion(seed: int, seconds: float = 10.0, rate_hz: float = RATE_HZ) -> tuple[
 
 def scene(time: Array, moved: Motion) -> Scene:
     """A run with these times and motion."""
-    return Scene("run.csv", np.zeros(len(time)), moved, arm(), np.zeros(30), np.zeros(moved.position.shape))
+    return Scene("run.csv", time, moved, arm(), np.zeros(30), np.zeros(moved.position.shape))
 
 
 def run(

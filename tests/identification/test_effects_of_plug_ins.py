@@ -118,7 +118,7 @@ def test_prediction_of_a_run_gives_effects_its_times(tmp_path: Path) -> None:
     model = with_effects(tmp_path, EVERY[2])
     predicted = model.predict(run(LINEAR, truth(LINEAR), 1, seconds=8.0))
     assert predicted.shape[1] == 3
-    with pytest.raises(ValueError, match="friction_drift .* needs the run"):
+    with pytest.raises(ValueError, match=r"friction_drift .* needs the run"):
         model.torque(recorded()[1])
 
 

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -45,7 +43,7 @@ def test_viscous_and_coulomb_friction_act_against_the_motion_at_their_own_joint_
 def test_coulomb_friction_is_averaged_over_the_interval_that_a_sample_stands_for() -> None:
     time = np.array([0.0, 0.1])
     moved = Motion(np.zeros((2, 3)), np.array([[0.1, 1.0, -0.2], [0.0, 1.0, -1.0]]), np.full((2, 3), 4.0))
-    where = replace(scene(time, moved), time=time)
+    where = scene(time, moved)
     found = [CoulombFriction.at(arm(), joint).columns(where)[:, 0, 0] for joint in (1, 2, 3)]
     # half an interval is 0.05 s and changes the velocity by 0.2: the sign is 0.1 / 0.2, and 1 or -1 beyond
     assert_allclose(found, [[0.5, 0.0], [1.0, 1.0], [-1.0, -1.0]])
