@@ -1,16 +1,16 @@
 """The same recording with each guard off in turn."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from armlab.diagnosis.diagnose import diagnose, prepare
-from armlab.diagnosis.fitted_model import FittedModel, search_effects
+from armlab.diagnosis.diagnose import conclude, diagnose, prepare
+from armlab.diagnosis.fitted_model import FittedModel, fit_background, search_effects
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import GUARDS, Settings, guards_without
 from armlab.diagnosis.verdict_files import verdict_content
+from armlab.effects.library import library
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 
@@ -26,27 +26,27 @@ def verdicts_without_each(folder: Path) -> dict[str, dict[str, Any]]:
 
 def diagnose_without_each(recording: Recording) -> Iterator[tuple[str, Diagnosis]]:
     """The diagnosis with all guards on, then with each off."""
-    ready = prepare(recording, None, 0, Settings(), _no_progress)
-    if isinstance(ready, Diagnosis):
-        yield from ((guard, ready) for guard in (ALL_ON, *GUARDS))
+    design = prepare(recording, None, Settings(), _no_progress)
+    if isinstance(design, Diagnosis):
+        yield from ((guard, design) for guard in (ALL_ON, *GUARDS))
         return
-    first = ready.fit_background(_no_progress)
-    searched = search_effects(first, _no_progress)
-    yield ALL_ON, ready.told(searched, time.perf_counter(), _no_progress)
+    background = fit_background(design, library(), 0, _no_progress)
+    searched = search_effects(background, _no_progress)
+    yield ALL_ON, conclude(recording, searched, _no_progress)
     for guard in GUARDS:
         settings = Settings(guards=guards_without((guard,)))
         if guard in GUARDS_AFTER_SEARCH:
-            yield guard, ready.told(_with_settings(searched, settings), time.perf_counter(), _no_progress)
+            yield guard, conclude(recording, _with_settings(searched, settings), _no_progress)
         elif guard in GUARDS_IN_SEARCH:
-            again = search_effects(_with_settings(first, settings), _no_progress)
-            yield guard, ready.told(again, time.perf_counter(), _no_progress)
+            again = search_effects(_with_settings(background, settings), _no_progress)
+            yield guard, conclude(recording, again, _no_progress)
         else:
             yield guard, diagnose(recording, settings=settings)
 
 
 def _with_settings(each: FittedModel, settings: Settings) -> FittedModel:
     """A round under other settings."""
-    return replace(each, bench=replace(each.bench, settings=settings))
+    return replace(each, design=replace(each.design, settings=settings))
 
 
 def _no_progress(message: str) -> None:

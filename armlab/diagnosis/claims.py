@@ -23,14 +23,14 @@ MAX_RIVALS = 3
 OUTLYING_FACTOR = 4.0  # times the median width of the other links
 
 
-def make_claims(found: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence]) -> tuple[Claim, ...]:
+def make_claims(model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence]) -> tuple[Claim, ...]:
     """All claims of a model, the strongest first."""
     if not effects and not links:
         return ()
-    wide = extend_with_shapes(found)
-    claims = [_effect_claim(found, wide, group, evidence) for group, evidence in effects.items()]
-    claims += _link_claims(found, wide, links)
-    known = list(dict.fromkeys(group.candidate.facts for group in found.solver.groups))
+    wide = extend_with_shapes(model)
+    claims = [_effect_claim(model, wide, group, evidence) for group, evidence in effects.items()]
+    claims += _link_claims(model, wide, links)
+    known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
     claims = [_with_equal_sums(claim, claims, known) for claim in claims]
     return tuple(sorted(claims, key=lambda claim: -claim.evidence.score))
 
@@ -55,14 +55,14 @@ def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effe
     return replace(claim, rivals=rivals, next_experiment=next_experiment(claim.candidate.facts, rivals))
 
 
-def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evidence) -> Claim:
-    solver = found.solver
+def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, evidence: Evidence) -> Claim:
+    solver = model.solver
     columns = solver.groups[group].columns
-    coefficients, covariance = solver.values(found.fit, group), wide.covariance(group)
-    candidate = solver.groups[group].candidate.first_name(coefficients, found.bench.scenes)
-    own = np.zeros(found.moments.size)
+    coefficients, covariance = solver.values(model.fit, group), wide.covariance(group)
+    candidate = solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
+    own = np.zeros(model.moments.size)
     own[columns] = coefficients
-    rivals = find_rivals(found, group, candidate)
+    rivals = find_rivals(model, group, candidate)
     return Claim(
         effect=candidate.effect,
         joint=candidate.joint,
@@ -70,7 +70,7 @@ def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evi
         parameters=parameter_values(candidate, coefficients, covariance, wide.factor),
         equation=candidate.equation(coefficients),
         evidence=evidence,
-        prediction=found.columns.torque_of(own),
+        prediction=model.columns.torque_of(own),
         rivals=rivals,
         next_experiment=next_experiment(candidate.facts, rivals),
         candidate=candidate,
@@ -79,14 +79,14 @@ def _effect_claim(found: FittedModel, wide: ShapedFit, group: int, evidence: Evi
     )
 
 
-def find_rivals(found: FittedModel, group: int, own: Candidate) -> tuple[Rival, ...]:
+def find_rivals(model: FittedModel, group: int, own: Candidate) -> tuple[Rival, ...]:
     """What these data cannot tell from a group of a model; the best first. own: its candidate, first name."""
-    solver, state = found.solver, found.state
+    solver, state = model.solver, model.state
     out = [Rival(name, own.joint, own.joints, True) for name in own.identical]
-    search = Search(solver, found.bench.settings.guards, True, 0)
+    search = Search(solver, model.design.settings.guards, True, 0)
     without = state.minus(group)
     scores = search.gains(without)
-    full = found.moments.heldout_error(found.fit.coefficients)
+    full = model.moments.heldout_error(model.fit.coefficients)
     for number in np.argsort(-scores):
         rival = int(number)
         deficit = float(scores[group] - scores[rival])
@@ -98,19 +98,19 @@ def find_rivals(found: FittedModel, group: int, own: Candidate) -> tuple[Rival, 
         if same or known or search.excluded(without, rival):
             continue
         other = search.with_group(without, rival)
-        if search.objection(other, rival) is None and _predicts_as_well(found, other, full):
+        if search.objection(other, rival) is None and _predicts_as_well(model, other, full):
             out.append(Rival(candidate.effect, candidate.joint, candidate.joints, False, max(deficit, 0.0)))
     return tuple(out)
 
 
-def _predicts_as_well(found: FittedModel, other: State, full: Array) -> bool:
-    error = found.moments.heldout_error(found.solver.fit(other).coefficients)
+def _predicts_as_well(model: FittedModel, other: State, full: Array) -> bool:
+    error = model.moments.heldout_error(model.solver.fit(other).coefficients)
     return bool(np.all(error <= (1 + HELD_OUT_TOLERANCE) * full))
 
 
-def _link_claims(found: FittedModel, wide: ShapedFit, links: dict[int, Evidence]) -> list[Claim]:
+def _link_claims(model: FittedModel, wide: ShapedFit, links: dict[int, Evidence]) -> list[Claim]:
     """One claim for each link that is off: its ten parameters, given what the joints feel of all links."""
-    bench, widths = found.bench, found.fit.state.widths
+    bench, widths = model.design, model.fit.state.widths
     if not links or bench.prior is None or widths is None:
         return []
     base, covariance = wide.base()
@@ -121,19 +121,19 @@ def _link_claims(found: FittedModel, wide: ShapedFit, links: dict[int, Evidence]
         law = link_law(
             bench.simulation.arm, link + 1, mean[place], spread[place, place], added=is_outlying(widths, link)
         )
-        claims.append(_link_claim(found, wide.factor, law, mean[place], spread[place, place], evidence))
+        claims.append(_link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence))
     return claims
 
 
 def _link_claim(
-    found: FittedModel, factor: float, law: LinkLaw, mean: Array, spread: Array, evidence: Evidence
+    model: FittedModel, factor: float, law: LinkLaw, mean: Array, spread: Array, evidence: Evidence
 ) -> Claim:
     """The claim about one link. mean (10,), spread (10, 10): what it has more than its simulation."""
-    bench, candidate = found.bench, law.candidate
+    bench, candidate = model.design, law.candidate
     link = candidate.joints[0]
     turn = np.column_stack([felt_values(bench.simulation.arm, link, unit) for unit in np.eye(10)])
     coefficients, covariance = turn @ mean, turn @ spread @ turn.T
-    change, torque = np.zeros(10 * len(bench.simulation.arm)), np.zeros(found.moments.size)
+    change, torque = np.zeros(10 * len(bench.simulation.arm)), np.zeros(model.moments.size)
     change[10 * link - 10 : 10 * link] = mean
     torque[: len(bench.base)] = bench.base.grouping @ change
     rivals = tuple(Rival(each, link, (), True) for each in law.rivals)
@@ -144,7 +144,7 @@ def _link_claim(
         parameters=parameter_values(candidate, coefficients, covariance, factor),
         equation=candidate.equation(coefficients),
         evidence=evidence,
-        prediction=found.columns.torque_of(torque),
+        prediction=model.columns.torque_of(torque),
         rivals=rivals,
         next_experiment=next_experiment(candidate.facts, rivals),
         candidate=candidate,

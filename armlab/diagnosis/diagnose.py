@@ -1,7 +1,12 @@
-"""The diagnosis of a recording, step by step."""
+"""The diagnosis of a recording, step by step.
+
+`diagnose` is the whole flow: filter the runs and make the columns (`prepare`), fit links and usual friction
+(`fit_background`), search effects (`search_effects`), test and name them (`conclude`).
+"""
 
 import time
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -38,6 +43,8 @@ from armlab.effects.library import library
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
 
+MIN_GAP = 0.02  # of the noise floor: a smaller gap cannot be measured
+
 
 def diagnose(
     recording: Recording,
@@ -52,46 +59,17 @@ def diagnose(
     progress: is told what is being done. Raises InputError where the wanted baseline is not there.
     """
     started = time.perf_counter()
-    ready = prepare(recording, baseline, seed, settings or Settings(), progress)
-    if isinstance(ready, Diagnosis):
-        return ready
-    return ready.told(search_effects(ready.fit_background(progress), progress), started, progress)
-
-
-Structures = tuple[Structure, ...]
-
-MIN_GAP = 0.02  # of the noise floor: a smaller gap cannot be measured
-
-
-@dataclass(frozen=True, eq=False)
-class PreparedDiagnosis:
-    """A recording with its bench, before anything is searched. seed: of the surrogates' random waves."""
-
-    recording: Recording
-    bench: DesignMatrix
-    seed: int
-
-    def fit_background(self, progress: Progress) -> FittedModel:
-        """With every candidate on the bench, and a first look at the noise."""
-        return fit_background(self.bench, library(), self.seed, progress)
-
-    def told(self, searched: FittedModel, started: float, progress: Progress) -> Diagnosis:
-        """Everything that can be said of a search. started: by `time.perf_counter`."""
-        progress("testing claims")
-        model, effects, links, left = _name_effects(prune(searched))
-        remains = [each for each in left if is_structured(each)]
-        unknowns = [each for each in remains if not is_form_error(each, effects)]
-        residual = model.residual(model.fit)
-        claims = make_claims(model, effects, links) + tuple(
-            make_unknown_claim(model, each, residual) for each in unknowns
-        )
-        return _assemble(self.recording, model, claims, (unknowns, remains), time.perf_counter() - started)
+    design = prepare(recording, baseline, settings or Settings(), progress)
+    if isinstance(design, Diagnosis):
+        return design
+    searched = search_effects(fit_background(design, library(), seed, progress), progress)
+    return replace(conclude(recording, searched, progress), seconds=time.perf_counter() - started)
 
 
 def prepare(
-    recording: Recording, baseline: Baseline | None, seed: int, settings: Settings, progress: Progress
-) -> PreparedDiagnosis | Diagnosis:
-    """What `diagnose` starts with; a diagnosis where nothing can be said and why."""
+    recording: Recording, baseline: Baseline | None, settings: Settings, progress: Progress
+) -> DesignMatrix | Diagnosis:
+    """The runs filtered, and the columns of the links; a diagnosis where nothing can be said, and why."""
     simulation = read_simulation(recording, baseline)
     reason = reason_unusable(recording)
     if reason is not None:
@@ -104,65 +82,84 @@ def prepare(
     base = base_parameters(simulation.arm)
     links = simulation.inertial
     prior = None if links is None or not are_bodies(links) else link_prior(simulation.arm, base, links)
-    return PreparedDiagnosis(recording, build_design_matrix(observed, simulation, base, prior, settings), seed)
+    return build_design_matrix(observed, simulation, base, prior, settings)
 
 
-def _name_effects(passed: Pruned) -> tuple[FittedModel, dict[int, Evidence], dict[int, Evidence], Structures]:
-    """The model with the names that hold: see `engine.doubt`; and what it leaves. Nothing without the guard."""
-    model, effects, links = passed
-    if not model.bench.settings.guards.unknown:
-        return model, effects, links, ()
+def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
+    """Tests what a search found, withdraws names that do not hold, and states the rest with numbers."""
+    progress("testing claims")
+    named = name_effects(prune(searched))
+    model = named.model
+    remains = [each for each in named.left if is_structured(each)]
+    unknowns = [each for each in remains if not is_form_error(each, named.effects)]
+    residual = model.residual(model.fit)
+    claims = make_claims(model, named.effects, named.links)
+    claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
+    return _assemble(recording, model, claims, unknowns, remains)
+
+
+@dataclass(frozen=True, eq=False)
+class NamedEffects:
+    """A model with the names that hold, by group and by link (from 0), and the structure that it leaves."""
+
+    model: FittedModel
+    effects: dict[int, Evidence]
+    links: dict[int, Evidence]
+    left: tuple[Structure, ...]
+
+
+def name_effects(pruned: Pruned) -> NamedEffects:
+    """Withdraws names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
+    model, effects, links = pruned
+    if not model.design.settings.guards.unknown:
+        return NamedEffects(model, effects, links, ())
     left = predict_residual_structure(model, fit_coloured_noise(model))
     while doubtful := names_contradicted_by_residual(effects, left):
         model, effects, links = withdraw(model, doubtful, "what is left at its joint is no less structured")
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left)
-    return model, effects, {link: each for link, each in links.items() if link not in wrong}, left
+    return NamedEffects(model, effects, {link: each for link, each in links.items() if link not in wrong}, left)
 
 
 def _assemble(
     recording: Recording,
     model: FittedModel,
     claims: tuple[Claim, ...],
-    structure: tuple[list[Structure], list[Structure]],
-    seconds: float,
+    unknowns: Sequence[Structure],
+    remains: Sequence[Structure],
 ) -> Diagnosis:
-    """structure: what is a finding `unknown`, and all that remains."""
-    bench, (unknowns, remains) = model.bench, structure
+    """The diagnosis of a model. unknowns: structure that is a finding `unknown`; remains: all structure."""
+    design, observed = model.design, model.design.observed
     final = model.residual(model.fit)
     for each in unknowns:
         final[:, each.joint] -= each.prediction
     refit = model.residual(model.solver.fit(State((), None)))
-    start = refit if bench.simulation.kind == "refit" else bench.target
-    observed = bench.observed
-    floor = noise_floor(final, bench.features, observed)
-    fits = _joint_fits(refit, final, floor, bench.observed)
-    where = locate_excess(start, floor, bench.observed)
+    start = refit if design.simulation.kind == "refit" else design.target
+    floor = noise_floor(final, design.features, observed)
+    fits = _joint_fits(refit, final, floor, observed)
     status: Status = "mismatch" if claims else "none"
-    unexplained = tuple(
-        Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
-    )
     base, covariance = model.base_parameters()
     return Diagnosis(
-        recording,
-        bench.simulation,
-        status,
-        summarise(status, claims, fits),
-        observed,
-        bench.target,
-        refit,
-        final,
-        inertial_parameters(model),
-        base,
-        covariance,
-        claims,
-        where if claims else (),
-        unexplained,
-        fits,
-        model.steps,
-        count_looks(model),
-        seconds,
-        {**asdict(bench.settings.guards), "cutoff_hz": bench.settings.cutoff_hz},
+        recording=recording,
+        simulation=design.simulation,
+        status=status,
+        summary=summarise(status, claims, fits),
+        observed=observed,
+        nominal=design.target,
+        refit=refit,
+        final=final,
+        inertial=inertial_parameters(model),
+        base_values=base,
+        base_covariance=covariance,
+        claims=claims,
+        located=locate_excess(start, floor, observed) if claims else (),
+        unexplained=tuple(
+            Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
+        ),
+        fit=fits,
+        steps=model.steps,
+        looks=count_looks(model),
+        settings={**asdict(design.settings.guards), "cutoff_hz": design.settings.cutoff_hz},
     )
 
 

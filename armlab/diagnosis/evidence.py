@@ -31,20 +31,20 @@ HELD_OUT_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
 class Comparison:
     """The state of a round beside others, whose groups are its own and some more."""
 
-    found: FittedModel
+    model: FittedModel
     state: State
     more: frozenset[int]
 
     @cached_property
     def wide(self) -> Fit:
         """The fit with everything that is compared."""
-        return self.found.solver.fit(State(tuple(sorted({*self.state.groups, *self.more})), self.state.widths))
+        return self.model.solver.fit(State(tuple(sorted({*self.state.groups, *self.more})), self.state.widths))
 
     @cached_property
     def folds(self) -> Folds:
         """Whitened rows of the wide fit, in folds."""
-        found, fit = self.found, self.wide
-        rows = whitened_rows(found.columns, {}, fit, found.moments.lengths, found.noise, found.bench.observed)
+        found, fit = self.model, self.wide
+        rows = whitened_rows(found.columns, {}, fit, found.moments.lengths, found.noise, found.design.observed)
         links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
         values = np.concatenate([links, fit.coefficients[fit.columns]])
         return split_folds(rows, values, prior_precision(found.solver, fit, len(fit.inverse)))
@@ -52,14 +52,14 @@ class Comparison:
     def covariance_of(self, state: State) -> BlockCovariance:
         """Robust covariance of the parameters of a state within the wide fit."""
         chosen = self._chosen(state)
-        rows, fit = self.folds.rows, self.found.solver.fit(state)
+        rows, fit = self.folds.rows, self.model.solver.fit(state)
         errors = [
             target - design[:, chosen] @ self._values(fit)
             for target, design in zip(self.folds.targets, rows.designs, strict=True)
         ]
         own = type(rows)(tuple(design[:, chosen] for design in rows.designs), tuple(errors), rows.blocks)
         precision = self.folds.precision[np.ix_(chosen, chosen)]
-        return block_covariance(own, precision, self.found.bench.settings.guards.robust_variance)
+        return block_covariance(own, precision, self.model.design.settings.guards.robust_variance)
 
     def _values(self, fit: Fit) -> Array:
         links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
@@ -69,7 +69,7 @@ class Comparison:
         """Where the parameters of a smaller state stand among those of the wide fit."""
         rank = self.wide.links.shape[1]
         at = {int(column): rank + place for place, column in enumerate(self.wide.columns)}
-        return [*range(rank), *(at[int(column)] for column in self.found.solver.fit(state).columns)]
+        return [*range(rank), *(at[int(column)] for column in self.model.solver.fit(state).columns)]
 
     def gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[Gain, Gain]]:
         """Per joint the gain on validation rows, and on identification stretches held out in turn."""
@@ -93,17 +93,17 @@ class Comparison:
 
     def validation_gain(self, fit: Fit, less: Fit, joint: int) -> Gain:
         """The gain at a joint on validation rows."""
-        observed, noise = self.found.bench.observed, self.found.noise
-        left = np.column_stack([self.found.residual_at(joint, each) for each in (less, fit)])
+        observed, noise = self.model.design.observed, self.model.noise
+        left = np.column_stack([self.model.residual_at(joint, each) for each in (less, fit)])
         white = noise.white(left, joint, observed, "validate")
         blocks = noise.numbers(block_numbers(observed, HELD_OUT_BLOCK_S), joint, observed, "validate")
         return held_out_gain(white[:, 0], white[:, 1], blocks)
 
     def validation_rms(self, fit: Fit, joint: int) -> float:
         """What a fit leaves at a joint on validation rows, N m."""
-        observed = self.found.bench.observed
+        observed = self.model.design.observed
         rows = rows_in(observed.of_role("validate", joint), observed.rows)
-        return float(np.sqrt(np.mean(self.found.residual_at(joint, fit)[rows] ** 2)))
+        return float(np.sqrt(np.mean(self.model.residual_at(joint, fit)[rows] ** 2)))
 
 
 PUSH_LEVEL = 0.3  # of a push's peak
@@ -171,18 +171,18 @@ class Evidence:
 class Judge:
     """Judges the effects of a state of a round."""
 
-    found: FittedModel
+    model: FittedModel
     state: State
 
     @cached_property
     def compared(self) -> Comparison:
         """The state beside the simpler groups that its own contain."""
         simpler = frozenset(other for group in self.state.groups for other in self.simpler(group))
-        return Comparison(self.found, self.state, simpler)
+        return Comparison(self.model, self.state, simpler)
 
     def effects(self) -> dict[int, Evidence]:
         """Evidence for each group."""
-        solver, state = self.found.solver, self.state
+        solver, state = self.model.solver, self.state
         fit = solver.fit(state)
         spread, losses = self.compared.covariance_of(state), solver.losses(fit)
         out = {}
@@ -218,7 +218,7 @@ class Judge:
 
     def _off(self, without: Widths, joints: int, looks: int) -> Evidence:
         """Evidence for the present widths against others."""
-        fit, less = (self.found.solver.fit(each) for each in (self.state, State(self.state.groups, without)))
+        fit, less = (self.model.solver.fit(each) for each in (self.state, State(self.state.groups, without)))
         score = fit.score - less.score
         p_value = float(np.exp(-np.clip(score, 0, 700)))  # a Bayes factor bounds the p-value from above
         gains = {joint: self.compared.validation_gain(fit, less, joint) for joint in range(joints)}
@@ -230,18 +230,18 @@ class Judge:
 
         Half of the level is for what every arm has.
         """
-        groups = self.found.solver.groups
-        if not self.found.solver.unusual[group]:
-            return 2 * int(np.sum(~self.found.solver.unusual))
+        groups = self.model.solver.groups
+        if not self.model.solver.unusual[group]:
+            return 2 * int(np.sum(~self.model.solver.unusual))
         own = groups[group].place
-        return 2 * self.found.solver.places * sum(each.candidate.looks for each in groups if each.place == own)
+        return 2 * self.model.solver.places * sum(each.candidate.looks for each in groups if each.place == own)
 
     def _in_wider_links(self, group: int) -> float:
         """P-value of a group where the links may be off far more than was found; 0 for links as simulated.
 
         What shows only because the links are thought to be off by so little is no evidence: nobody knows that width.
         """
-        solver, state = self.found.solver, self.state
+        solver, state = self.model.solver, self.state
         if not state.widths or not any(state.widths):
             return 0.0
         wider = solver.fit(State(state.groups, tuple(WIDER_LINKS_FACTOR * max(state.widths) for _ in state.widths)))
@@ -252,24 +252,24 @@ class Judge:
 
     def _pushed(self, group: int) -> str | None:
         """Against a push: see `engine.pushes`."""
-        found, candidate = self.found, self.found.solver.groups[group].candidate
-        joint, column = candidate.rows[0], int(self.found.solver.groups[group].columns[0])
+        found, candidate = self.model, self.model.solver.groups[group].candidate
+        joint, column = candidate.rows[0], int(self.model.solver.groups[group].columns[0])
         own = found.columns.matrices[joint][:, int(np.flatnonzero(found.columns.index[joint] == column)[0])]
-        push, observed = own * found.coefficients(found.fit)[column], found.bench.observed
+        push, observed = own * found.coefficients(found.fit)[column], found.design.observed
         return reason_no_contact(
             push, joint, observed, observed.torque[:, joint] - found.residual_at(joint, found.fit) - push
         )
 
     def simpler(self, group: int) -> tuple[int, ...]:
         """See `simpler_than`."""
-        return contained_groups(self.found.solver.groups, group)
+        return contained_groups(self.model.solver.groups, group)
 
     def _in_place_of_usual(self, group: int) -> bool:
         """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that.
 
         A law without a shape is usual friction by direction, and has to be better than it as others have.
         """
-        solver, state, simpler = self.found.solver, self.state, self.simpler(group)
+        solver, state, simpler = self.model.solver, self.state, self.simpler(group)
         candidate = solver.groups[group].candidate
         numbers = int(solver.ranks[group]) + len(candidate.shape)
         if not candidate.shape or set(simpler) & set(state.groups) or numbers > solver.ranks[list(simpler)].sum():
@@ -279,41 +279,41 @@ class Judge:
 
     def _beyond_usual(self, group: int) -> Evidence:
         """The evidence against usual friction in the place of one special law, and of all at this joint."""
-        groups, state = self.found.solver.groups, self.state
+        groups, state = self.model.solver.groups, self.state
         joint, simpler = groups[group].candidate.joint, self.simpler(group)
         special = [each for each in state.groups if groups[each].candidate.joint == joint and self.simpler(each)]
         tested = max(self._beyond(group, simpler), self._in_wider_links(group)), self.looks(group)
         found = list[Evidence]()
         for taken in ([group], special):
             less = State(tuple(sorted({*state.groups, *simpler} - set(taken))), state.widths)
-            score = self.found.solver.fit(state).score - self.found.solver.fit(less).score
+            score = self.model.solver.fit(state).score - self.model.solver.fit(less).score
             found.append(self._against(less, tested, groups[group].candidate.rows, score))
         return min(found, key=lambda each: each.gain)
 
     def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
         """Evidence for the state against a smaller one."""
-        fit, other = (self.found.solver.fit(each) for each in (self.state, less))
+        fit, other = (self.model.solver.fit(each) for each in (self.state, less))
         return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score)
 
     def _tested(self, fit: Fit, spread: BlockCovariance, group: int) -> float:
-        columns = self.found.solver.groups[group].columns
+        columns = self.model.solver.groups[group].columns
         return spread.p_value(fit.coefficients[columns], self._place(fit, group))
 
     def _beyond(self, group: int, simpler: tuple[int, ...]) -> float:
         """P-value of what a group explains that the simpler ones in it do not."""
         state = State(tuple(sorted({*self.state.groups, *simpler})), self.state.widths)
-        return self._tested(self.found.solver.fit(state), self.compared.covariance_of(state), group)
+        return self._tested(self.model.solver.fit(state), self.compared.covariance_of(state), group)
 
     def _place(self, fit: Fit, group: int) -> list[int]:
         """Where a group's coefficients stand in a fit's covariance."""
-        columns = self.found.solver.groups[group].columns
+        columns = self.model.solver.groups[group].columns
         start = fit.links.shape[1] + int(np.flatnonzero(fit.columns == columns[0])[0])
         return list(range(start, start + len(columns)))
 
     def _covariance(self, fit: Fit, spread: BlockCovariance, group: int) -> Array:
         """Of a group's unscaled coefficients."""
         place = self._place(fit, group)
-        lengths = self.found.moments.lengths[self.found.solver.groups[group].columns]
+        lengths = self.model.moments.lengths[self.model.solver.groups[group].columns]
         return np.asarray(spread.covariance[np.ix_(place, place)] / np.outer(lengths, lengths))
 
     def _evidence(
@@ -329,7 +329,7 @@ class Judge:
         best = validated if validated.share >= inside.share else inside
         held_p = min(each.p_value for each in (validated, inside) if each.share >= min(0.5 * best.share, best.share))
         p_value, looks = tested
-        corrected = min(1.0, p_value * (looks if self.found.bench.settings.guards.correction else 1))
+        corrected = min(1.0, p_value * (looks if self.model.design.settings.guards.correction else 1))
         before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
         return Evidence(
             joint,
@@ -358,6 +358,6 @@ def _validation_refutes(validated: Gain, inside: Gain, growth: float) -> bool:
     return lost or growth > MAX_LOSS_UNEXCITED
 
 
-def count_looks(found: FittedModel) -> int:
+def count_looks(model: FittedModel) -> int:
     """Everything that was compared: each candidate with each shape, and the alternatives of scans."""
-    return max(sum(group.candidate.looks for group in found.solver.groups), 1)
+    return max(sum(group.candidate.looks for group in model.solver.groups), 1)

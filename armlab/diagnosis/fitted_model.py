@@ -26,7 +26,7 @@ Progress = Callable[[str], None]
 class FittedModel:
     """A bench with its moments, and the state that was found on it."""
 
-    bench: DesignMatrix
+    design: DesignMatrix
     noise: Noise
     moments: Moments
     solver: Solver
@@ -36,7 +36,7 @@ class FittedModel:
     @property
     def columns(self) -> Columns:
         """The bench's."""
-        return self.bench.columns
+        return self.design.columns
 
     @property
     def fit(self) -> Fit:
@@ -49,7 +49,7 @@ class FittedModel:
 
     def base_parameters(self) -> tuple[Array, Array]:
         """Deviation of the base parameters from the simulation's, and its covariance under the noise model."""
-        fit, count = self.fit, len(self.bench.base)
+        fit, count = self.fit, len(self.design.base)
         rank, lengths = fit.links.shape[1], self.moments.lengths[:count]
         spread = fit.links @ fit.inverse[:rank, :rank] @ fit.links.T
         return self.coefficients(fit)[:count], np.asarray(spread / np.outer(lengths, lengths))
@@ -63,20 +63,20 @@ class FittedModel:
         return self.columns.matrices[joint][:, -1] - self.columns.torque_at(joint, self.coefficients(fit))
 
 
-def initial_link_widths(bench: DesignMatrix) -> Widths | None:
+def initial_link_widths(design: DesignMatrix) -> Widths | None:
     """Widths for a look at links that may be off: None without a nominal model or for a refit."""
-    if bench.prior is None or bench.simulation.kind == "refit":
+    if design.prior is None or design.simulation.kind == "refit":
         return None
-    return (INITIAL_LINK_WIDTH,) * bench.prior.links
+    return (INITIAL_LINK_WIDTH,) * design.prior.links
 
 
-def fit_background(bench: DesignMatrix, families: Sequence[Family], seed: int, progress: Progress) -> FittedModel:
+def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, progress: Progress) -> FittedModel:
     """Friction and links fitted, every candidate on the bench, and errors taken as coloured for the first time.
 
     seed: of the surrogates' random waves.
     """
     progress("fitting links and friction")
-    plain = bench.with_candidates(family for family in families if family.facts.usual)
+    plain = design.with_candidates(family for family in families if family.facts.usual)
     first = _fit_model(
         plain, _white_noise(plain.target, plain), lambda solver: background_state(solver, initial_link_widths(plain))
     )
@@ -89,15 +89,15 @@ def fit_background(bench: DesignMatrix, families: Sequence[Family], seed: int, p
     rough = _fit_model(
         whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
     )
-    forward = Search(rough.solver, replace(bench.settings.guards, backward_elimination=False), True, 0)
+    forward = Search(rough.solver, replace(design.settings.guards, backward_elimination=False), True, 0)
     steps: list[Step] = []
     return replace(rough, state=forward.climb(rough.state, steps))
 
 
-def _split_by_run(bench: DesignMatrix, residual: Array) -> list[Array]:
+def _split_by_run(design: DesignMatrix, residual: Array) -> list[Array]:
     """A residual (rows, joints) of each run, (samples, joints), NaN at rows that were not kept."""
     parts, start = [], 0
-    for signals in bench.observed.signals:
+    for signals in design.observed.signals:
         whole = np.full(signals.motion.position.shape, np.nan)
         whole[signals.filter.rows] = residual[start : start + len(signals.torque)]
         parts.append(whole)
@@ -105,31 +105,31 @@ def _split_by_run(bench: DesignMatrix, residual: Array) -> list[Array]:
     return parts
 
 
-def search_effects(current: FittedModel, progress: Progress) -> FittedModel:
+def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
     """Rounds of search, shapes and model from a first round, which is let go as the next one is made."""
     for number in range(SEARCH_ROUNDS):
         progress(f"searching, round {number + 1}")
-        noise, known = fit_coloured_noise(current), current.state if number else None
-        bench, steps = _follow_model(current) if number else current.bench, current.steps
-        del current  # its columns, before there are others
+        noise, known = fit_coloured_noise(model), model.state if number else None
+        bench, steps = _follow_model(model) if number else model.design, model.steps
+        del model  # its columns, before there are others
         searched = _search_state(bench, noise, known, True, steps)
         progress("fitting nonlinear parameters")
         bench, steps = bench.with_blocks(refine_shapes(bench, noise, searched.solver, searched.state)), searched.steps
         known = searched.state
         del searched
-        current = _fit_model(bench, noise, known, steps)
+        model = _fit_model(bench, noise, known, steps)
     progress("searching, last round")
-    return _search_state(current.bench, fit_coloured_noise(current), current.state, False, current.steps)
+    return _search_state(model.design, fit_coloured_noise(model), model.state, False, model.steps)
 
 
 def _search_state(
-    bench: DesignMatrix, noise: Noise, known: State | None, afresh: bool, steps: tuple[Step, ...]
+    design: DesignMatrix, noise: Noise, known: State | None, afresh: bool, steps: tuple[Step, ...]
 ) -> FittedModel:
     """The best state under a noise model, from what is known already, and `afresh` from the two starts."""
-    guards, links = bench.settings.guards, len(bench.simulation.arm)
-    opened = initial_link_widths(bench)
+    guards, links = design.settings.guards, len(design.simulation.arm)
+    opened = initial_link_widths(design)
     at_rest = None if opened is None else (0.0,) * links
-    base = _fit_model(bench, noise, State((), at_rest))
+    base = _fit_model(design, noise, State((), at_rest))
     starts = [] if known is None else [known]
     if afresh:
         starts.append(State((), at_rest))
@@ -139,50 +139,50 @@ def _search_state(
     return replace(base, state=state, steps=(*steps, *moves))
 
 
-def fit_coloured_noise(current: FittedModel) -> Noise:
+def fit_coloured_noise(model: FittedModel) -> Noise:
     """Noise of what a round leaves and no surrogate predicts."""
-    observed, guards = current.bench.observed, current.bench.settings.guards
-    left = current.residual(current.fit)
-    for joint, each in enumerate(current.bench.features):
+    observed, guards = model.design.observed, model.design.settings.guards
+    left = model.residual(model.fit)
+    for joint, each in enumerate(model.design.features):
         left[:, joint] -= predict_structure(left[:, joint], joint, each, observed)
-    return fit_noise(left, observed, len(current.fit.inverse) / observed.joints, guards.prewhitening)
+    return fit_noise(left, observed, len(model.fit.inverse) / observed.joints, guards.prewhitening)
 
 
-def _white_noise(residual: Array, bench: DesignMatrix) -> Noise:
-    return fit_noise(residual, bench.observed, 0.0, colour=False)
+def _white_noise(residual: Array, design: DesignMatrix) -> Noise:
+    return fit_noise(residual, design.observed, 0.0, colour=False)
 
 
 def _fit_model(
-    bench: DesignMatrix, noise: Noise, state: State | Callable[[Solver], State], steps: tuple[Step, ...] = ()
+    design: DesignMatrix, noise: Noise, state: State | Callable[[Solver], State], steps: tuple[Step, ...] = ()
 ) -> FittedModel:
-    moments, solver = bench.solver(noise)
+    moments, solver = design.solver(noise)
     chosen = state(solver) if callable(state) else state
-    return FittedModel(bench, noise, moments, solver, chosen, steps)
+    return FittedModel(design, noise, moments, solver, chosen, steps)
 
 
-def _follow_model(current: FittedModel) -> DesignMatrix:
+def _follow_model(model: FittedModel) -> DesignMatrix:
     """The bench with columns that follow the model of a round."""
-    bench, fit = current.bench, current.fit
-    inertial = inertial_parameters(current)
+    bench, fit = model.design, model.fit
+    inertial = inertial_parameters(model)
     nominal = bench.simulation.inertial
     change = inertial if nominal is None else inertial - nominal
 
     def torque(scene: Scene) -> Array:
         out = bench.simulation.torque(scene) + rigid_body_torque(scene.arm, scene.motion, change)
         for group in fit.state.groups:
-            candidate = current.solver.groups[group].candidate
+            candidate = model.solver.groups[group].candidate
             if candidate.of_channel:  # acts on what is recorded, itself not included
                 continue
-            out[:, list(candidate.rows)] += candidate.columns(scene) @ current.solver.values(fit, group)
+            out[:, list(candidate.rows)] += candidate.columns(scene) @ model.solver.values(fit, group)
         return out
 
     return bench.with_model(inertial, torque)
 
 
-def inertial_parameters(current: FittedModel) -> Array:
+def inertial_parameters(model: FittedModel) -> Array:
     """Inertial parameters (10 * joints,) of the links of a round: the simulation's, and what they are off."""
-    bench, fit = current.bench, current.fit
-    base = current.coefficients(fit)[: len(bench.base)]
+    bench, fit = model.design, model.fit
+    base = model.coefficients(fit)[: len(bench.base)]
     nominal = bench.simulation.inertial
     start = np.zeros(10 * len(bench.simulation.arm)) if nominal is None else nominal
     if bench.prior is None or fit.state.widths is None:

@@ -24,7 +24,7 @@ class ShapedFit:
     places: where a group's shapes stand, by group.
     """
 
-    found: FittedModel
+    model: FittedModel
     spread: BlockCovariance
     places: dict[int, slice]
 
@@ -35,7 +35,7 @@ class ShapedFit:
 
     def covariance(self, group: int) -> Array:
         """Of a group's coefficients and shapes, unscaled, (coefficients + shapes,) squared."""
-        found = self.found
+        found = self.model
         columns = found.solver.groups[group].columns
         start = found.fit.links.shape[1] + int(np.flatnonzero(found.fit.columns == columns[0])[0])
         chosen = [*range(start, start + len(columns)), *_places(self.places.get(group))]
@@ -44,7 +44,7 @@ class ShapedFit:
 
     def base(self) -> tuple[Array, Array]:
         """Deviation of the base parameters and its covariance."""
-        found = self.found
+        found = self.model
         factor, rank = found.fit.links, found.fit.links.shape[1]
         lengths = found.moments.lengths[: len(factor)]
         block = factor @ self.spread.covariance[:rank, :rank] @ factor.T
@@ -55,17 +55,17 @@ def _places(place: slice | None) -> range:
     return range(0) if place is None else range(place.start, place.stop)
 
 
-def extend_with_shapes(found: FittedModel) -> ShapedFit:
+def extend_with_shapes(model: FittedModel) -> ShapedFit:
     """Adds the torque's derivatives by the shapes to the columns of the fit."""
-    bench, fit = found.bench, found.fit
+    bench, fit = model.design, model.fit
     extra = {joint: np.empty((bench.observed.rows, 0)) for joint in range(bench.observed.joints)}
     places, start = {}, len(fit.inverse)
     for group in fit.state.groups:
-        candidate = found.solver.groups[group].candidate
+        candidate = model.solver.groups[group].candidate
         count = len(candidate.shape)
         if not count:
             continue
-        slopes = [_shape_derivative(found, group, which) for which in range(count)]
+        slopes = [_shape_derivative(model, group, which) for which in range(count)]
         for joint in extra:
             own = np.zeros((bench.observed.rows, count))
             if joint in candidate.rows:
@@ -73,19 +73,19 @@ def extend_with_shapes(found: FittedModel) -> ShapedFit:
             extra[joint] = np.hstack([extra[joint], own])
         places[group] = slice(start, start + count)
         start += count
-    rows = whitened_rows(found.columns, extra, fit, found.moments.lengths, found.noise, bench.observed)
-    spread = block_covariance(rows, prior_precision(found.solver, fit, start), bench.settings.guards.robust_variance)
-    return ShapedFit(found, spread, places)
+    rows = whitened_rows(model.columns, extra, fit, model.moments.lengths, model.noise, bench.observed)
+    spread = block_covariance(rows, prior_precision(model.solver, fit, start), bench.settings.guards.robust_variance)
+    return ShapedFit(model, spread, places)
 
 
-def _shape_derivative(found: FittedModel, group: int, which: int) -> Array:
+def _shape_derivative(model: FittedModel, group: int, which: int) -> Array:
     """Derivative of a group's filtered torque by one of its shapes, (rows, rows of the candidate)."""
-    candidate, values = found.solver.groups[group].candidate, found.solver.values(found.fit, group)
+    candidate, values = model.solver.groups[group].candidate, model.solver.values(model.fit, group)
     low, high = candidate.bounds[which]
     ends = []
     for sign in (1, -1):
         shape = list(candidate.shape)
         shape[which] = float(np.clip(shape[which] + sign * SHAPE_STEP * (high - low), low, high))
-        ends.append((shape[which], found.bench.block(candidate.with_shape(tuple(shape)), 0).values @ values))
+        ends.append((shape[which], model.design.block(candidate.with_shape(tuple(shape)), 0).values @ values))
     width = ends[0][0] - ends[1][0]
     return np.asarray((ends[0][1] - ends[1][1]) / (width or 1.0))

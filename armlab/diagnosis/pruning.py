@@ -42,56 +42,56 @@ def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
     return None
 
 
-def prune(found: FittedModel) -> Pruned:
+def prune(model: FittedModel) -> Pruned:
     """The round with the effects that pass, and the evidence of those and of the links that do (from 0).
 
     After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
     be its copy. Then the search looks once more, without the places that were withdrawn.
     """
-    steps = list(found.steps)
-    return _settle_links(found, _prune_and_search(found, found.state, frozenset(), steps), steps)
+    steps = list(model.steps)
+    return _settle_links(model, _prune_and_search(model, model.state, frozenset(), steps), steps)
 
 
 def _prune_and_search(
-    found: FittedModel, state: State, banned: frozenset[int], steps: list[Step], fixed: bool = False
+    model: FittedModel, state: State, banned: frozenset[int], steps: list[Step], fixed: bool = False
 ) -> _State:
     """What passes of a state, and of what the search finds once more. fixed: whether the links' widths stay."""
     for _ in range(MAX_CYCLES):
-        state, effects, banned = _remove_failing(found, state, banned, steps)
+        state, effects, banned = _remove_failing(model, state, banned, steps)
         known = fixed or state.widths is None
-        search = Search(found.solver, found.bench.settings.guards, known, len(state.widths or ()), banned)
+        search = Search(model.solver, model.design.settings.guards, known, len(state.widths or ()), banned)
         again = search.climb(state, steps)
         if again == state:
             return state, effects, banned
         state = again
-    return _remove_failing(found, state, banned, steps)
+    return _remove_failing(model, state, banned, steps)
 
 
-def withdraw(found: FittedModel, groups: frozenset[int], why: str) -> Pruned:
+def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
     """The same without some groups, and without what no longer passes; usual friction in the place of special laws."""
-    judge, steps = Judge(found, found.state), list(found.steps)
+    judge, steps = Judge(model, model.state), list(model.steps)
     for group in groups:
-        candidate = found.solver.groups[group].candidate
+        candidate = model.solver.groups[group].candidate
         steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
     back = {other for group in groups for other in judge.simpler(group)}
-    state = State(tuple(sorted(set(found.state.groups) - groups | back)), found.state.widths)
-    return _settle_links(found, _remove_failing(found, state, groups, steps), steps)
+    state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
+    return _settle_links(model, _remove_failing(model, state, groups, steps), steps)
 
 
-def _settle_links(found: FittedModel, passed: _State, steps: list[Step]) -> Pruned:
+def _settle_links(model: FittedModel, passed: _State, steps: list[Step]) -> Pruned:
     """With the links that pass; where they do not, all is tested and searched again with links as simulated."""
     state, effects, banned = passed
-    state, links = _test_links(found, state, steps)
+    state, links = _test_links(model, state, steps)
     if links is None:
-        state, effects, banned = _prune_and_search(found, state, banned, steps, fixed=True)
-    return replace(found, state=state, steps=tuple(steps)), effects, links or {}
+        state, effects, banned = _prune_and_search(model, state, banned, steps, fixed=True)
+    return replace(model, state=state, steps=tuple(steps)), effects, links or {}
 
 
-def _remove_failing(found: FittedModel, state: State, banned: frozenset[int], steps: list[Step]) -> _State:
+def _remove_failing(model: FittedModel, state: State, banned: frozenset[int], steps: list[Step]) -> _State:
     """The state without its failing effects, the weakest first; usual friction in the place of special laws."""
-    groups, settings = found.solver.groups, found.bench.settings
+    groups, settings = model.solver.groups, model.design.settings
     while True:
-        judge = Judge(found, state)
+        judge = Judge(model, state)
         effects = judge.effects()
         bad = {group: why for group, each in effects.items() if (why := reason_to_reject(each, settings)) is not None}
         if not bad:
@@ -109,7 +109,7 @@ def _remove_failing(found: FittedModel, state: State, banned: frozenset[int], st
 
 def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
     """The group that fails; usual friction beside a special law takes that law with it, if it is likelier alone."""
-    solver, state = judge.found.solver, judge.state
+    solver, state = judge.model.solver, judge.state
     joint = solver.groups[weakest].candidate.joint
     special = {each for each in state.groups if judge.simpler(each) and solver.groups[each].candidate.joint == joint}
     if not solver.groups[weakest].candidate.facts.usual or not special:
@@ -119,13 +119,13 @@ def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
     return {weakest} if solver.fit(state.minus(weakest)).score > solver.fit(plain).score else special
 
 
-def _test_links(found: FittedModel, state: State, steps: list[Step]) -> tuple[State, dict[int, Evidence] | None]:
+def _test_links(model: FittedModel, state: State, steps: list[Step]) -> tuple[State, dict[int, Evidence] | None]:
     """The state, and the links that may be claimed: those that pass alone, or the likeliest if they do together.
 
     They stay as wide as they were found as long as any passes: that they are off is no claim about each. None where
     they had to be brought back to the simulation.
     """
-    judge, settings = Judge(found, state), found.bench.settings
+    judge, settings = Judge(model, state), model.design.settings
     links = judge.links()
     if not links:
         return state, {}

@@ -46,32 +46,32 @@ class Profile:
         return 0.5 * float(towards @ np.linalg.pinv(left, rcond=1e-6, hermitian=True) @ towards)
 
 
-def refine_shapes(bench: DesignMatrix, noise: Noise, solver: Solver, state: State) -> dict[int, Block]:
+def refine_shapes(design: DesignMatrix, noise: Noise, solver: Solver, state: State) -> dict[int, Block]:
     """Blocks with better shapes for the state's groups that have any, by their number."""
     out = {}
     for group in state.groups:
         candidate = solver.groups[group].candidate
         if candidate.shape:
-            profile = _profile_without(bench, noise, solver, state.minus(group))
-            found = _search_shape(bench, noise, profile, bench.blocks[group])
+            profile = _profile_without(design, noise, solver, state.minus(group))
+            found = _search_shape(design, noise, profile, design.blocks[group])
             if found is not None:
                 out[group] = found
     return out
 
 
-def _profile_without(bench: DesignMatrix, noise: Noise, solver: Solver, rest: State) -> Profile:
-    fit, columns = solver.fit(rest), bench.columns
-    rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, bench.observed)
+def _profile_without(design: DesignMatrix, noise: Noise, solver: Solver, rest: State) -> Profile:
+    fit, columns = solver.fit(rest), design.columns
+    rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, design.observed)
     joints = range(columns.joints)
     return Profile(
         dict(zip(joints, rows.designs, strict=True)), dict(zip(joints, rows.errors, strict=True)), fit.inverse
     )
 
 
-def _search_shape(bench: DesignMatrix, noise: Noise, profile: Profile, block: Block) -> Block | None:
+def _search_shape(design: DesignMatrix, noise: Noise, profile: Profile, block: Block) -> Block | None:
 
     def whiten(matrix: Array, joint: int) -> Array:
-        return noise.white(matrix, joint, bench.observed, "identify")
+        return noise.white(matrix, joint, design.observed, "identify")
 
     to_shape, to_unit = _unit_cube_maps(block.candidate)
     best = (profile.gain(block, whiten), block)
@@ -79,7 +79,7 @@ def _search_shape(bench: DesignMatrix, noise: Noise, profile: Profile, block: Bl
     def loss(unit: Array) -> float:
         nonlocal best
         candidate = block.candidate.with_shape(to_shape(np.clip(unit, 0, 1)))
-        tried = bench.block(candidate, block.variant)
+        tried = design.block(candidate, block.variant)
         if not np.isfinite(tried.values).all():
             return 0.0
         gain = profile.gain(tried, whiten)

@@ -19,19 +19,19 @@ HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identifi
 UNKNOWN_LEVEL = 0.03  # of the test between stretches of time, after all surrogates that were tried
 
 
-def predict_residual_structure(found: FittedModel, noise: Noise) -> tuple[Structure, ...]:
+def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Structure, ...]:
     """What surrogates predict of each joint's residual, friction and offsets fitted that may not be claimed."""
-    usual = {number for number, unusual in enumerate(found.solver.unusual) if not unusual}
-    state = State(tuple(sorted({*found.state.groups, *usual})), found.state.widths)
-    residual = found.residual(found.solver.fit(state))
-    return tuple(_surest_structure(found, residual[:, joint], joint, noise) for joint in range(residual.shape[1]))
+    usual = {number for number, unusual in enumerate(model.solver.unusual) if not unusual}
+    state = State(tuple(sorted({*model.state.groups, *usual})), model.state.widths)
+    residual = model.residual(model.solver.fit(state))
+    return tuple(_surest_structure(model, residual[:, joint], joint, noise) for joint in range(residual.shape[1]))
 
 
-def _surest_structure(found: FittedModel, residual: Array, joint: int, noise: Noise) -> Structure:
+def _surest_structure(model: FittedModel, residual: Array, joint: int, noise: Noise) -> Structure:
     """What the surest surrogate predicts of a joint's residual (rows,), its p-value that of the best of all."""
-    observed = found.bench.observed
+    observed = model.design.observed
     few = feature_banks(observed, joint, observed.torque[:, joint] - residual)
-    tried = [find_structure(residual, joint, each, noise, observed) for each in (found.bench.features[joint], *few)]
+    tried = [find_structure(residual, joint, each, noise, observed) for each in (model.design.features[joint], *few)]
     best = min(tried, key=lambda each: (each.gain <= MIN_STRUCTURE_GAIN, each.p_value))
     return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
 
@@ -41,9 +41,9 @@ def is_structured(each: Structure) -> bool:
     return each.gain > MIN_STRUCTURE_GAIN and each.p_value < UNKNOWN_LEVEL
 
 
-def make_unknown_claim(found: FittedModel, each: Structure, residual: Array) -> Claim:
+def make_unknown_claim(model: FittedModel, each: Structure, residual: Array) -> Claim:
     """The finding `unknown` at a joint, with its surrogate's prediction."""
-    observed = found.bench.observed
+    observed = model.design.observed
     rows = rows_in(observed.of_role("validate", each.joint), observed.rows)
     before = float(np.sqrt(np.mean(residual[rows, each.joint] ** 2)))
     after = float(np.sqrt(np.mean((residual[rows, each.joint] - each.prediction[rows]) ** 2)))
