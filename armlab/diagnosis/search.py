@@ -188,13 +188,18 @@ class Search:
         """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
         bare, usual = state.minus(group), contained_groups(self.solver.groups, group)
         back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
-        own, free = self.solver.groups[group].candidate, bare
-        for other in bare.groups:  # one law may stand for all friction of a joint, and no part alone makes room for it
-            beside = self.solver.groups[other].candidate
-            usual_friction = all(each.facts.usual and each.facts.dissipates for each in (own, beside))
-            if usual_friction and beside.joint == own.joint:
+        free, friction = bare, self._usual_friction(state, self.solver.groups[group].candidate.joint)
+        if friction[:1] == [
+            group
+        ]:  # one law may stand for all friction of a joint, and no part alone makes room for it
+            for other in friction[1:]:
                 free = free.minus(other)
         return list(dict.fromkeys((bare, back, free)))
+
+    def _usual_friction(self, state: State, joint: int | None) -> list[int]:
+        """Groups of a joint's usual friction in a state, in the order of the library."""
+        facts = [(group, self.solver.groups[group].candidate) for group in state.groups]
+        return [group for group, each in facts if each.joint == joint and each.facts.usual and each.facts.dissipates]
 
     def _widths(self, state: State) -> Iterator[tuple[str, State]]:
         if self.fixed or state.widths is None:

@@ -208,7 +208,7 @@ class Backlash(Transmission):
 
     facts = BACKLASH_FACTS
     names = ("gap",)
-    closely = True
+    follows_closely = True
 
     @property
     def law(self) -> tuple[Twist, float]:
