@@ -118,7 +118,7 @@ def build_design_matrix(
 
 def _scene_of_run(signals: Signals, motion: Motion, simulation: Simulation, inertial: Array) -> Scene:
     bare = scene_of(signals.run, motion, simulation.arm)
-    return replace(bare, inertial=inertial, torque=simulation.torque(bare))
+    return replace(bare, inertial=inertial, torque=simulation.torque_in_mechanism(bare))
 
 
 def _is_usable(block: Block) -> bool:

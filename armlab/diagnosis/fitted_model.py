@@ -15,6 +15,7 @@ from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import Fit, Solver, State
 from armlab.diagnosis.surrogate import flexible_features, predict_structure
 from armlab.effects.contract import Family, Scene
+from armlab.effects.model import FittedEffect, torque_in_mechanism
 from problem.regressor import rigid_body_torque
 
 INITIAL_LINK_WIDTH = 0.08  # of the links' errors, for the first look
@@ -24,7 +25,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class FittedModel:
-    """A bench with its moments, and the state that was found on it."""
+    """A design with its moments, and the state that was found on it."""
 
     design: DesignMatrix
     noise: Noise
@@ -35,7 +36,7 @@ class FittedModel:
 
     @property
     def columns(self) -> Columns:
-        """The bench's."""
+        """The design's."""
         return self.design.columns
 
     @property
@@ -71,7 +72,7 @@ def initial_link_widths(design: DesignMatrix) -> Widths | None:
 
 
 def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, progress: Progress) -> FittedModel:
-    """Friction and links fitted, every candidate on the bench, and errors taken as coloured for the first time.
+    """Friction and links fitted, every candidate on the design, and errors taken as coloured for the first time.
 
     seed: of the surrogates' random waves.
     """
@@ -110,14 +111,17 @@ def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
     for number in range(SEARCH_ROUNDS):
         progress(f"searching, round {number + 1}")
         noise, known = fit_coloured_noise(model), model.state if number else None
-        bench, steps = _follow_model(model) if number else model.design, model.steps
+        design, steps = _follow_model(model) if number else model.design, model.steps
         del model  # its columns, before there are others
-        searched = _search_state(bench, noise, known, True, steps)
+        searched = _search_state(design, noise, known, True, steps)
         progress("fitting nonlinear parameters")
-        bench, steps = bench.with_blocks(refine_shapes(bench, noise, searched.solver, searched.state)), searched.steps
+        design, steps = (
+            design.with_blocks(refine_shapes(design, noise, searched.solver, searched.state)),
+            searched.steps,
+        )
         known = searched.state
         del searched
-        model = _fit_model(bench, noise, known, steps)
+        model = _fit_model(design, noise, known, steps)
     progress("searching, last round")
     return _search_state(model.design, fit_coloured_noise(model), model.state, False, model.steps)
 
@@ -161,35 +165,34 @@ def _fit_model(
 
 
 def _follow_model(model: FittedModel) -> DesignMatrix:
-    """The bench with columns that follow the model of a round."""
-    bench, fit = model.design, model.fit
+    """The design with columns that follow the model of a round."""
+    design, fit = model.design, model.fit
     inertial = inertial_parameters(model)
-    nominal = bench.simulation.inertial
+    nominal = design.simulation.inertial
     change = inertial if nominal is None else inertial - nominal
 
-    def torque(scene: Scene) -> Array:
-        out = bench.simulation.torque(scene) + rigid_body_torque(scene.arm, scene.motion, change)
-        for group in fit.state.groups:
-            candidate = model.solver.groups[group].candidate
-            if candidate.of_channel:  # acts on what is recorded, itself not included
-                continue
-            out[:, list(candidate.rows)] += candidate.columns(scene) @ model.solver.values(fit, group)
-        return out
+    chosen = [(model.solver.groups[group].candidate, model.solver.values(fit, group)) for group in fit.state.groups]
+    effects = [FittedEffect(candidate, values) for candidate, values in chosen]
 
-    return bench.with_model(inertial, torque)
+    def torque(scene: Scene) -> Array:
+        simulated = design.simulation.torque_in_mechanism(scene)
+        rigid = simulated + rigid_body_torque(scene.arm, scene.motion, change)
+        return torque_in_mechanism(effects, replace(scene, inertial=inertial, torque=rigid))
+
+    return design.with_model(inertial, torque)
 
 
 def inertial_parameters(model: FittedModel) -> Array:
     """Inertial parameters (10 * joints,) of the links of a round: the simulation's, and what they are off."""
-    bench, fit = model.design, model.fit
-    base = model.coefficients(fit)[: len(bench.base)]
-    nominal = bench.simulation.inertial
-    start = np.zeros(10 * len(bench.simulation.arm)) if nominal is None else nominal
-    if bench.prior is None or fit.state.widths is None:
+    design, fit = model.design, model.fit
+    base = model.coefficients(fit)[: len(design.base)]
+    nominal = design.simulation.inertial
+    start = np.zeros(10 * len(design.simulation.arm)) if nominal is None else nominal
+    if design.prior is None or fit.state.widths is None:
         change = np.zeros(len(start))
-        change[bench.base.columns] = base
+        change[design.base.columns] = base
         return np.asarray(start + change)
     if not any(fit.state.widths):
         return start
-    mean, _ = bench.prior.deviations(fit.state.widths, base, np.zeros((len(base), len(base))))
+    mean, _ = design.prior.deviations(fit.state.widths, base, np.zeros((len(base), len(base))))
     return np.asarray(start + mean)

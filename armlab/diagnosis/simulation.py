@@ -31,8 +31,14 @@ class Simulation:
 
     def torque(self, scene: Scene) -> Array:
         """Simulated torque of the motion of a scene, (samples, joints); zeros where there is no simulation."""
-        if self.model is not None:
-            return self.model.torque_in(scene)
+        return self._rigid_torque(scene) if self.model is None else self.model.torque_in(scene)
+
+    def torque_in_mechanism(self, scene: Scene) -> Array:
+        """The same without faults of the torque's channel, which act on what is recorded alone."""
+        return self._rigid_torque(scene) if self.model is None else self.model.torque_in_mechanism(scene)
+
+    def _rigid_torque(self, scene: Scene) -> Array:
+        """What the links and rotors of a robot file need."""
         out = np.zeros(scene.torque.shape)
         if self.inertial is not None:
             out = rigid_body_torque(self.arm, scene.motion, self.inertial)

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
-from armlab.effects.model import FittedEffect, torque_of_model
+from armlab.effects.model import FittedEffect, torque_in_mechanism, torque_of_model
 from armlab.effects.parameters import ParameterValue, parameter_values
 from armlab.effects.scene import Scene, instants, scene_of
 from armlab.identification.regression import signals_of
@@ -76,8 +76,15 @@ class TorqueModel:
 
     def torque_in(self, scene: Scene) -> Array:
         """Torque of the motion of a scene, (samples, joints), N m (N); the scene's links and torque do not matter."""
+        return torque_of_model(self.effects, self._rigid_scene(scene))
+
+    def torque_in_mechanism(self, scene: Scene) -> Array:
+        """The same without faults of the torque's channel."""
+        return torque_in_mechanism(self.effects, self._rigid_scene(scene))
+
+    def _rigid_scene(self, scene: Scene) -> Scene:
         rigid = rigid_body_torque(self.arm, scene.motion, self.links)
-        return torque_of_model(self.effects, replace(scene, inertial=self.links, torque=rigid))
+        return replace(scene, inertial=self.links, torque=rigid)
 
     def filtered_torque(self, signals: Signals) -> Array:
         """Torque that passed the filter of the recorded one, (kept, joints)."""

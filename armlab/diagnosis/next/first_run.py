@@ -2,7 +2,6 @@
 moments of all columns.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,6 +21,7 @@ from armlab.diagnosis.next.sampling import Sampling, Whitening, kept_columns
 from armlab.diagnosis.noise import fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
+from armlab.effects.model import FittedEffect, torque_in_mechanism
 from armlab.recordings.cutoff import acceleration_spectrum, noise_level
 from armlab.recordings.recording import Recording, Role
 from problem.arm import Arm
@@ -45,15 +45,8 @@ class PresentModel:
         if self.arm.rotor_inertia:
             torque = torque + np.asarray(self.arm.rotor_inertia) * motion.acceleration
         scene = Scene(run, time, motion, self.arm, self.inertial, torque)
-        scene = self._add_effects(scene, lambda candidate: not candidate.follows_model)
-        return self._add_effects(scene, lambda candidate: candidate.follows_model)
-
-    def _add_effects(self, scene: Scene, wanted: Callable[[Candidate], bool]) -> Scene:
-        torque = scene.torque.copy()
-        for candidate, values in self.parts:
-            if wanted(candidate):
-                torque[:, list(candidate.rows)] += candidate.columns(scene) @ values
-        return replace(scene, torque=torque)
+        effects = [FittedEffect(candidate, values) for candidate, values in self.parts]
+        return replace(scene, torque=torque_in_mechanism(effects, scene))
 
 
 @dataclass(frozen=True, eq=False)
