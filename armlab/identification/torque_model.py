@@ -1,5 +1,6 @@
 """A structure with values: predicts torque and tells its parameters with intervals; knows no files or pictures."""
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -128,6 +129,20 @@ class TorqueModel:
         if derivatives is not None:
             block = derivatives @ block @ derivatives.T
         return np.asarray(self.factor * np.sqrt(np.maximum(np.diag(block), 0)))
+
+    def __repr__(self) -> str:
+        """The robot, how many parameters of which components, and the cut-off of the identification."""
+        parts = Counter(part.effect for part in self.structure.components)
+        lines = [
+            f"{type(self).__name__} of {self.robot}; joints: {len(self.arm)}, base parameters: {len(self.base_values)}",
+            "  components: " + (", ".join(f"{count} {effect}" for effect, count in parts.items()) or "none"),
+        ]
+        if self.extras:
+            lines.append("  effects: " + ", ".join(each.told["effect"] for each in self.extras))
+        links = "physically consistent" if self.inertial is not None else "known by their base parameters"
+        intervals = "without intervals" if self.covariance is None else "with 95 % intervals"
+        cutoff = "" if self.cutoff_hz is None else f"; cut-off {self.cutoff_hz:.4g} Hz"
+        return "\n".join([*lines, f"  links {links}; {intervals}{cutoff}"])
 
     def __str__(self) -> str:
         """A table of all parameters."""
