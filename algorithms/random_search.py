@@ -15,7 +15,7 @@ from armlab.common.arrays import Array
 
 @dataclass(frozen=True)
 class RandomSearchParams:
-    """There is nothing to set."""
+    """No hyper-parameters."""
 
 
 @dataclass
