@@ -6,6 +6,7 @@ import sys
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -45,6 +46,20 @@ def test_an_unknown_name_is_an_attribute_error():
 
 def test_the_version_is_that_of_the_installed_package():
     assert armlab.__version__ == version("armlab")
+
+
+def test_a_function_of_ones_own_is_minimised_by_an_algorithm_of_any_name():
+    spso, rng = armlab.load_algorithm("spso"), np.random.default_rng(1)
+    box = armlab.Box(np.full(3, -1.0), np.full(3, 2.0))
+    start = rng.uniform(box.lower, box.upper, (10, 3))
+    result = armlab.minimise(spso, spso.Params(), lambda X: np.square(X).sum(axis=1), box, start, 500, rng)
+    assert result.best_fitness < 0.01
+    assert repr(result).startswith(f"Result: fitness {result.best_fitness:.6g}; 500 evaluations in 50 populations\n")
+
+
+def test_settings_of_a_problem_build_a_problem():
+    problem = armlab.parse_problem({"preset": "sphere"}, "my script").build()
+    assert problem.evaluate(problem.lower[None]).violation == 0.0
 
 
 def test_type_checkers_see_the_same_objects_as_users():
@@ -138,3 +153,20 @@ def test_objects_say_what_they_are_in_a_few_lines(recording, model):
     assert repr(found) == "Diagnosis of 'my-recording': inconclusive; claims: 0\n  The runs are too short."
     for each in (recording, model, found, recording.arm):
         assert len(repr(each).splitlines()) <= 6
+
+
+def test_a_diagnosis_and_a_comparison_name_effects_with_their_places(recording):
+    claims = [SimpleNamespace(effect="viscous_friction", joint=joint, equation=f"tau_{joint}") for joint in range(1, 6)]
+    claims.append(SimpleNamespace(effect="time_delay", joint=None, equation="tau(t)"))
+    found = Diagnosis(recording, None, "mismatch", "The simulation misses much.", claims=tuple(claims))
+    assert repr(found).splitlines()[:2] == [
+        "Diagnosis of 'my-recording': mismatch; claims: 6",
+        "  viscous_friction@1: tau_1",
+    ]
+    assert repr(found).splitlines()[-1] == "  and 2 more claims"
+    compared = armlab.Comparison("changed", found, found, found, (SimpleNamespace(changed=True),))
+    assert "1 of 1 parameters changed" in repr(compared)
+    assert repr(compared).endswith("viscous_friction@5, time_delay")
+    assert repr(armlab.Comparison("inconclusive", found, found, reason="Too short.")).endswith(
+        "inconclusive\n  Too short."
+    )
