@@ -1,11 +1,10 @@
-"""Does an algorithm keep the promises of `algorithms.contract`? A broken one is named in a sentence.
+"""Tests whether an algorithm keeps the promises of `algorithms.contract`, and names a broken one in a sentence.
 
     from algorithms.check import check_algorithm
     check_algorithm(MyAlgorithm)
 
-It passes in silence, or raises BrokenPromiseError at the first promise that is broken.
-
-Algorithms are watched on small problems, whose objectives and recorded steps stand here too.
+It returns nothing if all promises are kept, and raises BrokenPromiseError at the first one that is broken. The
+algorithm runs on small problems, whose objectives are defined here too.
 """
 
 import dataclasses
@@ -25,7 +24,7 @@ BetweenCalls = Callable[[Any, list[Array]], Any]
 
 
 class Game(NamedTuple):
-    """A problem and how long it is played; the first population counts as a step."""
+    """A problem and the number of steps that an algorithm runs on it; the first population counts as a step."""
 
     objective: Callable[[Array], Array]
     points: int = 8
@@ -47,7 +46,6 @@ class Step(NamedTuple):
 
 
 def do_nothing(state: Any, arrays: list[Array]) -> Any:
-    """Do nothing between the calls."""
     return state
 
 
@@ -59,7 +57,7 @@ def play(algorithm: AnyAlgorithm, game: Game, seed: int = 1, between: BetweenCal
 def play_steps(
     algorithm: AnyAlgorithm, game: Game, rng: np.random.Generator, between: BetweenCalls = do_nothing
 ) -> Iterator[Step]:
-    """Step by step; `between` may swap the state and spoil the caller's arrays after every call."""
+    """Step by step; `between` may replace the state and overwrite the caller's arrays after every call."""
     box, population = search_box(game), first_population(game)
     state = algorithm.init(algorithm.Params(), population, box, game.horizon, rng)
     state = between(state, [population])
@@ -79,7 +77,7 @@ def play_steps(
 
 
 def search_box(game: Game) -> Box:
-    """Neither centred nor of equal widths."""
+    """A box that is not centred and has unequal widths."""
     lower = np.linspace(-1.0, -2.0, game.dimensions)
     return Box(lower, lower + np.linspace(2.5, 4.0, game.dimensions))
 
@@ -174,7 +172,7 @@ def check_occasion(algorithm: AnyAlgorithm, occasion: str) -> None:
 
 
 def check_points(algorithm: AnyAlgorithm, occasion: str, game: Game, steps: list[Step]) -> None:
-    """The first population first, and then one point or more in the same dimensions, all finite."""
+    """It asks for the first population first, then for one or more points of the same dimension, all finite."""
     for k, step in enumerate(steps):
         shaped = step.asked.ndim == 2 and step.asked.shape[1] == game.dimensions and len(step.asked) > 0
         found = f"shape {step.asked.shape} and type {step.asked.dtype}"
@@ -190,7 +188,7 @@ def check_points(algorithm: AnyAlgorithm, occasion: str, game: Game, steps: list
 
 
 def check_incumbent(algorithm: AnyAlgorithm, occasion: str, steps: list[Step]) -> None:
-    """After the last of these steps the incumbent is a told point, and no loss unless all are."""
+    """After the last of these steps the incumbent is a point that was told, with finite fitness if any was finite."""
     X, fitness = np.concatenate([s.X for s in steps]), np.concatenate([s.fitness for s in steps])
     point, value = steps[-1].incumbent, steps[-1].incumbent_fitness
     when = f"after step {len(steps) - 1}, {occasion}"
@@ -203,7 +201,7 @@ def check_incumbent(algorithm: AnyAlgorithm, occasion: str, steps: list[Step]) -
 
 
 def check_sharing(algorithm: AnyAlgorithm, game: Game) -> None:
-    """Neither side sees what the other does to its arrays after a call."""
+    """A change that one side makes to its arrays after a call does not reach the other side."""
     with _name_crashes(algorithm, "when the caller overwrites arrays that are its own"):
         overwritten = play(algorithm, game, between=_overwrite_arrays)
     problem = "keeps the caller's arrays or gives away its own: its path changes when they are overwritten"
@@ -211,7 +209,7 @@ def check_sharing(algorithm: AnyAlgorithm, game: Game) -> None:
 
 
 def check_randomness(algorithm: AnyAlgorithm, game: Game) -> None:
-    """The path follows from the generator that was given, and nothing is shared between two runs."""
+    """The path depends on the given generator alone, and two runs share nothing."""
     alone = play(algorithm, game)
     _demand(
         _same_path(alone, play(algorithm, game)), algorithm, "takes another path when it gets the same generator again"

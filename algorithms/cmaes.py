@@ -1,22 +1,36 @@
 """CMA-ES from the package `cmaes`, as a yardstick: with the population size of the swarm, and with restarts (IPOP).
 
-Neither is part of the paper. A state around the package's optimiser can be pickled and resumed.
+Neither is part of the paper. One generation of lambda points x_k, sorted by fitness, with mean m, step size s and
+covariance matrix C (Hansen 2016; the package names the same equations in its source):
 
-`cma-es` (Hansen 2016, arXiv 1604.00772): coordinates are normalised by the box, since the first step size is one
-number. The first population is told as the first generation of a distribution at the centre of the box with the
-spread of uniform points, 1 / sqrt(12) of the width; from then on populations of the same size are drawn. Points that
-the bound policy moved are told where they are. It is finished when the package's own stopping tests say so.
+    x_k = m + s y_k,   y_k from N(0, C)                                           eq. 38-40
+    y_w = sum_(i <= mu) w_i y_i,   m <- m + s y_w                                 eq. 41-42
+    p_s <- (1 - c_s) p_s + sqrt(c_s (2 - c_s) mu_eff) C^(-1/2) y_w                eq. 43
+    s <- s exp(c_s / d_s (||p_s|| / E||N(0, I)|| - 1))                            eq. 44
+    p_c <- (1 - c_c) p_c + h sqrt(c_c (2 - c_c) mu_eff) y_w                       eq. 45
+    w_i' = w_i if w_i >= 0, else w_i d / ||C^(-1/2) y_i||^2                       eq. 46
+    C <- (1 + c_1 (1 - h) c_c (2 - c_c) - c_1 - c_mu sum w_i) C + c_1 p_c p_c^T + c_mu sum_i w_i' y_i y_i^T   eq. 47
 
-`ipop-cma-es` (Auger and Hansen 2005, doi 10.1109/CEC.2005.1554902): restarts with doubled populations.
+h is 0 while ||p_s|| is large, else 1; weights and rates are the defaults of eq. 48-58, which depend on lambda and on
+the number of dimensions d alone. A state around the package's optimiser can be pickled and resumed. In both
+algorithms coordinates are normalised by the box, since the first step size is one number.
 
-Form: the package `cmaes` searches in coordinates normalised by the box, with the population size 4 + 3 ln d that
-it recommends, until its own stopping tests say that it is over; then it begins anew at a uniform point with twice
-the population, for ever. The first population, whatever its size, is a random search for the first mean: its best
-point. Points that the bound policy moved are told where they are; all others exactly as the package drew them, since
-small populations leave eigenvalues equal, and rounding that depends on the place of the box would choose the vectors.
+`cma-es`: lambda is the swarm size. The first population is told as the first generation of a distribution at the
+centre of the box with the spread of uniform points, s = 1 / sqrt(12) of the width; from then on populations of the
+same size are drawn. Points that the bound policy moved are told where they are. It is finished when the package's
+own stopping tests say so.
 
-How peers differ: Auger and Hansen start every run with half of the width of the box as step size, here 0.3 of it
-(within the advice of Hansen 2016, arXiv 1604.00772); pycma's `fmin2(restarts=...)` resamples points outside.
+`ipop-cma-es` (Auger and Hansen 2005): lambda = 4 + floor(3 ln d) (eq. 48) until the package's stopping tests say that
+the search is over; then it begins anew at a uniform point with
+
+    lambda <- 2 lambda,
+
+for ever. The first population, whatever its size, is a random search for the first mean: its best point. Points that
+the bound policy moved are told where they are. All others are told exactly as the package drew them: small
+populations leave eigenvalues equal, and rounding that depends on the place of the box would choose the vectors.
+
+How peers differ: Auger and Hansen 2005 start every run with half of the width of the box as step size, here 0.3 of it
+(within the advice of Hansen 2016); pycma's `fmin2(restarts=...)` resamples points outside.
 """
 
 import math

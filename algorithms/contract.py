@@ -1,4 +1,4 @@
-"""What an algorithm promises, and what it may rely on (ask and tell, one population at a time).
+"""The contract of algorithms: ask and tell, one population at a time.
 
     state = algorithm.init(params, population, box, horizon, rng)
     while not algorithm.finished(state):

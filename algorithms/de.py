@@ -1,9 +1,17 @@
-"""Differential evolution, DE/rand/1/bin (Storn and Price 1997, doi 10.1023/A:1008202821328).
+"""Differential evolution, DE/rand/1/bin (Storn and Price 1997).
 
-Form: mutant v = x_r1 + F (x_r2 - x_r3) with r1, r2, r3 different from each other and from the target;
-binomial crossover with rate CR, one coordinate always the mutant's; all trials are built from one
-generation, and a trial replaces its target if it is not worse. F = 0.85 and CR = 1 are Table 2's; with CR = 1
-the trial is the mutant.
+Update of target x_i in coordinate j:
+
+    v_i = x_r1 + F (x_r2 - x_r3)                                                  mutant
+    u_ij = v_ij if rand_ij < CR or j = j_i, else x_ij                             trial
+    x_i(t + 1) = u_i if f(u_i) <= f(x_i), else x_i                                selection
+
+with r1, r2, r3 and i all different, rand_ij uniform in [0, 1), drawn anew for every target and coordinate, and the
+coordinate j_i drawn once a target. All trials are built from one generation. F = 0.85 and CR = 1 are Table 2's; with
+CR = 1 the trial is the mutant.
+
+Where this differs from the source: there a trial has to be better than its target; here it is enough that it is not
+worse, so the population can move on a plateau.
 
 How peers differ: scipy defaults to best/1/bin with dithered F, updates at once and polishes the end; pygmo
 defaults to rand/1/exp; mealpy has F = 0.1 and no forced coordinate; pymoo adds polynomial mutation.
@@ -71,6 +79,7 @@ class DE:
 
 
 def _build_trials(state: DEState) -> Array:
+    """Trials u = v or x of all targets (n, d), with v = x_r1 + F (x_r2 - x_r3)."""
     X, params = state.population, state.params
     r1, r2, r3 = distinct_others(len(X), state.rng)
     mutants = X[r2]

@@ -83,6 +83,13 @@ class Result:
     present_best: Array
     final_state: Any
 
+    def __repr__(self) -> str:
+        point = np.array2string(self.best_x, precision=4, threshold=8, edgeitems=3)
+        return (
+            f"Result: fitness {self.best_fitness:.6g}; {self.evaluations} evaluations in {len(self.best_so_far)} "
+            f"populations\n  best point, {len(self.best_x)} dimensions: {point}"
+        )
+
 
 def planned_iterations(evaluations: int, swarm_size: int) -> int:
     """The horizon: populations that fit into the budget after the first one."""

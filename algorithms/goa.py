@@ -1,13 +1,20 @@
-"""Grasshopper optimisation (Saremi, Mirjalili and Lewis 2017, doi 10.1016/j.advengsoft.2017.01.004).
+"""Grasshopper optimisation algorithm (Saremi, Mirjalili and Lewis 2017).
 
-Form: eq. 2.7 of that paper in all coordinates at once, the whole swarm moved together; the social force s of
-eq. 2.3 with f = 0.5 and l = 1.5; c of eq. 2.8 falls linearly and reaches its last value at the last planned
-iteration; the target is the best point so far. It draws no random numbers: all chance is in the first
-population.
+Update of grasshopper i in coordinate d; T is the target, the best point so far, lb and ub are the limits of the box:
 
-Eq. 2.3 takes distances as plain numbers, so the coordinates are normalised by the box inside this file: a
-difference between 0 and the width of the box becomes a distance between 1 and 4, the interval that the paper
-names, and unit vectors are those of the normalised coordinates. So the units do not matter.
+    x_i^d = c sum_(j != i) c (ub_d - lb_d) / 2 s(r_ij^d) (x_j^d - x_i^d) / d_ij + T^d     eq. 2.7
+    s(r) = f exp(-r / l) - exp(-r),   f = 0.5, l = 1.5                                    eq. 2.3
+    c = c_max - t (c_max - c_min) / horizon,   c_max = 1, c_min = 4e-5 (Table 2)          eq. 2.8
+
+The whole swarm moves together. It draws no random numbers: all chance is in the first population.
+
+Where this differs from the source: there r_ij^d = |x_j^d - x_i^d| is a plain number, so the units of the coordinates
+matter, and the source maps distances into [1, 4] without an equation. Here coordinates are normalised by the box,
+u = (x - lb) / (ub - lb), and
+
+    r_ij^d = 1 + 3 |u_j^d - u_i^d|,   (x_j^d - x_i^d) / d_ij  becomes  (u_j^d - u_i^d) / ||u_j - u_i||,
+
+so that the units do not matter. Two grasshoppers at one point exert no force on each other.
 
 How peers differ: the authors' MATLAB works on pairs of coordinates and wraps distances into [2, 4) by a
 remainder; mealpy multiplies by an extra normal number.
@@ -77,6 +84,7 @@ class GOA:
 
 
 def _hop(state: GOAState) -> Array:
+    """New positions (n, d): c^2 (ub - lb) / 2 times the social forces, from the target (eq. 2.7)."""
     params, width = state.params, state.box.upper - state.box.lower
     progress = min(state.iteration / max(state.horizon, 1), 1.0)
     c = params.first_c - progress * (params.first_c - params.last_c)  # eq. 2.8
@@ -86,7 +94,7 @@ def _hop(state: GOAState) -> Array:
 
 
 def social_forces(U: Array, params: GOAParams) -> Array:
-    """The sum over the others in eq. 2.7, in normalised coordinates, (n, d) -> (n, d).
+    """sum_j s(r_ij) (u_j - u_i) / ||u_j - u_i|| of eq. 2.7, in normalised coordinates, (n, d) -> (n, d).
 
     A few grasshoppers at a time against all, so that the pairs stay in the processor's cache.
     """

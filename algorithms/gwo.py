@@ -1,8 +1,19 @@
-"""Grey wolf optimizer (Mirjalili, Mirjalili and Lewis 2014, doi 10.1016/j.advengsoft.2013.12.007).
+"""Grey wolf optimizer (Mirjalili, Mirjalili and Lewis 2014).
 
-Form: eq. 3.1-3.7 of that paper with vectors A and C, fresh for every wolf, leader and coordinate; alpha, beta
-and delta are the three best points so far; every wolf moves, better or not. a falls linearly from 2 at the
-first move to 2 / horizon at the last, as in the authors' code: with a = 0 all wolves would land on one point.
+Update of a wolf at X; the leaders X_k, k = 1, 2, 3 (alpha, beta, delta), are the three best points so far:
+
+    A_k = 2 a r1 - a,   C_k = 2 r2                                                eq. 3.3, 3.4
+    D_k = |C_k X_k - X|                                                           eq. 3.5
+    X_k' = X_k - A_k D_k                                                          eq. 3.6
+    X(t + 1) = (X_1' + X_2' + X_3') / 3                                           eq. 3.7
+
+with r1 and r2 uniform in [0, 1), drawn anew for every wolf, leader and coordinate. Eq. 3.5-3.7 are eq. 3.1-3.2 for
+three leaders. Every wolf moves, better or not. The source lets a fall linearly from 2 to 0; here
+
+    a = 2 (1 - (t - 1) / horizon),   t = 1 ... horizon,
+
+2 at the first move and 2 / horizon at the last, as in the authors' code: with a = 0 all wolves would stand on one
+point.
 
 It is drawn to the origin of coordinates, since C multiplies a position: a property of the equations.
 
@@ -70,6 +81,7 @@ class GWO:
 
 
 def _hunt(state: GWOState) -> None:
+    """Move all wolves in place: X = mean over the leaders of X_k - A_k |C_k X_k - X| (eq. 3.3-3.7)."""
     X, leaders = state.position, state.leaders.position[:, None, :]
     a = state.params.first_a * max(1.0 - (state.iteration - 1) / max(state.horizon, 1), 0.0)
     A, D = state.rng.random((2, 3, *X.shape))  # r1, r2: (leader, wolf, coordinate)

@@ -17,12 +17,12 @@ class Leaders:
 
 
 def no_leaders(population: Array, k: int) -> Leaders:
-    """Before any evaluation the first points stand in: if all are losses, there is a point to follow."""
+    """The first k points with fitness +inf, so that there is a point to follow even if every fitness is a loss."""
     return Leaders(population[np.arange(k) % len(population)], np.full(k, np.inf))
 
 
 def promote(leaders: Leaders, X: Array, fitness: Array) -> None:
-    """Let better points of X (n, d) take the lead and demote the others; the older of equals stays."""
+    """Keep the k best of leaders and X (n, d), in order; of equals the older one stays."""
     candidates = np.concatenate((leaders.fitness, as_loss(fitness)))
     order = candidates.argsort(kind="stable")[: len(leaders.fitness)]
     leaders.fitness = candidates[order]

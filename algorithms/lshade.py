@@ -1,13 +1,24 @@
-"""L-SHADE (Tanabe and Fukunaga 2014, doi 10.1109/CEC.2014.6900380), the root of most winners of later contests.
+"""L-SHADE (Tanabe and Fukunaga 2014), the root of most winners of later contests.
 
-Form: current-to-pbest/1/bin with an archive,
+Update of target x_i of a population of N points, current-to-pbest/1/bin with an archive:
 
-    v = x_i + F (x_pbest - x_i) + F (x_r1 - x_r2),    x_r1 of the population, x_r2 of population and archive,
+    CR_i = normal(M_CR[r_i], 0.1) cut to [0, 1],  F_i = Cauchy(M_F[r_i], 0.1), again if <= 0, cut to 1       eq. 1-2
+    v_i = x_i + F_i (x_pbest - x_i) + F_i (x_r1 - x_r2)                                                      eq. 3
+    u_ij = v_ij if rand_ij < CR_i or j = j_i, else x_ij                                                      eq. 5
+    x_i <- u_i if f(u_i) <= f(x_i), else x_i                                                                 eq. 6
+    M_F[k], M_CR[k] <- sum_i w_i S_i^2 / sum_i w_i S_i,  w_i = gain_i / sum gain                             eq. 7-9
+    N <- round(N_first + (4 - N_first) evaluations / planned evaluations)                                    eq. 10
 
-F and CR drawn about a memory of what succeeded, and a population that shrinks linearly with the evaluations to 4
-at the end of the horizon. The constants are the authors': H = 6, p = 0.11, archive 2.6 times the population. They
-start with 18 d points; here the first population is what is given. Points outside are for the bound policy; the
-authors put a coordinate half-way between the target and the bound.
+with r_i one of the H entries of the memory M; x_pbest one of the best round(p N) points, of two at least; x_r1 of the
+population and x_r2 of population and archive, with i, r1 and r2 all different; rand_ij and j_i as in `algorithms.de`.
+S are the F_i or CR_i of the trials that are better than their targets, gain_i = f(x_i) - f(u_i). Each generation with
+such a trial replaces the next entry k; an M_CR[k] for which all S are 0 stays 0 from then on. Targets that were beaten
+go to the archive, chance takes from it what is above 2.6 N points, and the worst points leave the population. H = 6,
+p = 0.11 and 2.6 are the authors' constants.
+
+Where this differs from the source: the authors start with 18 d points, here the first population is what is given;
+eq. 4 puts a coordinate outside half-way between target and bound, here the bound policy moves it; a gain out of a
+fitness that is not finite counts as much as the largest finite one.
 """
 
 from dataclasses import dataclass, field
@@ -34,13 +45,13 @@ class SuccessHistory:
     place: int = 0
 
     def rates(self, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-        """Scaling factors and crossover rates for n points, (n,) each (Tanabe 2013, eq. 8-9)."""
+        """Scaling factors and crossover rates for n points, (n,) each (eq. 1-2)."""
         entry = (rng.random(n) * len(self.scaling)).astype(np.intp)
         rates = self.crossover[entry] + MEMORY_SPREAD * ndtri(rng.random(n))
         return _draw_scaling_factors(self.scaling[entry], rng), np.clip(np.nan_to_num(rates, nan=0.0), 0.0, 1.0)
 
     def learn(self, scaling: Array, crossover: Array, gain: Array) -> None:
-        """Replace an entry by the means of what succeeded, (k,) each, weighted by the gain in fitness."""
+        """Replace an entry by the means of what succeeded, (k,) each, weighted by the gain in fitness (eq. 7-9)."""
         if not len(gain):
             return
         weights = _finite_gains(gain) / _finite_gains(gain).sum()
@@ -51,7 +62,7 @@ class SuccessHistory:
 
 
 def lehmer_mean(values: Array, weights: Array) -> float:
-    """Sum of weighted squares over the weighted sum (Tanabe 2014, eq. 7)."""
+    """Sum of weighted squares over the weighted sum (eq. 7)."""
     return float((weights * values**2).sum() / (weights * values).sum())
 
 
@@ -84,7 +95,7 @@ class LSHADEParams:
 
 @dataclass
 class LSHADEState:
-    """first_size, evaluations, planned: for the shrinking. scaling, crossover (n,): of the trials that were asked."""
+    """first_size, evaluations, planned: for eq. 10. scaling, crossover (n,): F_i and CR_i of the trials asked for."""
 
     params: LSHADEParams
     population: Array
@@ -144,6 +155,7 @@ class LSHADE:
 
 
 def _build_trials(state: LSHADEState) -> Array:
+    """Trials u of all targets (n, d), eq. 3 and 5."""
     X, rng = state.population, state.rng
     n, d = X.shape
     place = np.floor(rng.random(n) * _best_count(state)).astype(np.intp)

@@ -1,18 +1,32 @@
 """MuPSO: a particle swarm whose whole swarm mutates when it stagnates (the paper's eq. 1-8 and Table 2).
 
-Form: inertia weight w (eq. 3) and social coefficient c2 (eq. 4) geometric in the iteration number, so that
-both reach their last value at the last planned iteration; a counter q of stagnant iterations (eq. 5-6); at
-q >= Q the whole swarm is drawn anew (eq. 7-8), at rest, its personal bests and its global best forgotten,
-while the schedules run on.
+Update of a particle with position x, velocity v and personal best p; g is the global best, `it` the number of
+populations that the algorithm was told, `horizon` the planned iterations:
+
+    v(it + 1) = w_it v(it) + c1 r1 (p - x(it)) + c2_it r2 (g - x(it))             eq. 2
+    x(it + 1) = x(it) + v(it + 1)                                                 eq. 1
+    w_it  = 2.1 n^it,    n = (0.6 / 2.1)^(1 / horizon)                            eq. 3
+    c2_it = 1.8 / m^it,  m = (1.8 / 3.9)^(1 / horizon)                            eq. 4
+
+so that both schedules reach their last value at the last planned iteration; c1 = 2.24. Stagnation of the global
+best F:
+
+    e_it = F_(it-1) - F_it                                                        eq. 5
+    q = q + 1 if e_(it-1) - e_it < E, else 0                                      eq. 6
+    at q >= Q: end if F <= E; draw the whole swarm anew if F > 1e-3               eq. 7
+    x = uniform in the box                                                        eq. 8
+
+with E = 1e-8 and Q = 10. After eq. 8 the particles are at rest, their personal bests and their global best are
+forgotten, q and e are 0, and the schedules run on.
 
 What the paper leaves open, and how it is read here:
-- Fitness in eq. 5-7 is that of the swarm's present global best, which a mutation forgets.
-- Eq. 6 is literal by default: q counts while e_(it-1) - e_it < E, so an iteration whose improvement grows
-  counts as stagnant too. `stagnation="no_improvement"` counts while e_it < E. The error before a swarm's
-  first step is 0.
-- Eq. 7 names nothing for E < Fitness <= 1e-3 at q >= Q: the swarm then flies on as it is.
-- No speed limit is named, but w > 1 makes the swarm explode without one: half of the box width, Vmax = Xmax,
-  which Shi and Eberhart (1998) advise together with a weight that falls in time; the same as in SPSO here.
+- F in eq. 5-7 is that of the swarm's present global best, which a mutation forgets.
+- Eq. 6 is literal by default: an iteration whose improvement grows counts as stagnant too.
+  `stagnation="no_improvement"` counts while e_it < E. The error before a swarm's first step is 0.
+- Eq. 7 names nothing for E < F <= 1e-3 at q >= Q: the swarm then flies on as it is.
+- No speed limit is named, but w > 1 makes the swarm explode without one. Here it is half of the box width,
+  Vmax = Xmax, which Shi and Eberhart 1998b advise together with a weight that falls in time. It is the same in SPSO.
+- Speeds at the start, walls and the order of updates: as in `algorithms.spso`.
 No other package has this algorithm; `algorithms.spso` says how particle swarms differ.
 """
 
@@ -98,6 +112,7 @@ class MuPSO:
 
 
 def _fly(state: MuPSOState) -> None:
+    """Eq. 1-2 with w and c2 of the iteration (eq. 3-4)."""
     params = state.params
     progress = min(state.iteration / max(state.horizon, 1), 1.0)
     w = _geometric_schedule(params.first_inertia, params.last_inertia, progress)  # eq. 3
@@ -111,6 +126,7 @@ def _geometric_schedule(first: float, last: float, progress: float) -> float:
 
 
 def _count_stagnation(state: MuPSOState) -> None:
+    """Eq. 5-6, after a population was told."""
     fitness = global_best(state.swarm)[1]
     if state.fitness is not None:
         error = 0.0 if fitness == state.fitness else state.fitness - fitness  # eq. 5; inf - inf is no progress
@@ -130,6 +146,7 @@ def _must_mutate(state: MuPSOState) -> bool:
 
 
 def _mutate(state: MuPSOState) -> None:
+    """Draw the whole swarm anew, at rest; it remembers nothing (eq. 8)."""
     position = uniform_points(len(state.swarm.position), state.box, state.rng)  # eq. 8
     state.swarm = new_swarm(position, state.box, state.params.velocity_limit)
     state.fitness, state.fitness_error, state.q = None, 0.0, 0

@@ -1,4 +1,4 @@
-"""What an algorithm does to a problem that is only moved, only scaled, or only noise: facts, not verdicts.
+"""Measured properties of an algorithm: its path on a problem that is moved or scaled, its ends on pure noise.
 
 All runs have 50 points, 30 iterations (1,550 evaluations) and default parameters.
 """
@@ -34,7 +34,7 @@ class Properties:
 def measure_properties(
     algorithm: AnyAlgorithm, repetitions: int = 40, seed: int = 0, bounds: str = "clip"
 ) -> Properties:
-    """All facts about an algorithm, from two runs a path and so many repetitions on noise."""
+    """All properties of an algorithm, from two runs a path and so many repetitions on noise."""
     best = best_points_on_noise(algorithm, repetitions, seed, bounds)
     return Properties(
         translation=path_deviation(algorithm, offset=5.0, factor=1.0, seed=seed, bounds=bounds),
@@ -45,7 +45,7 @@ def measure_properties(
 
 
 def path_deviation(algorithm: AnyAlgorithm, offset: float, factor: float, seed: int, bounds: str) -> float:
-    """How far the path leaves its own after x -> factor * x + offset of box, population and objective."""
+    """Largest deviation of the path after x -> factor * x + offset of box, population and objective."""
     here = evaluated_points(algorithm, 1.0, 0.0, seed, bounds)
     there = evaluated_points(algorithm, factor, offset, seed, bounds)
     width = REFERENCE_BOX.upper - REFERENCE_BOX.lower
@@ -69,7 +69,7 @@ def evaluated_points(algorithm: AnyAlgorithm, factor: float, offset: float, seed
 
 
 def best_points_on_noise(algorithm: AnyAlgorithm, repetitions: int, seed: int, bounds: str) -> Array:
-    """The best point of each run on an objective that is nothing but chance, in [0, 1]^d (repetitions, d)."""
+    """The best point of each run on an objective of pure noise in [0, 1]^d, (repetitions, d)."""
     runs = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(repetitions))
     return np.array([_best_point_on_noise(algorithm, rng, bounds) for rng in runs])
 

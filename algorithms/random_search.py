@@ -1,4 +1,8 @@
-"""Random search: every population is drawn uniformly in the box; the yardstick that a search has to beat."""
+"""Random search: the yardstick that a search has to beat.
+
+Every point of every population is drawn anew, x = lb + r (ub - lb) with r uniform in [0, 1) for every coordinate; lb
+and ub are the limits of the box. No point learns from another.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +15,7 @@ from armlab.common.arrays import Array
 
 @dataclass(frozen=True)
 class RandomSearchParams:
-    """There is nothing to set."""
+    """No hyper-parameters."""
 
 
 @dataclass

@@ -1,8 +1,8 @@
 """Algorithms by name: built-in ones, and third parties' of the entry-point group `armlab.algorithms`.
 
-Beside them stand peers: other packages' algorithms, for comparison, which need the extra `peers`.
+There are also peers for comparison: algorithms of other packages, which need the extra `peers`.
 
-Names are found without importing anything, so a broken plug-in troubles only those who ask for it.
+Names are found without importing anything, so a broken plug-in raises an error only where its name is used.
 """
 
 from difflib import get_close_matches

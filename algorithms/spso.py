@@ -1,20 +1,25 @@
 """Standard particle swarm: global best, constant inertia weight, with the constants of Table 2.
 
-Form: eq. 1-2 with w = 0.72, c1 = c2 = 1.45. That is the constriction form of Clerc and Kennedy (2002),
-written with an inertia weight, near its usual constants chi = 0.7298 and chi * 2.05 = 1.4962. The speed limit
-is half of the box width, Vmax = Xmax, as Eberhart and Shi (2000) advise beside constriction;
-the list below names the other choices.
+Update of a particle with position x, velocity v and personal best p; g is the global best (the paper's eq. 1-2;
+Kennedy and Eberhart 1995 with the inertia weight of Shi and Eberhart 1998a):
 
-How peers differ: pygmo defaults to a ring of neighbours (local best) with constriction; mealpy moves a
-particle only if the new place is better; NiaPy sets w = 1; pymoo adapts its constants; evosax knows no
-bounds.
+    v(t + 1) = w v(t) + c1 r1 (p - x(t)) + c2 r2 (g - x(t))            eq. 2
+    x(t + 1) = x(t) + v(t + 1)                                         eq. 1
 
-MuPSO moves the same swarm. What the equations leave open, one way for both:
+with r1 and r2 uniform in [0, 1), drawn anew for every particle and coordinate, and w = 0.72, c1 = c2 = 1.45
+(Table 2). This is the constriction form of Clerc and Kennedy 2002 written with an inertia weight, near its usual
+constants chi = 0.7298 and 2.05 chi = 1.4962.
+
+What the equations leave open, one way for SPSO and MuPSO:
 - velocities start at zero (Engelbrecht 2012);
-- a velocity is limited, coordinate by coordinate, to a fraction of the width of the box;
-- a coordinate that the bound policy moved loses its velocity (Clerc's Standard PSO 2007; "absorbing wall",
-  Robinson and Rahmat-Samii 2004), or the particle would push against the wall from then on;
+- between eq. 2 and eq. 1 a velocity is limited, coordinate by coordinate, to a fraction of the width of the box:
+  one half, Vmax = Xmax, as Eberhart and Shi 2000 advise beside constriction;
+- a coordinate that the bound policy moved loses its velocity (Clerc 2012, the form of 2007; the "absorbing wall" of
+  Robinson and Rahmat-Samii 2004), because the particle would push against the wall from then on;
 - the swarm moves as one: all bests are updated after the whole population is evaluated.
+
+How peers differ: pygmo defaults to a ring of neighbours (local best) with constriction; mealpy moves a particle only
+if the new place is better; NiaPy sets w = 1; pymoo adapts its constants; evosax has no bounds.
 """
 
 from dataclasses import dataclass
@@ -47,7 +52,7 @@ def new_swarm(position: Array, box: Box, velocity_limit: float) -> Swarm:
 
 
 def fly(swarm: Swarm, w: float, c1: float, c2: float, rng: np.random.Generator) -> None:
-    """Move all particles by eq. 1-2 with fresh r1, r2 for every coordinate."""
+    """Move all particles: v = w v + c1 r1 (p - x) + c2 r2 (g - x), limited (eq. 2); x = x + v (eq. 1)."""
     r1, r2 = rng.random((2, *swarm.position.shape))
     r1 *= swarm.personal_best - swarm.position
     r1 *= c1

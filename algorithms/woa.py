@@ -1,9 +1,19 @@
-"""Whale optimization algorithm (Mirjalili and Lewis 2016, doi 10.1016/j.advengsoft.2016.01.008).
+"""Whale optimization algorithm (Mirjalili and Lewis 2016).
 
-Form: eq. 2.1-2.8 of that paper with vectors A and C, fresh for every whale and coordinate; |A| < 1 is asked
-coordinate by coordinate; p, l in [-1, 1] and the random whale are drawn once a whale; b = 1; the prey is the
-best point so far. a falls linearly from 2 at the first move to 2 / horizon at the last, as in the authors'
-code.
+Update of a whale at X; the prey X* is the best point so far, X_rand another whale or itself, drawn at random:
+
+    A = 2 a r - a,   C = 2 r'                                                     eq. 2.3, 2.4
+    p < 0.5, |A| < 1:    X(t + 1) = X* - A |C X* - X|                             eq. 2.1, 2.2
+    p < 0.5, |A| >= 1:   X(t + 1) = X_rand - A |C X_rand - X|                     eq. 2.7, 2.8
+    p >= 0.5:            X(t + 1) = |X* - X| exp(b l) cos(2 pi l) + X*            eq. 2.5, 2.6
+
+with r and r' uniform in [0, 1), drawn anew for every whale and coordinate; p in [0, 1), l in [-1, 1) and X_rand
+drawn once a whale; b = 1. A is a vector, and the source does not say what |A| < 1 means for one: here it is asked
+coordinate by coordinate. The source lets a fall linearly from 2 to 0; here
+
+    a = 2 (1 - (t - 1) / horizon),   t = 1 ... horizon,
+
+2 at the first move and 2 / horizon at the last, as in the authors' code.
 
 It is drawn to the origin of coordinates, since C multiplies a position: a property of the equations.
 
@@ -72,6 +82,7 @@ class WOA:
 
 
 def _hunt(state: WOAState) -> Array:
+    """New positions (n, d): around the prey or another whale, or on a spiral, with equal chance (eq. 2.6)."""
     X, prey = state.position, state.leaders.position[0]
     p, turn, whale = state.rng.random((3, len(X), 1))
     random_whales = X[(whale[:, 0] * len(X)).astype(np.intp)]
@@ -80,7 +91,7 @@ def _hunt(state: WOAState) -> Array:
 
 
 def _encircle(state: WOAState, random_whales: Array, prey: Array) -> Array:
-    """Move around the prey (eq. 2.1-2.2) where |A| < 1, else around a random whale (eq. 2.7-2.8)."""
+    """X* - A |C X* - X| (eq. 2.1-2.2) where |A| < 1, else X_rand - A |C X_rand - X| (eq. 2.7-2.8)."""
     a = state.params.first_a * max(1.0 - (state.iteration - 1) / max(state.horizon, 1), 0.0)
     A, C = state.rng.random((2, *state.position.shape))  # r of eq. 2.3, r of eq. 2.4
     A *= 2.0 * a
@@ -95,7 +106,7 @@ def _encircle(state: WOAState, random_whales: Array, prey: Array) -> Array:
 
 
 def _spiral(X: Array, prey: Array, turn: Array, b: float) -> Array:
-    """Eq. 2.5; turn is its l, (n, 1) in [-1, 1]."""
+    """|X* - X| exp(b l) cos(2 pi l) + X* (eq. 2.5); turn is l, (n, 1) in [-1, 1)."""
     distance: Array = np.abs(prey - X)
     distance *= np.exp(b * turn) * np.cos(2.0 * np.pi * turn)
     distance += prey

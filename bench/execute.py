@@ -105,6 +105,14 @@ class Outcome:
     best_x: Array
     curves: Curves
 
+    def __repr__(self) -> str:
+        limits = "every limit kept" if self.violation == 0 else f"violation {self.violation:.4g}"
+        point = np.array2string(self.best_x, precision=4, threshold=8, edgeitems=3)
+        return (
+            f"Outcome: value {self.value:.6g}, {limits}; {self.evaluations} evaluations, {self.seconds:.3g} s\n"
+            f"  best point, {len(self.best_x)} dimensions: {point}"
+        )
+
 
 @dataclass(frozen=True)
 class Failure:

@@ -72,6 +72,20 @@ class Arm:
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     rotor_inertia: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        """Joints, what is known of the links, and how many joints have limits."""
+        kinds = "".join(joint.kind[0].upper() for joint in self.joints)
+        links = "unknown" if self.links is None else f"{sum(link.mass for link in self.links):.4g} kg in all"
+        finite = {
+            "position": sum(np.isfinite(joint.limits.position).all() for joint in self.joints),
+            **{
+                name: sum(np.isfinite(getattr(joint.limits, name)) for joint in self.joints)
+                for name in ("velocity", "acceleration", "torque")
+            },
+        }
+        limits = ", ".join(f"{name} {count}" for name, count in finite.items())
+        return f"Arm {self.name!r}; joints: {len(self)} ({kinds})\n  links: {links}\n  joints with limits: {limits}"
+
     def __len__(self) -> int:
         """Number of joints."""
         return len(self.joints)

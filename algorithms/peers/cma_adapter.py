@@ -2,8 +2,8 @@
 
 Form: as our `cma-es`, which is the package `cmaes`: coordinates normalised by the box, the first population
 told as a first generation of the distribution at the centre with the spread of uniform points, the population
-size that of the swarm. This one knows the box and transforms its points smoothly into it, where the bound
-policy finds nothing to move. Its stopping tests are set aside: it is the budget that ends it.
+size that of the swarm. pycma transforms its points smoothly into the box, so the bound policy moves none of
+them. Its stopping tests are not used: only the budget ends it.
 """
 
 import math

@@ -70,7 +70,7 @@ def _run_optimiser(method: Any, start: Start, evaluate: Evaluate) -> None:
 
 @contextmanager
 def _keep_global_random_state() -> Iterator[None]:
-    """When they are made, its space and method draw seeds that are never used from numpy's global state."""
+    """nevergrad's space and method draw seeds from numpy's global state when they are made, and never use them."""
     state = np.random.get_state()  # noqa: NPY002
     try:
         yield

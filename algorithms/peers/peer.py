@@ -1,16 +1,15 @@
-"""What all adapters share: another package's own loop behind ask and tell.
+"""The base of all adapters: another package's own loop behind ask and tell.
 
-The first population is the trial's, as for every algorithm, and the peer is started from it; after that it
-asks as its own loop does: a population at once or, where the package knows nothing else, a point at a time.
-Its points are the package's, which keeps its own way of staying inside the box. A fitness that is not finite
-reaches it as +inf.
+The first population is that of the trial, as for every algorithm, and the peer starts from it. After that the peer
+asks as its own loop does: a population at once or, where the package offers nothing else, a point at a time. The
+package keeps its own way of staying inside the box. A fitness that is not finite reaches it as +inf.
 
-A State is pickled as the peer's seed and all that it was told. To resume, the peer's loop is run again from
-its start with the same answers: cheap, since nothing is evaluated, and exact, since its seed is all its chance.
-A peer whose loop has come to its end is finished.
+A State is pickled as the peer's seed and all fitness values that it was told. To resume, the peer's loop runs again
+from its start with the same answers. This is cheap, since nothing is evaluated, and exact, since the seed determines
+all random numbers. A peer whose loop has ended is finished.
 
-A peer's loop calls its objective; here it is turned inside out: it runs in a thread of its own and asks, and waits to
-be told. It never runs at the same time as its caller: one of both always waits.
+A package's loop calls its objective and expects an answer. Here the loop runs in a thread of its own; its objective
+hands the points to the caller and waits for the fitness. Loop and caller never run at the same time.
 """
 
 import threading
@@ -32,7 +31,7 @@ Loop = Callable[[Evaluate], None]
 
 
 class _Dismissed(BaseException):
-    """Ends the loop from within its objective when nobody will answer any more; no loop takes it for an error."""
+    """Ends the loop from within its objective when there is no caller; no Exception, so no loop catches it."""
 
 
 class Conversation:
@@ -64,7 +63,7 @@ class Conversation:
 def _run_loop(
     loop: Loop, questions: "SimpleQueue[Array | BaseException | None]", answers: "SimpleQueue[Array | None]"
 ) -> None:
-    """Run the loop to its end; it knows the queues but not the Conversation, which else would never be let go."""
+    """Run the loop to its end. It holds the queues, not the Conversation, which could else never be collected."""
 
     def evaluate(points: Array) -> Array:
         questions.put(np.array(points, dtype=np.float64))
@@ -92,7 +91,7 @@ def _dismiss_loop(answers: "SimpleQueue[Array | None]", thread: threading.Thread
 
 
 class Start(NamedTuple):
-    """Where a peer begins: its points (n, d) and their loss (n,), the box, planned iterations and a seed < 2^31."""
+    """The start of a peer: points (n, d) and their loss (n,), the box, planned iterations and a seed < 2^31."""
 
     X: Array
     loss: Array
@@ -176,7 +175,7 @@ class Peer:
 
 
 def answer_first_population(start: Start, evaluate: Evaluate) -> Evaluate:
-    """For a loop that evaluates its first population itself: those points are known and not asked again."""
+    """For a loop that evaluates its first population itself: answer those points from the known losses."""
     known = start.loss.tolist()
 
     def answer(points: Array) -> Array:

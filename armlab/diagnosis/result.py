@@ -114,3 +114,13 @@ class Diagnosis:
     looks: int = 0
     seconds: float = 0.0
     settings: dict[str, float | str | bool] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """The status, the first claims as effect@place with their equations, and how many there are."""
+        lines = [f"Diagnosis of {self.recording.name!r}: {self.status}; claims: {len(self.claims)}"]
+        for claim in self.claims[:4]:
+            place = "" if claim.joint is None else f"@{claim.joint}"
+            lines.append(f"  {claim.effect}{place}: {claim.equation}")
+        if len(self.claims) > 4:
+            lines.append(f"  and {len(self.claims) - 4} more claims")
+        return "\n".join(lines if self.claims else [*lines, f"  {self.summary}"])

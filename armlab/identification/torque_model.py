@@ -1,5 +1,6 @@
 """A structure with values: predicts torque and states its parameters with intervals; knows no files or pictures."""
 
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -117,6 +118,20 @@ class TorqueModel:
         covariance = None if self.covariance is None else self.covariance[place, place]
         found = parameter_values(part, self.values[place], covariance, self.factor)
         return tuple(replace(each, interval=None) if _is_held(each) else each for each in found)
+
+    def __repr__(self) -> str:
+        """The robot, how many parameters of which components, and the cut-off of the identification."""
+        parts = Counter(part.effect for part in self.structure.components)
+        lines = [
+            f"{type(self).__name__} of {self.robot}; joints: {len(self.arm)}, base parameters: {len(self.base_values)}",
+            "  components: " + (", ".join(f"{count} {effect}" for effect, count in parts.items()) or "none"),
+        ]
+        if self.extras:
+            lines.append("  effects: " + ", ".join(each.told["effect"] for each in self.extras))
+        links = "physically consistent" if self.inertial is not None else "known by their base parameters"
+        intervals = "without intervals" if self.covariance is None else "with 95 % intervals"
+        cutoff = "" if self.cutoff_hz is None else f"; cut-off {self.cutoff_hz:.4g} Hz"
+        return "\n".join([*lines, f"  links {links}; {intervals}{cutoff}"])
 
     def __str__(self) -> str:
         """A table of all parameters."""

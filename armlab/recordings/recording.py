@@ -153,6 +153,17 @@ class Recording:
         """Name of the folder."""
         return self.folder.resolve().name
 
+    def __repr__(self) -> str:
+        """The robot, the first runs, and how many findings there are."""
+        lines = [f"Recording {self.name!r} of {self.arm.name}; joints: {len(self.arm)}, runs: {len(self.runs)}"]
+        for run in self.runs[:3]:
+            lines.append(f"  {run.name} ({run.role}): {run.samples} samples at {run.rate_hz:.5g} Hz")
+        if len(self.runs) > 3:
+            lines.append(f"  and {len(self.runs) - 3} more runs")
+        found = [each.severity for each in (*self.findings, *(each for run in self.runs for each in run.findings))]
+        lines.append(f"  findings: {found.count('repaired')} repairs, {found.count('warning')} warnings")
+        return "\n".join(lines)
+
     def with_role(self, role: Role) -> tuple[Run, ...]:
         """The runs that identify, or those that validate."""
         return tuple(run for run in self.runs if run.role == role)

@@ -1,7 +1,10 @@
 """CMA-ES is the package's own: the adapter only normalises, seeds and starts it."""
 
+import copy
+
 import numpy as np
 import pytest
+import scipy.linalg
 from cmaes import CMA
 
 from algorithms.cmaes import CMAES, CMAESParams
@@ -42,3 +45,34 @@ def test_it_is_finished_when_the_package_stops_on_a_flat_objective():
 def test_a_single_point_is_refused():
     with pytest.raises(ValueError, match="1 is too few"):
         CMAES.init(CMAESParams(), START[:1], BOX, 3, np.random.default_rng(0))
+
+
+def test_a_generation_of_the_package_is_that_of_equations_38_to_47():
+    d, n = 5, 12
+    optimiser = CMA(np.full(d, 0.5), 0.02, seed=3, population_size=n)
+    held_back = 0
+    for _ in range(30):
+        before = copy.deepcopy(optimiser.__dict__)
+        U = np.array([optimiser.ask() for _ in range(n)])
+        fitness = (np.arange(1, d + 1) * np.square(U - 3.0)).sum(axis=1)
+        optimiser.tell(list(zip(U, fitness.tolist(), strict=True)))
+        after, weights, mu = optimiser.__dict__, before["_weights"], before["_mu"]
+        root = np.linalg.inv(scipy.linalg.sqrtm(before["_C"]).real)
+        y = (U[fitness.argsort()] - before["_mean"]) / before["_sigma"]
+        y_w = weights[:mu] @ y[:mu]
+        c_s, c_c, c_1, c_mu = (before[name] for name in ("_c_sigma", "_cc", "_c1", "_cmu"))
+        p_s = (1 - c_s) * before["_p_sigma"] + np.sqrt(c_s * (2 - c_s) * before["_mu_eff"]) * (root @ y_w)
+        step = before["_sigma"] * np.exp(c_s / before["_d_sigma"] * (np.linalg.norm(p_s) / before["_chi_n"] - 1))
+        h = float(not np.allclose(after["_pc"], (1 - c_c) * before["_pc"]))
+        p_c = (1 - c_c) * before["_pc"] + h * np.sqrt(c_c * (2 - c_c) * before["_mu_eff"]) * y_w
+        lengths = np.square(y @ root).sum(axis=1)
+        active = np.where(weights >= 0, weights, weights * d / lengths)
+        kept = 1 + c_1 * (1 - h) * c_c * (2 - c_c) - c_1 - c_mu * weights.sum()
+        C = kept * before["_C"] + c_1 * np.outer(p_c, p_c) + c_mu * (y.T * active) @ y
+        assert after["_mean"] == pytest.approx(before["_mean"] + before["_sigma"] * y_w)
+        assert after["_p_sigma"] == pytest.approx(p_s)
+        assert after["_sigma"] == pytest.approx(step)
+        assert after["_pc"] == pytest.approx(p_c)
+        assert after["_C"] == pytest.approx(C, abs=1e-7)  # the package adds 1e-8 to a length
+        held_back += h == 0.0
+    assert 0 < held_back < 30

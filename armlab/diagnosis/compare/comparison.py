@@ -38,6 +38,16 @@ class Comparison:
     changes: tuple[Change, ...] = ()
     reason: str = ""
 
+    def __repr__(self) -> str:
+        """The status, how many parameters changed, and what the new recording shows against the old model."""
+        changed = sum(each.changed for each in self.changes)
+        lines = [f"Comparison of {self.old.recording.name!r} with {self.new.recording.name!r}: {self.status}"]
+        if self.against is None:
+            return "\n".join([*lines, f"  {self.reason}"])
+        lines.append(f"  {changed} of {len(self.changes)} parameters changed (1 %, Holm)")
+        effects = [f"{each.effect}@{each.joint}" if each.joint else each.effect for each in self.against.claims]
+        return "\n".join([*lines, f"  new recording against old model: {', '.join(effects) or 'nothing'}"])
+
 
 def compare(
     old: Recording,

@@ -1,0 +1,105 @@
+"""The documents name files, commands and links that exist, and the examples of the README run."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "docs" / "architecture.md",
+    ROOT / "docs" / "plugins.md",
+]
+FOLDERS = "problem|algorithms|bench|armlab|tests|docs|configs|results|templates|notebooks"
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_every_file_that_a_document_names_exists(path):
+    named = re.findall(rf"`((?:{FOLDERS})/[\w./-]*)`", path.read_text(encoding="utf-8"))
+    assert named
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+@pytest.mark.parametrize("path", [*DOCUMENTS, *(ROOT / "docs").glob("*.md")], ids=lambda path: path.name)
+def test_every_link_between_documents_leads_somewhere(path):
+    links = re.findall(r"\]\(([^)#:]+)\)", path.read_text(encoding="utf-8"))
+    assert [link for link in links if not (path.parent / link).exists()] == []
+
+
+def test_every_module_that_a_flow_names_is_in_the_layers_picture():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    picture = text.split("```mermaid")[1].split("```")[0]
+    packages = {name.replace("/", ".") for name in re.findall(r"`((?:armlab/)?\w+)/[\w/]+\.py`", text)}
+    assert {name for name in packages if name not in picture} == set()
+
+
+def pictured_layers():
+    """Packages of the picture, and for each the packages that a path of arrows leads to."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    picture = text.split("```mermaid")[1].split("```")[0]
+    package = {node: label.split("<br/>")[0] for node, label in re.findall(r'(\w+)\["([^"]*)"\]', picture)}
+    arrows = re.findall(r'(\w+)(?:\["[^"]*"\])? --> (\w+)', picture)
+    below = {name: {package[end] for start, end in arrows if package[start] == name} for name in package.values()}
+    for _ in below:
+        below = {name: found.union(*(below[other] for other in found)) for name, found in below.items()}
+    return below
+
+
+def test_the_layers_picture_allows_every_import():
+    below = pictured_layers()
+    packages = sorted((name for name in below if not name.startswith("users")), key=len, reverse=True)
+
+    def package_of(module):
+        if module in ("armlab", "armlab.flows"):
+            return "armlab"
+        return next((name for name in packages if name != "armlab" and f"{module}.".startswith(f"{name}.")), None)
+
+    crossing = set()
+    for folder in ("problem", "algorithms", "bench", "armlab"):
+        for path in (ROOT / folder).rglob("*.py"):
+            module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ImportFrom) and node.module and package_of(node.module):
+                    crossing.add((package_of(module), package_of(node.module)))
+    assert len(crossing) > 20
+    assert {(upper, lower) for upper, lower in crossing if upper != lower and lower not in below[upper]} == set()
+
+
+def test_commands_of_the_readme_exist():
+    shown = subprocess.run(
+        [sys.executable, "-m", "armlab.cli.main", "--help"], capture_output=True, text=True, check=True
+    ).stdout
+    lines = (ROOT / "README.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^(?:\.venv/bin/)?armlab ([a-z-]+)", lines, re.MULTILINE))
+    assert len(named) > 5
+    assert {name for name in named if not re.search(rf"^  {name}\b", shown, re.MULTILINE)} == set()
+
+
+def test_make_targets_of_the_readme_exist():
+    targets = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+        assert set(re.findall(r"(?:^|`)make ([a-z0-9-]+)", path.read_text(encoding="utf-8"), re.MULTILINE)) <= targets
+
+
+PYTHON_EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+
+
+def test_the_python_examples_of_the_readme_run(tmp_path, recording_folder):
+    assert len(PYTHON_EXAMPLES) == 2
+    recording_folder(tmp_path / "my-recording")
+    (tmp_path / "mine.yaml").write_text(
+        "{name: mine, problem: sphere, algorithms: [de], swarm_size: 10, evaluations: 100, repetitions: 2, seed: 1}"
+    )
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+    for example in PYTHON_EXAMPLES:
+        done = subprocess.run(
+            [sys.executable, "-c", example], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout
