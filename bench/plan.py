@@ -90,7 +90,8 @@ class Plan(Sequence[Entry]):
 def plan_trials(experiment: Experiment, where: str) -> Plan:
     """All trials in the order of the configuration: problem, swarm size, budget, algorithm, repetition.
 
-    Raises InputError, in one line, for a problem, an algorithm or a hyper-parameter that is not right.
+    Raises InputError, in one line, for a problem, an algorithm or a hyper-parameter that is not right, and for output
+    'rivals' without a pair to compare.
     """
     problems = [(choice.label, _parse_problem(choice, where)) for choice in experiment.problem]
     contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
@@ -110,7 +111,12 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
         for evaluations in experiment.budgets(swarm_size)
         for contestant in contestants
     ]
-    return Plan(tuple(series), experiment.repetitions)
+    plan = Plan(tuple(series), experiment.repetitions)
+    if experiment.output == "rivals" and not rival_pairs(plan.first_entries()):
+        raise InputError(
+            f"output 'rivals' of {where} should have a peer and, in 'algorithms', the one that it stands beside"
+        )
+    return plan
 
 
 def _parse_problem(choice: ProblemChoice, where: str) -> ProblemSettings:

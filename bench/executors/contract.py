@@ -28,6 +28,16 @@ class WorkReport(NamedTuple):
     results: list[tuple[str, Outcome | Failure]]
     origin: str
 
+    @property
+    def outcomes(self) -> list[tuple[str, Outcome]]:
+        """The outcomes, each with its key in the run store."""
+        return [(key, result) for key, result in self.results if isinstance(result, Outcome)]
+
+    @property
+    def failures(self) -> list[Failure]:
+        """The trials that failed."""
+        return [result for _, result in self.results if isinstance(result, Failure)]
+
 
 def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:
     """Run trials one after the other; the process dies with a trial that takes longer than `timeout_s`."""

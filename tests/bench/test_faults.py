@@ -14,9 +14,8 @@ import pytest
 from refusals import refusal
 
 from armlab.common.errors import InputError
-from bench.dispatch import run_missing
 from bench.execute import run_trial
-from bench.run import load_experiment
+from bench.run import load_experiment, run_missing
 from bench.statistics import summarise
 from bench.store import open_store, salvage
 from problem.contract import Evaluation

@@ -8,7 +8,7 @@ import pandas as pd
 
 from bench.files import write_whole
 from bench.plan import Plan
-from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_loaded_experiment
+from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
 from bench.studies.beyond_paper.report import (
@@ -48,8 +48,8 @@ def make_study(configs: Path, options: RunOptions, records: Path, bar: ProgressB
     `run_experiment` does; what is finished is kept, and the same command goes on from there.
     """
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
-    for experiment in loaded.values():
-        yield from run_loaded_experiment(experiment, options, bar)
+    for name in EXPERIMENTS:
+        yield from run_experiment(configs / f"{name}.yaml", options, bar)
     for name, content in _make_files(_read_outcomes(loaded, options), records, options.workers).items():
         write_whole(options.results / name, content)
         yield options.results / name

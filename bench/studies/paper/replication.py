@@ -9,7 +9,7 @@ import pandas as pd
 from armlab.common.settings import Settings
 from bench.files import write_whole
 from bench.printed import read_printed
-from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_loaded_experiment
+from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
 from bench.studies.mutations import MutationHistory, replay_mutations
@@ -53,8 +53,8 @@ def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressB
     """
     items = _read_items(configs)
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
-    for experiment in loaded.values():
-        yield from run_loaded_experiment(experiment, options, bar)
+    for name in EXPERIMENTS:
+        yield from run_experiment(configs / f"{name}.yaml", options, bar)
     evidence = _gather_evidence(items, loaded, options, records)
     files = _make_files(items, loaded, evidence) | _settings_files(items)
     yield from _write_files(options.results, files)

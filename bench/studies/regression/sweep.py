@@ -14,11 +14,11 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.config import Experiment, PositiveInt
-from bench.dispatch import run_missing
 from bench.execute import Outcome
 from bench.files import write_whole
 from bench.plan import Entry, plan_trials
 from bench.provenance import provenance
+from bench.run import run_missing
 from bench.statistics import is_feasible
 from bench.store import open_store
 
@@ -105,7 +105,7 @@ def plan_entries(sweep: Sweep, sample: Sample | None = None) -> Sequence[Entry]:
 def run_entries(entries: Sequence[Entry], workers: int, progress: Progress) -> Ends:
     """Run all trials anew, in a store of their own that nothing was kept in before."""
     with TemporaryDirectory() as folder, open_store(Path(folder) / "runs.sqlite") as store:
-        run_missing(entries, store, workers, progress)
+        run_missing(entries, store, workers, progress=progress)
         return group_ends((entry, store.get(entry.key)) for entry in entries)
 
 
