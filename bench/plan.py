@@ -12,7 +12,7 @@ from algorithms.registry import load, peer_names
 from armlab.common.errors import InputError
 from bench.config import AlgorithmChoice, Experiment, ProblemChoice, find_algorithm, parse_params
 from bench.execute import Trial, build_problem
-from bench.provenance import fingerprint
+from bench.fingerprint import fingerprint
 from problem.registry import ProblemSettings, parse_problem
 
 
@@ -96,7 +96,7 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
     problems = [(choice.label, _parse_problem(choice, where)) for choice in experiment.problem]
     contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
     codes = {
-        (label, contestant.label): fingerprint(contestant.algorithm, problem.model_dump(mode="json"))
+        (label, contestant.label): fingerprint(contestant.algorithm, problem)
         for (label, problem), contestant in product(problems, contestants)
     }
     series = [

@@ -15,7 +15,8 @@ from pydantic import Field, model_validator
 
 from armlab.common.settings import Settings
 from bench.execute import Failure, Outcome, Trial, load_algorithm, run_batch
-from bench.provenance import fingerprint, provenance
+from bench.fingerprint import fingerprint
+from bench.provenance import provenance
 from problem.registry import ProblemSettings
 
 Work = Sequence[tuple[str, Trial]]
@@ -45,7 +46,7 @@ def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:
 
 
 def run_in_worker(work: Work, timeout_s: float | None = None) -> WorkReport:
-    """`do` in a process of its own, after a look whether it holds the code that the keys speak of."""
+    """`run_work` in a process of its own; a trial fails if its key was made with other code than this process has."""
     strangers = [
         (key, trial) for key, trial in work if trial.key(_code_fingerprint(trial.algorithm, trial.problem)) != key
     ]
@@ -82,11 +83,14 @@ def _time_limit(timeout_s: float | None) -> Iterator[None]:
 
 @lru_cache(maxsize=512)
 def _code_fingerprint(algorithm: str, problem: ProblemSettings) -> str:
-    return fingerprint(load_algorithm(algorithm), problem.model_dump(mode="json"))
+    return fingerprint(load_algorithm(algorithm), problem)
 
 
 def _other_code_message() -> str:
-    return f"OtherCodeError: the worker on {platform.node()} has other code or files than the place of the start"
+    return (
+        f"OtherCodeError: the worker on {platform.node()} has other code or files, or another release of a package, "
+        "than the process that started the run"
+    )
 
 
 @lru_cache

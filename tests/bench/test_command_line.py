@@ -111,6 +111,6 @@ def test_check_names_the_broken_promise(armlab: Armlab, plug_in: Callable[[str],
 
 
 def test_a_reader_that_goes_away_is_no_traceback(small: Path) -> None:
-    command = f"{sys.executable} -m bench.cli list | true"
+    command = f"{sys.executable} -m armlab.cli.main list | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert done.stderr == ""
