@@ -1,29 +1,10 @@
-"""Result files on the disk: written whole or not at all, and never over the results of another configuration."""
+"""The folder of results: it never mixes the results of two configurations."""
 
-import os
 import tempfile
-from collections.abc import Iterable
 from itertools import zip_longest
 from pathlib import Path
 
 from armlab.common.errors import InputError
-
-
-def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
-    """Replace a file in one step, so that a crash leaves the old or the new one, never a half.
-
-    content: the whole, or pieces that are written as they come.
-    """
-    data = content.encode() if isinstance(content, str) else content
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with draft.open("wb") as file:
-            file.writelines([data] if isinstance(data, bytes) else data)
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def settings_path(folder: Path, name: str) -> Path:

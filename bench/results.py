@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from armlab.common.files import write_whole
 from bench.config import Experiment
-from bench.files import settings_path, write_whole
+from bench.files import settings_path
 from bench.plan import Plan, rival_pairs
 from bench.store import RunStore
 from bench.tables import as_csv, convergence_table, summary_page, summary_table, tidy_frame, times_table

@@ -15,7 +15,7 @@ import yaml
 
 from algorithms.registry import names as registered
 from armlab.common.arrays import Array
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.report import sections
 from bench.report.analysis import Cell, analyse_cells, block_losses, share_of_targets_reached
 from bench.report.ranking_chart import chart_style

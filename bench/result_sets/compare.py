@@ -11,12 +11,13 @@ import pandas as pd
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
-from bench.files import write_whole
+from armlab.common.statistics import adjust_by_holm
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import CELL_COLUMNS, ResultSet
 from bench.statistics import is_feasible, quantile
-from bench.statistics.pairwise import holm, log_losses, signed_rank_p, superiority, superiority_unpaired
+from bench.statistics.pairwise import log_losses, signed_rank_p, superiority, superiority_unpaired
 from bench.studies.regression.check import location_p_value
 from bench.tables import as_csv
 
@@ -61,7 +62,7 @@ def changed_problems(first: ResultSet, second: ResultSet) -> list[str]:
 def compare_sets(first: ResultSet, second: ResultSet) -> pd.DataFrame:
     """One row a `Comparison` with its `change`, for all that both sets have; empty if they have nothing in common."""
     raw = [_compare_cell(*shared, paired=are_paired(first, second)) for shared in _shared_trials(first, second)]
-    adjusted = holm(np.array([comparison.p for comparison in raw]))
+    adjusted = adjust_by_holm(np.array([comparison.p for comparison in raw]))
     found = [Comparison(**{**asdict(c), "p": float(p)}) for c, p in zip(raw, adjusted, strict=True)]
     columns = [*Comparison.__dataclass_fields__, "change"]
     return pd.DataFrame([asdict(c) | {"change": c.change()} for c in found], columns=columns)

@@ -20,7 +20,7 @@ import yaml
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.result_sets.result_set import TRIAL_COLUMNS, ResultSet, TableOfCurves, read_stored_results, runs_by_algorithm
 from bench.statistics.performance import Run
 

@@ -8,7 +8,8 @@ import pandas as pd
 from scipy.stats import friedmanchisquare, rankdata
 
 from armlab.common.arrays import Array
-from bench.statistics.pairwise import holm, signed_rank_p
+from armlab.common.statistics import adjust_by_holm
+from bench.statistics.pairwise import signed_rank_p
 
 Pair = tuple[str, str]
 ERROR_RATE = 0.05
@@ -38,7 +39,7 @@ def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> Criti
     ranks = average_ranks(losses)
     pairs = list(combinations(ranks, 2))
     raw = np.array([signed_rank_p(losses[a].to_numpy(), losses[b].to_numpy()) for a, b in pairs])
-    p = dict(zip(pairs, holm(raw).tolist(), strict=True))
+    p = dict(zip(pairs, adjust_by_holm(raw).tolist(), strict=True))
     return CriticalDifference(
         ranks, p, indistinguishable_groups(list(ranks), p, rate), _friedman_p(losses), len(losses)
     )

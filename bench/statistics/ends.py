@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from bench.seeds import named_generator
+from armlab.common.streams import named_generator
 
 
 @dataclass(frozen=True)

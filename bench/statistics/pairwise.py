@@ -10,18 +10,8 @@ import pandas as pd
 from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
+from armlab.common.statistics import adjust_by_holm
 from bench.statistics.ends import is_feasible, percentile_interval, resamples
-
-
-def holm(p: Array) -> Array:
-    """P-values (..., k) after Holm's correction, valid however the comparisons depend on each other."""
-    order = np.argsort(p, axis=-1, kind="stable")
-    factors = np.arange(p.shape[-1], 0, -1)
-    adjusted = np.maximum.accumulate(np.take_along_axis(p, order, axis=-1) * factors, axis=-1)
-    result = np.empty_like(adjusted)
-    np.put_along_axis(result, order, np.minimum(adjusted, 1.0), axis=-1)
-    return result
-
 
 _NUMBERS_PER_PIECE = 1_000_000  # numbers of a piece of work
 
@@ -52,7 +42,7 @@ class Duel:
 def duels(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> list[Duel]:
     """Duels of (subject, rival) labels in a tidy frame of one problem, swarm size and budget, Holm over all of them."""
     losses = log_losses(frame)
-    p = holm(np.array([signed_rank_p(losses[subject], losses[rival]) for subject, rival in pairs]))
+    p = adjust_by_holm(np.array([signed_rank_p(losses[subject], losses[rival]) for subject, rival in pairs]))
     return [
         Duel(subject, rival, *superiority(losses[subject], losses[rival]), float(adjusted))
         for (subject, rival), adjusted in zip(pairs, p, strict=True)

@@ -14,7 +14,7 @@ from scipy.special import ndtri
 from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
-from bench.seeds import named_generator
+from armlab.common.streams import named_generator
 
 POWER_SIMULATIONS = 4000
 _MAX_RANDOM_NUMBERS = 1_000_000  # drawn at most, so that thousands of repetitions are simulated less often

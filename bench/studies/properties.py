@@ -10,9 +10,9 @@ import pandas as pd
 
 from algorithms.properties import measure_properties
 from algorithms.registry import names as registered
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.config import find_algorithm
-from bench.files import write_whole
 from bench.result_sets.formats import make_folder
 from bench.studies.speed.clock import median_seconds
 from bench.studies.speed.overhead import armlab_task

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import read_yaml, suggest_name
 from bench.execute import canonical
-from bench.files import write_whole
 from bench.studies.best_known.records import Record, build_excitation, read_records
 from bench.studies.best_known.search import record_point
 from bench.trajectory_files import TRAJECTORY_FORMATS, SampledTrajectory, sample_trajectory

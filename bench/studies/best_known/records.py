@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from bench.execute import canonical
-from bench.files import write_whole
 from bench.plan import Entry
 from problem.excitation import ExcitationProblem
 from problem.registry import ProblemSettings, parse_problem

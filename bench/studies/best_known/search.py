@@ -18,10 +18,10 @@ from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.streams import named_generator
 from bench.config import find_algorithm
 from bench.execute import canonical
 from bench.provenance import provenance
-from bench.seeds import named_generator
 from bench.studies.best_known.descent import SearchEnd, check_supported, descend, evaluate_point
 from bench.studies.best_known.records import (
     RECORDS_FILE,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.plan import Plan
 from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from armlab.common.arrays import Array
-from bench.seeds import named_generator
+from armlab.common.streams import named_generator
 from bench.studies.does_it_help.identification import NOISE_KINDS, identification_errors
 from bench.studies.does_it_help.trajectories import Specimen, random_feasible
 from problem.excitation import ExcitationProblem

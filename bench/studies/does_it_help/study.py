@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 from joblib import Parallel, delayed
 
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.studies.best_known.records import RECORDS_FILE, read_records
 from bench.studies.does_it_help.judgement import SUBSETS, Jury, choose_jury, correlation_table, judge_specimen
 from bench.studies.does_it_help.report import draw_correlations, draw_errors, study_page

@@ -10,8 +10,8 @@ from algorithms.contract import Box
 from algorithms.driver import minimise
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.streams import named_generator
 from bench.config import find_algorithm
-from bench.seeds import named_generator
 from bench.studies.best_known.records import Record, build_excitation
 from bench.studies.best_known.search import record_point
 from problem.excitation import ExcitationProblem

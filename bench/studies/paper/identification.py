@@ -10,9 +10,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.streams import named_generator
 from bench.execute import build_problem
 from bench.plan import Entry
-from bench.seeds import named_generator
 from bench.store import RunStore
 from bench.studies.paper.settings import Table4Settings
 from problem.arm import Arm

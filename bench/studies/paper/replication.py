@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings
-from bench.files import write_whole
 from bench.printed import read_printed
 from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
-from bench.files import write_whole
+from armlab.common.files import write_whole
+from armlab.common.statistics import adjust_by_holm
+from armlab.common.streams import named_generator
 from bench.plan import Entry
 from bench.provenance import provenance
-from bench.seeds import named_generator
-from bench.statistics.pairwise import holm
 from bench.studies.regression.check import CheckVerdict, judge_run, p_values
 from bench.studies.regression.defects import DEFECTS, run_ends_with_defect
 from bench.studies.regression.sweep import Baseline, Cell, Ends, Progress, Sample, Sweep, plan_entries, run_entries
@@ -133,7 +133,7 @@ def _try_defect(name: str, sweep: Sweep, baseline: Baseline, fixed: Ends, drawn:
 
 def _find_alarms(p: Array, sweep: Sweep) -> Array:
     """Which cells raise an alarm (runs, cells), of p-values (runs, cells, 2)."""
-    adjusted = holm(p.reshape(len(p), -1)).reshape(p.shape)
+    adjusted = adjust_by_holm(p.reshape(len(p), -1)).reshape(p.shape)
     return np.asarray(adjusted.min(axis=-1) <= sweep.false_alarm_rate)
 
 

@@ -11,8 +11,8 @@ from scipy.special import gammaln
 from scipy.stats import mannwhitneyu
 
 from armlab.common.arrays import Array
+from armlab.common.statistics import adjust_by_holm
 from bench.statistics import quantile
-from bench.statistics.pairwise import holm
 from bench.studies.regression.sweep import Baseline, Cell, Ends
 
 
@@ -46,7 +46,7 @@ class CellComparison:
 
 def compare_ends(baseline: Ends, now: Ends) -> list[CellComparison]:
     """All cells of `now`, which the baseline must have too, with p-values after Holm over both statistics of all."""
-    adjusted = holm(np.concatenate([p_values(baseline[cell], now[cell]) for cell in now])).reshape(-1, 2)
+    adjusted = adjust_by_holm(np.concatenate([p_values(baseline[cell], now[cell]) for cell in now])).reshape(-1, 2)
     return [
         CellComparison(cell, baseline[cell], now[cell], float(p_location), float(p_best))
         for cell, (p_location, p_best) in zip(now, adjusted, strict=True)

@@ -12,10 +12,10 @@ from pydantic import Field, model_validator
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.config import Experiment, PositiveInt
 from bench.execute import Outcome
-from bench.files import write_whole
 from bench.plan import Entry, plan_trials
 from bench.provenance import provenance
 from bench.run import run_missing

@@ -5,8 +5,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
-from bench.files import write_whole
 from bench.provenance import provenance
 from bench.result_sets.formats import make_folder
 from bench.studies.scale.kills import KillResult, Victim, kill_repeatedly
