@@ -15,6 +15,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.statistics import adjust_by_holm
 from armlab.common.streams import named_generator
 from bench.plan import Entry
@@ -181,8 +182,8 @@ def _shares_by_name(shares: Mapping[Cell, float]) -> dict[str, float]:
 
 
 def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
-    sections = [
-        "# Calibration of the regression check",
+    return markdown_page(
+        "Calibration of the regression check",
         f"{calibration.runs} runs of {sweep.repetitions} repetitions, drawn from {sweep.calibration.repetitions} "
         "trials of unchanged code a cell with a seed of their own, against a baseline of "
         f"{sweep.baseline.repetitions}. "
@@ -194,7 +195,7 @@ def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
         "is drawn anew for each run.",
         "## Power against a shift",
         "Share of runs in which a cell raises the alarm when log10 cond of that cell alone is shifted.",
-        "\n".join(_power_table(calibration.power)),
+        _power_table(calibration.power),
         "## The fixed run of unchanged code",
         _code_block(calibration.verdict.lines()),
         "## Defects put into the code",
@@ -202,14 +203,13 @@ def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
         f"from {sweep.calibration.defect_repetitions} defective trials a cell. A defect of the observation matrix is "
         "run with two algorithms only, the others being taken as unchanged: the power is a lower bound.",
         *(_defect_section(name, found) for name, found in calibration.defects.items()),
-    ]
-    return "\n\n".join(sections) + "\n"
+    )
 
 
-def _power_table(power: Mapping[float, Mapping[Cell, float]]) -> list[str]:
-    heads = ["problem", "algorithm", *(f"{shift:+g}" for shift in power)]
+def _power_table(power: Mapping[float, Mapping[Cell, float]]) -> str:
+    headings = ["problem", "algorithm", *(f"{shift:+g}" for shift in power)]
     rows = [[*cell, *(f"{shares[cell]:.2f}" for shares in power.values())] for cell in next(iter(power.values()))]
-    return [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
+    return markdown_table(headings, rows)
 
 
 def _defect_section(name: str, found: DefectResult) -> str:
