@@ -8,14 +8,14 @@ from armlab.common.errors import InputError
 
 
 def settings_path(folder: Path, name: str) -> Path:
-    """Where the full settings of the results of that name stand, beside them."""
+    """The file with the full settings of the results of that name, beside them."""
     return folder / f"{name}.settings.yaml"
 
 
 def check_folder(folder: Path, name: str, settings: str) -> None:
-    """Make sure, before hours of work, that results of these settings may be written there.
+    """Check, before hours of work, that results of these settings may be written into a folder.
 
-    Raises InputError if the folder cannot be written, or holds results of that name and other settings.
+    Raises InputError if the folder cannot be written, or if it holds results of that name and other settings.
     """
     there = settings_path(folder, name)
     try:

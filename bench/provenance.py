@@ -1,4 +1,4 @@
-"""The origin of numbers: versions, machine and commit, written beside every outcome."""
+"""The provenance of an outcome: versions, machine and commit, stored beside it."""
 
 import json
 import platform
@@ -26,7 +26,7 @@ def provenance() -> str:
 
 
 def _processor_name() -> str:
-    """The processor's name; Linux tells it only in /proc."""
+    """The processor's name; on Linux only /proc has it."""
     cpuinfo = Path("/proc/cpuinfo")
     lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
     names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]

@@ -13,9 +13,9 @@ Files = dict[str, str | bytes]
 
 
 def write_results(experiment: Experiment, entries: Plan, settings: str, store: RunStore, folder: Path) -> list[Path]:
-    """Write what the experiment's `output` names; returns the files.
+    """Write the files that the experiment's `output` names; returns their paths.
 
-    The settings come last, so that results cut off half-way are not taken for whole ones.
+    The settings are written last, so that incomplete results are never taken for complete ones.
     """
     make = {
         "table": _table_files,

@@ -1,6 +1,4 @@
-"""The contract between the dispatch of trials and an executor: batches of work, reports, settings, and what a worker
-does with a batch.
-"""
+"""What the dispatch of trials and an executor agree on: batches, reports, settings, and the work of a worker."""
 
 import faulthandler
 import os
@@ -24,7 +22,7 @@ Work = Sequence[tuple[str, Trial]]
 
 
 class WorkReport(NamedTuple):
-    """What became of a batch, trial by trial, and the provenance of the worker."""
+    """The results of a batch, trial by trial, and the provenance of the worker."""
 
     results: list[tuple[str, Outcome | Failure]]
     origin: str
@@ -67,8 +65,8 @@ def _run_with_time_limit(key: str, trial: Trial, timeout_s: float | None) -> Out
 def _time_limit(timeout_s: float | None) -> Iterator[None]:
     """End the process if the block takes longer.
 
-    The watchdog is a thread in C with a clock that nobody sets: it needs neither the interpreter's lock nor the main
-    thread, so that it ends a loop in compiled code as well.
+    The watchdog is a thread in C with a monotonic clock. It needs neither the interpreter's lock nor the main thread,
+    so it also ends a loop in compiled code.
     """
     if timeout_s is None:
         yield
@@ -99,7 +97,7 @@ def _worker_provenance() -> str:
 
 
 class ExecutorSettings(Settings):
-    """backend: the engine. address: of a cluster that is running; without one, processes on this machine.
+    """backend: the executor. address: of a running cluster; without one, processes on this machine are started.
 
     Dask: `tcp://HOST:PORT` of the scheduler. Ray: `HOST:PORT` of the head, or `auto`.
     """
@@ -115,10 +113,10 @@ class ExecutorSettings(Settings):
 
 
 class BatchExecutor(Protocol):
-    """Takes batches and gives futures of their reports.
+    """Takes batches and returns futures of their reports.
 
-    slots: batches that keep all workers busy; more should not be under way. crashes: what a future raises when the
-    worker died.
+    slots: how many batches keep all workers busy; no more are submitted at a time. crashes: errors that a future raises
+    if its worker died.
     """
 
     @property
@@ -128,5 +126,5 @@ class BatchExecutor(Protocol):
     def crashes(self) -> tuple[type[BaseException], ...]: ...
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future of the batch; it may hold one of `crashes`."""
+        """A future of the report; it may raise one of `crashes`."""
         ...

@@ -22,13 +22,13 @@ _POLL_INTERVAL_S = 1.0  # long against the milliseconds in which loky sees that 
 
 
 class InProcessExecutor:
-    """One batch after the other, here."""
+    """Runs each batch at once, in this process."""
 
     slots = 1
     crashes: tuple[type[BaseException], ...] = ()
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future that is done."""
+        """A future that is done already."""
         future: Future[WorkReport] = Future()
         future.set_result(run_work(work))
         return future
@@ -36,10 +36,10 @@ class InProcessExecutor:
 
 @dataclass
 class LokyExecutor:
-    """A pool of loky's processes, one BLAS thread each; a pool that broke with a worker is replaced by a new one.
+    """A pool of loky's processes, one BLAS thread each; a pool that broke because a worker died is replaced.
 
-    The pool is this executor's own: loky's reusable pool is one for the whole process, and `joblib.Parallel` takes it
-    for its own.
+    The pool belongs to this executor. loky's reusable pool is shared by the whole process, and `joblib.Parallel` would
+    take it for its own.
     """
 
     workers: int
@@ -52,11 +52,10 @@ class LokyExecutor:
 
     @property
     def slots(self) -> int:
-        """Batches under way."""
+        """How many batches are submitted at a time."""
         return _BATCHES_PER_WORKER * self.workers
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future of the batch."""
         try:
             return self._submit_to_pool(work)
         except BrokenProcessPool:
@@ -76,7 +75,7 @@ class LokyExecutor:
 
 @contextmanager
 def local_executor(workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
-    """One worker is this process itself, unless a time limit might end it."""
+    """Processes on this machine; a single worker without a time limit is this process itself."""
     if workers == 1 and timeout_s is None:
         yield InProcessExecutor()
         return
@@ -95,10 +94,10 @@ def local_executor(workers: int, timeout_s: float | None) -> Iterator[BatchExecu
 
 
 def _watch_workers(executor: LokyExecutor, over: threading.Event) -> None:
-    """Breaks a pool that has not noticed for a while that a worker died.
+    """Break a pool that has not noticed for a while that a worker died.
 
-    A worker that dies while it writes a report leaves half of it in the pipe, and loky would wait for the other half
-    for ever: this process holds the pipe open itself.
+    A worker that dies while it writes a report leaves a part of it in the pipe. loky then waits for the rest without
+    end, because this process holds the pipe open itself.
     """
     before: set[int] = set()
     while not over.wait(_POLL_INTERVAL_S):
@@ -114,13 +113,13 @@ def _watch_workers(executor: LokyExecutor, over: threading.Event) -> None:
 
 
 def _prepare_worker(parent: int) -> None:
-    """In a worker: a terminal sends Ctrl-C to all processes, but it is for the parent to stop the work."""
+    """Ignore Ctrl-C, which a terminal sends to all processes: only the parent stops the work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_exit_with_parent, args=(parent,), daemon=True).start()
 
 
 def _exit_with_parent(parent: int) -> None:
-    """A parent that is killed cannot stop its workers, and loky leaves them behind."""
+    """End this worker when its parent is gone: loky leaves the workers of a killed process running."""
     while os.getppid() == parent:
         time.sleep(_POLL_INTERVAL_S)
     os._exit(1)

@@ -1,4 +1,4 @@
-"""`armlab export`: the trajectory of a record, checked at the controller's rate, into a file."""
+"""`armlab export`: the trajectory of a record, checked at the controller's rate, as a file."""
 
 from pathlib import Path
 from typing import Any

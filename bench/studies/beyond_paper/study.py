@@ -1,4 +1,4 @@
-"""`armlab study`: runs what is missing of its experiments, then writes tables, figures and one page over all."""
+"""`armlab study`: runs the missing trials of its experiments and writes tables, figures and one page over all."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -42,10 +42,10 @@ class _Outcomes:
 
 
 def make_study(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
-    """Run what is missing and write everything into the results folder; yields the files as they are written.
+    """Run the missing trials and write all files into the results folder; yields the files as they are written.
 
-    configs: the folder with one configuration for each experiment. records: the best known trajectories. Raises as
-    `run_experiment` does; what is finished is kept, and the same command goes on from there.
+    configs: the folder with one configuration for each experiment. records: the best known trajectories. Raises the
+    errors of `run_experiment`; finished trials stay in the store.
     """
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
     for name in EXPERIMENTS:
@@ -56,7 +56,7 @@ def make_study(configs: Path, options: RunOptions, records: Path, bar: ProgressB
 
 
 def describe_study(configs: Path, options: RunOptions) -> Iterator[str]:
-    """What would be run, and how long it would take."""
+    """Lines that list the trials and estimate the time."""
     for name in EXPERIMENTS:
         yield from describe_run(configs / f"{name}.yaml", options)
 

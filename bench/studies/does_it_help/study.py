@@ -19,9 +19,9 @@ REPETITIONS = 20
 
 
 def make_does_it_help(results: Path, workers: int) -> list[Path]:
-    """Write `results`/paper/does_it_help.* from the best-known records in `results`; returns the files.
+    """Write `results`/paper/does_it_help.* from the best known records in `results`; returns the files.
 
-    Nothing depends on the number of workers. Raises InputError, in one line, without a record to begin from.
+    The results do not depend on the number of workers. Raises InputError, in one line, if there is no record.
     """
     records = read_records(results / RECORDS_FILE)
     chosen, beside = make_specimens(SEED, records), unit_column_specimens(records)

@@ -36,7 +36,7 @@ Files = dict[str, str | bytes]
 
 @dataclass(frozen=True)
 class _ItemSettings:
-    """The settings of what is no experiment of its own."""
+    """The settings of the tables and figures that are no experiments."""
 
     table1: Table1Settings
     table2: Table2Settings
@@ -46,10 +46,10 @@ class _ItemSettings:
 
 
 def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
-    """Run what is missing and write everything into the results folder; yields the files as they are written.
+    """Run the missing trials and write all files into the results folder; yields the files as they are written.
 
-    configs: the folder with one configuration for each table and figure. records: the best known trajectories.
-    Raises as `run_experiment` does.
+    configs: the folder with one configuration for each table and figure. records: the best known trajectories. Raises
+    the errors of `run_experiment`.
     """
     items = _read_items(configs)
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
@@ -62,7 +62,7 @@ def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressB
 
 
 def describe_paper(configs: Path, options: RunOptions) -> Iterator[str]:
-    """What would be run, and how long it would take."""
+    """Lines that list the trials and estimate the time."""
     for name in EXPERIMENTS:
         yield from describe_run(configs / f"{name}.yaml", options)
 

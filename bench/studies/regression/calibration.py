@@ -1,7 +1,7 @@
-"""Calibration of the regression check: its false-alarm rate and its power against shifts and defects, and the report.
+"""Calibration of the regression check: its false-alarm rate, and its power against shifts and defects.
 
-A run is a draw of repetitions without replacement from a bank of trials, the same ones for all algorithms of a
-problem, since those share their first populations.
+A run is a draw of repetitions without replacement from a bank of trials. All algorithms of a problem use the same
+repetitions, because they share their first populations.
 """
 
 import json
@@ -30,7 +30,9 @@ DefectRun = Callable[[str, Sequence[Entry]], Ends]
 
 @dataclass(frozen=True)
 class DefectResult:
-    """verdict: of the fixed run under the defect. power: share of drawn runs that raise an alarm, any and by cell."""
+    """verdict: of the fixed run under the defect. power: share of drawn runs that raise an alarm, in any cell and by
+    cell.
+    """
 
     verdict: CheckVerdict
     power: float
@@ -41,8 +43,9 @@ class DefectResult:
 class Calibration:
     """Shares of runs that raise an alarm.
 
-    false_alarms: runs of unchanged code against the committed baseline; redrawn: against a baseline of the same
-    size, drawn anew for each run. power: by shift of log10 cond in a single cell, that cell's own alarm.
+    false_alarms: runs of unchanged code against the committed baseline; false_alarms_of_drawn_baselines: against a
+    baseline of the same size, drawn anew for each run. power: by shift of log10 cond in a single cell, that cell's own
+    alarm.
     """
 
     runs: int
@@ -112,7 +115,7 @@ def _false_alarms_of_drawn_baselines(sweep: Sweep, bank: Ends) -> float:
 
 
 def _power_of_shift(sweep: Sweep, baseline: Baseline, drawn: Ends, p: Array, shift: float) -> dict[Cell, float]:
-    """Share of runs that find one cell's log10 cond shifted, by cell."""
+    """Share of runs that detect a shift of one cell's log10 cond, by cell."""
     power = {}
     for index, cell in enumerate(drawn):
         shifted = p.copy()
