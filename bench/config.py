@@ -22,7 +22,7 @@ def _to_tuple(value: Any) -> Any:
 
 
 def _expand_problems(value: Any) -> Any:
-    """One problem or many; the name of a suite is replaced by all its problems, also in `{suite: NAME, penalty: ...}`."""
+    """One problem or many; a suite stands for all its problems, also in `{suite: NAME, penalty: ...}`."""
     return tuple(problem for item in _to_tuple(value) for problem in _expand_suite(item))
 
 

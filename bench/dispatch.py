@@ -180,4 +180,4 @@ def _handle_crash(work: Work, queue: _BatchQueue, timeout_s: float | None) -> Wo
 
 def _worker_lost_message(timeout_s: float | None) -> str:
     limit = "" if timeout_s is None else f", or it takes longer than trial_timeout_s = {timeout_s:g}"
-    return f"WorkerLostError: twice the worker process died with this trial: something kills it{limit}"
+    return f"WorkerLostError: the worker process died twice with this trial: something kills it{limit}"

@@ -27,7 +27,7 @@ def check_folder(folder: Path, name: str, settings: str) -> None:
         raise InputError(f"cannot write to the results folder {folder}: {error.strerror}") from None
     way_out = "choose another folder with --results, or replace them with --overwrite"
     if found is None and (folder / f"{name}.csv").exists():
-        raise InputError(f"{folder}/{name}.csv is there without {there.name}, which tells its origin: {way_out}")
+        raise InputError(f"{folder}/{name}.csv stands without {there.name}, which would say how it was made: {way_out}")
     if found not in (None, settings):
         difference = _describe_first_difference(str(found), settings)
         raise InputError(f"{folder} holds results of another configuration ({difference}): {way_out}")

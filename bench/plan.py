@@ -114,7 +114,7 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
     plan = Plan(tuple(series), experiment.repetitions)
     if experiment.output == "rivals" and not rival_pairs(plan.first_entries()):
         raise InputError(
-            f"output 'rivals' of {where} should have a peer and, in 'algorithms', the one that it stands beside"
+            f"output 'rivals' of {where} should have a peer and, in 'algorithms', our algorithm of the same kind"
         )
     return plan
 

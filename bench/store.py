@@ -192,7 +192,7 @@ def _advice_on_error(error: sqlite3.DatabaseError, path: Path) -> str:
     """What the user can do about an error."""
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the rest says more than anyone wants to know
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-        return "; all that was kept before is still there: make room, and the same command goes on"
+        return "; all outcomes stored before are safe: free some space, and the same command continues"
     if code == sqlite3.SQLITE_CORRUPT:
         return f"; `armlab salvage {path} --out NEW` takes what is readable into a new store"
     return ""
@@ -211,13 +211,13 @@ def salvage(damaged: Path, out: Path) -> int:
     if not damaged.is_file():
         raise InputError(f"there is no run store {damaged}")
     if out.exists():
-        raise InputError(f"{out} is there already: name a new file with --out")
+        raise InputError(f"{out} exists already: name a new file with --out")
     with closing(sqlite3.connect(f"{damaged.resolve().as_uri()}?mode=ro", uri=True)) as connection:
         connection.execute("PRAGMA writable_schema = ON")  # else SQLite reads nothing of a file that is too short
         found = _read_outcomes(RunStore(connection, damaged))
         first = next(found, None)
         if first is None:
-            raise InputError(f"nothing of {damaged} can be read: it, or its beginning, is no store's")
+            raise InputError(f"nothing of {damaged} can be read: it is no run store, or its beginning is damaged")
         return _write_outcomes([first], found, out)
 
 

@@ -1,4 +1,4 @@
-"""Tables of outcomes: trials, summaries by algorithm, times, average convergence, and the summary as a Markdown page."""
+"""Tables of outcomes: trials, summaries, times, average convergence, and the summary as a Markdown page."""
 
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import asdict

@@ -20,13 +20,13 @@ _DEFAULT_STORE = Path(".armlab/runs.sqlite")
 
 def _run_options(command: Callable[..., None], results: str = "results") -> Callable[..., None]:
     options = (
-        click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core]."),
+        click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core]."),
         click.option(
             "--store",
             type=click.Path(path_type=Path),
             default=_DEFAULT_STORE,
             show_default=True,
-            help="File that keeps finished trials.",
+            help="File of the run store, which keeps finished trials.",
         ),
         click.option(
             "--results",
@@ -38,11 +38,11 @@ def _run_options(command: Callable[..., None], results: str = "results") -> Call
         click.option(
             "--executor",
             type=click.Choice(["loky", "dask", "ray"]),
-            help="Engine [default: that of the configuration, else loky: processes on this machine].",
+            help="Where the trials run [default: as configured, else loky: processes on this machine].",
         ),
-        click.option("--address", help="Of a running Dask or Ray cluster [default: processes on this machine]."),
+        click.option("--address", help="Address of a running Dask or Ray cluster [default: start processes here]."),
         click.option("--dry-run", is_flag=True, help="List the trials and estimate the time; run nothing."),
-        click.option("--fresh", is_flag=True, help="Compute again what is already kept."),
+        click.option("--fresh", is_flag=True, help="Compute stored trials again."),
         click.option("--overwrite", is_flag=True, help="Replace results of another configuration."),
     )
     for option in reversed(options):
@@ -189,7 +189,7 @@ def check(algorithm: str) -> None:
 
 _PATH = click.Path(path_type=Path)
 _STORE_OPTION = click.option(
-    "--store", type=_PATH, default=Path(".armlab/runs.sqlite"), show_default=True, help="File with finished trials."
+    "--store", type=_PATH, default=_DEFAULT_STORE, show_default=True, help="File of the run store."
 )
 
 
@@ -274,7 +274,7 @@ _RESULTS_OPTION = click.option("--results", type=click.Path(path_type=Path), def
 
 @click.command("best-known")
 @click.option("--minutes", type=click.FloatRange(min=0), default=10.0, show_default=True)
-@click.option("--problem", help="One of configs/best_known.yaml [default: all in turn].")
+@click.option("--problem", help="Name of a problem in configs/best_known.yaml [default: all in turn].")
 @_RESULTS_OPTION
 def best_known(minutes: float, problem: str | None, results: Path) -> None:
     """Search for better trajectories than the best known.
@@ -288,7 +288,7 @@ def best_known(minutes: float, problem: str | None, results: Path) -> None:
 
 
 @click.command("does-it-help")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core].")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_RESULTS_OPTION
 def does_it_help(workers: int | None, results: Path) -> None:
     """Test whether a small condition number helps.
@@ -307,7 +307,9 @@ def does_it_help(workers: int | None, results: Path) -> None:
 @click.argument("problem", type=click.Path(path_type=Path))
 @click.option("--record", required=True, help="Name of a record in best_known.json.")
 @click.option("--format", "form", type=click.Choice(["csv", "ros2", "rapid"]), default="csv", show_default=True)
-@click.option("--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Hz.")
+@click.option(
+    "--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Sampling rate, Hz."
+)
 @click.option("--out", type=click.Path(path_type=Path), required=True)
 @_RESULTS_OPTION
 def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> None:

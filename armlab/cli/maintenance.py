@@ -25,7 +25,7 @@ _PATH = click.Path(path_type=Path)
 
 @click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
-@click.option("--kills", type=click.IntRange(min=1), help="Instead: kill the command, and its workers, so many times.")
+@click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")
 @click.option("--results", type=_PATH, default=Path("results"), show_default=True)
 @click.pass_context
 def scale(context: click.Context, trials: int, kills: int | None, results: Path) -> None:
@@ -50,9 +50,11 @@ def _print_progress(text: str) -> None:
 
 
 @click.command()
-@click.option("--update-baseline", "task", flag_value="update_baseline", help="Accept the present code as it is.")
-@click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power; takes minutes.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core].")
+@click.option(
+    "--update-baseline", "task", flag_value="update_baseline", help="Make the results of the present code the baseline."
+)
+@click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power (minutes).")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @click.option("--config", type=click.Path(path_type=Path), default=Path("configs/regression.yaml"), show_default=True)
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
 @click.pass_context

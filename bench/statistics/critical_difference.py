@@ -31,7 +31,7 @@ class CriticalDifference:
 
     @property
     def has_too_few_blocks(self) -> bool:
-        """Whether no pair can differ significantly: even the smallest possible p-value, of equal signs, is too large."""
+        """Whether no pair can differ significantly: even the smallest possible p-value is too large."""
         return len(self.p) * 2.0 ** (1 - self.blocks) > ERROR_RATE
 
 

@@ -53,4 +53,4 @@ def _check_same_trajectory(settings: ProblemSettings, record: Record, path: Path
     for key in own.keys() | record.settings.keys():
         here, there = (canonical(given.get(key)) for given in (own, record.settings))
         if key not in _KEYS_THAT_MAY_DIFFER and here != there:
-            raise InputError(f"{path}: '{key}' is {here}, the record '{name}' has {there}: another one")
+            raise InputError(f"{path}: '{key}' is {here}, the record '{name}' has {there}: it is of another trajectory")

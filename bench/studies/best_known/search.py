@@ -190,7 +190,9 @@ class _ProblemSearch:
     def _check_record(self, record: Record | None) -> Record | None:
         """The record, if it is of this very problem."""
         if record is not None and canonical(record.settings) != canonical(self.settings):
-            raise InputError(f"{self.path}: '{self.name}' has other settings there: rename the problem or remove it")
+            raise InputError(
+                f"{self.path}: '{self.name}' has other settings there: rename the problem or remove its record"
+            )
         return record
 
     def _run(self, start: SearchStart, old: Record | None, records: dict[str, Record]) -> tuple[str, SearchEnd]:
@@ -201,7 +203,7 @@ class _ProblemSearch:
         if best is not None and start.number % 2:
             return "kick", start.descend_from_kick(self.problem, best)
         if source not in records:
-            raise InputError(f"{self.name} starts from the record of '{source}', which is not there yet")
+            raise InputError(f"{self.name} starts from the record of '{source}', which does not exist yet")
         return f"from {source}", descend(self.problem, record_point(records[source]))
 
     def _update_record(

@@ -1,4 +1,4 @@
-"""The replication report as Markdown and as one HTML file: every claim with our result, the ranking, and the figures."""
+"""The replication report as Markdown and as one HTML file: every claim with our result, ranking and figures."""
 
 import base64
 from collections.abc import Mapping, Sequence
