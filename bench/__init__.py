@@ -1,1 +1,1 @@
-"""Configuration, runner, run store, statistics, tables, figures and the command line."""
+"""The benchmark harness: configuration, plan, execution, run store, statistics, tables, figures and studies."""

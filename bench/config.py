@@ -1,5 +1,6 @@
-"""The configuration of an experiment: one YAML file, typed, hyper-parameters and names of algorithms checked; every
-mistake is reported in one line.
+"""The configuration of an experiment: one YAML file.
+
+Types, hyper-parameters and names of algorithms are checked; every mistake is reported in one line.
 """
 
 from dataclasses import MISSING, fields
@@ -21,7 +22,7 @@ def _to_tuple(value: Any) -> Any:
 
 
 def _expand_problems(value: Any) -> Any:
-    """One problem or many; the name of a suite stands for all its problems, also in `{suite: NAME, penalty: ...}`."""
+    """One problem or many; a suite stands for all its problems, also in `{suite: NAME, penalty: ...}`."""
     return tuple(problem for item in _to_tuple(value) for problem in _expand_suite(item))
 
 
@@ -43,7 +44,7 @@ def _to_choice(value: Any) -> Any:
 
 
 class AlgorithmChoice(Settings):
-    """An algorithm by its registered name, with other hyper-parameters than its defaults if given.
+    """An algorithm by its registered name, and the hyper-parameters that differ from its defaults.
 
     label: its name in tables and figures.
     """
@@ -61,7 +62,7 @@ class ProblemChoice(Settings):
 
 
 def _split_label(value: Any) -> Any:
-    """Our own key `label` apart from the problem's keys; a bare name is a preset."""
+    """Separates the key `label` from the keys of the problem; a bare name is a preset."""
     if isinstance(value, str):
         return _split_label({"preset": value})
     if not isinstance(value, dict):
@@ -75,12 +76,11 @@ OneOrMany = Annotated[tuple[PositiveInt, ...], BeforeValidator(_to_tuple), Field
 
 
 class Experiment(Settings):
-    """What is compared with what: every problem x algorithm x swarm size x budget x repetition.
+    """A comparison: every problem x algorithm x swarm size x budget x repetition.
 
-    iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or
-    evaluations: the budget itself. output: what is made of the outcomes beside the table.
-    printed: show the paper's Table 3 beside ours. executor, trial_timeout_s: on what the trials are run, and after how
-    long one of them is ended; they change no outcome.
+    iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or evaluations: the
+    budget itself. output: the result files beside the table. printed: show the paper's Table 3 beside ours. executor:
+    where the trials run. trial_timeout_s: a trial that takes longer is ended. The last two change no outcome.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]

@@ -1,6 +1,6 @@
-"""One trial: what is run and the key of its outcome, the run itself, and what it leaves behind.
+"""One trial: its content and key, its execution, and its outcome.
 
-This is what a worker process runs.
+Worker processes run this module.
 """
 
 import dataclasses
@@ -27,7 +27,7 @@ from problem.registry import ProblemSettings
 
 @dataclass(frozen=True)
 class Trial:
-    """One run of one algorithm on one problem; what it holds decides the outcome to the bit.
+    """One run of one algorithm on one problem; its fields decide the outcome to the bit.
 
     params: the algorithm's own `Params`. evaluations: the budget. repetition: counts from 0.
     """
@@ -76,10 +76,10 @@ def _problem_text(problem: ProblemSettings) -> str:
 
 @dataclass(frozen=True)
 class Curves:
-    """Convergence, one entry a population (k,), of the problem's own figure without weights and penalty.
+    """Convergence, one entry a population (k,), of the problem's own value without weights and penalty.
 
-    evaluations: used up to and with the population.
-    best_*: of the best point so far. present_*: of the algorithm's own present best.
+    evaluations: the sum up to this population. best_*: of the best point so far. present_*: of the algorithm's own
+    present best.
     """
 
     evaluations: Array
@@ -91,10 +91,10 @@ class Curves:
 
 @dataclass(frozen=True)
 class Outcome:
-    """The end of a trial: its best point (d,) and what the problem says of it.
+    """The end of a trial: its best point (d,) and the problem's evaluation of it.
 
-    value: the problem's own figure, e.g. the condition number, without weights and penalty.
-    violation: 0 when feasible. fitness: what was minimised. seconds: of processor time, for the search alone.
+    value: the problem's own value, e.g. the condition number, without weights and penalty. violation: 0 if feasible.
+    fitness: the minimised number. seconds: processor time of the search alone.
     """
 
     value: float
@@ -116,7 +116,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Failure:
-    """A trial that raised, with the traceback as text."""
+    """A trial that raised an error; traceback: its text."""
 
     trial: Trial
     traceback: str
@@ -124,7 +124,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class _RecordedObjective:
-    """The objective that an algorithm sees, and all that the problem said along the way."""
+    """The objective that an algorithm sees; it records every evaluation of the problem."""
 
     problem: Problem
     said: list[Evaluation] = field(default_factory=list)
@@ -135,12 +135,12 @@ class _RecordedObjective:
         return np.asarray(evaluation.fitness, dtype=float)
 
     def column(self, name: str) -> Array:
-        """One figure of all evaluated points in their order (evaluations,)."""
+        """One quantity of all evaluated points in their order (evaluations,)."""
         return np.concatenate([np.asarray(getattr(evaluation, name), float) for evaluation in self.said])
 
 
 def run_batch(work: Sequence[tuple[str, Trial]]) -> list[tuple[str, Outcome | Failure]]:
-    """Run trials one after the other, each with its key; one that raises leaves the others alone."""
+    """Run trials one after the other, each with its key. An error in one trial does not affect the others."""
     return [(key, _run_guarded(trial)) for key, trial in work]
 
 
@@ -152,7 +152,7 @@ def _run_guarded(trial: Trial) -> Outcome | Failure:
 
 
 def run_trial(trial: Trial) -> Outcome:
-    """Search once, from the first population and the stream that the trial's names give."""
+    """Search once, from the first population and with the random stream that belong to the trial."""
     tape = _RecordedObjective(build_problem(trial.problem))
     began = time.process_time()
     result = _run_search(trial, tape)
@@ -160,7 +160,7 @@ def run_trial(trial: Trial) -> Outcome:
 
 
 def replay(trial: Trial) -> Result:
-    """The search of `run_trial` with the algorithm's last state, which no outcome keeps."""
+    """Repeat the search of `run_trial` and return it with the algorithm's last state, which no outcome keeps."""
     return _run_search(trial, _RecordedObjective(build_problem(trial.problem)))
 
 
@@ -176,13 +176,13 @@ def _run_search(trial: Trial, tape: _RecordedObjective) -> Result:
 
 @lru_cache(maxsize=8)
 def build_problem(settings: ProblemSettings) -> Problem:
-    """The problem, built once a process: it is cheaper to build than to send."""
+    """The problem, built once in each process: building is cheaper than sending it."""
     return settings.build()
 
 
 @lru_cache
 def load_algorithm(name: str) -> AnyAlgorithm:
-    """The algorithm, looked up once a process: the entry points of a large environment take long to read."""
+    """The algorithm, looked up once in each process: reading the entry points of a large environment is slow."""
     return load(name)
 
 
@@ -215,7 +215,7 @@ def _make_curves(result: Result, tape: _RecordedObjective) -> Curves:
 
 
 def _first_index_of(wanted: Array, fitness: Array) -> NDArray[np.intp]:
-    """For each wanted figure the first evaluation that gave it; one past the end if none did."""
+    """For each wanted number the index of the first evaluation that gave it; one past the end if none did."""
     order = np.argsort(fitness, kind="stable")
     place = np.minimum(np.searchsorted(fitness[order], wanted), len(fitness) - 1)
     return np.where(fitness[order[place]] == wanted, order[place], len(fitness))

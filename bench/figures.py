@@ -1,5 +1,5 @@
-"""Figures: one palette and one size, the same bytes for the same data; cost and time against swarm size (Figure 2),
-convergence (Figure 3).
+"""Figures in one style, the same bytes for the same data: cost and time against swarm size (Figure 2), and convergence
+(Figure 3).
 """
 
 from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ DrawPanels = Callable[[Sequence[Axes]], None]
 
 
 class LineStyle(NamedTuple):
-    """How one algorithm is drawn, in all panels of a figure."""
+    """How one algorithm is drawn in all panels of a figure."""
 
     color: str
     linestyle: str | tuple[int, tuple[int, ...]]
@@ -30,13 +30,13 @@ class LineStyle(NamedTuple):
 
 
 def line_style(index: int) -> LineStyle:
-    """The look of the index-th algorithm."""
+    """The style of the index-th algorithm."""
     place = index % len(_COLORS)
     return LineStyle(_COLORS[place], _DASHES[place], _MARKERS[place])
 
 
 def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:
-    """The figure that `draw` makes on a row of axes, as PNG and SVG bytes, a legend below."""
+    """PNG and SVG bytes of a figure with a row of panels, which `draw` fills, and a legend below."""
 
     def fill(figure: Figure) -> None:
         axes = list(figure.subplots(1, panels, squeeze=False, sharey=True)[0])
@@ -48,7 +48,7 @@ def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:
 
 
 def render_figure(size: tuple[float, float], fill: Callable[[Figure], None]) -> dict[str, bytes]:
-    """The figure of that size, inches, that `fill` makes, as PNG and SVG bytes."""
+    """PNG and SVG bytes of a figure of that size, inches, which `fill` fills."""
     with matplotlib.rc_context():
         _set_style()
         figure = Figure(figsize=size, layout="constrained")

@@ -1,40 +1,21 @@
-"""Result files on the disk: written whole or not at all, and never over the results of another configuration."""
+"""The folder of results: it never mixes the results of two configurations."""
 
-import os
 import tempfile
-from collections.abc import Iterable
 from itertools import zip_longest
 from pathlib import Path
 
 from armlab.common.errors import InputError
 
 
-def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
-    """Replace a file in one step, so that a crash leaves the old or the new one, never a half.
-
-    content: the whole, or pieces that are written as they come.
-    """
-    data = content.encode() if isinstance(content, str) else content
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with draft.open("wb") as file:
-            file.writelines([data] if isinstance(data, bytes) else data)
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    finally:
-        draft.unlink(missing_ok=True)
-
-
 def settings_path(folder: Path, name: str) -> Path:
-    """Where the full settings of the results of that name stand, beside them."""
+    """The file with the full settings of the results of that name, beside them."""
     return folder / f"{name}.settings.yaml"
 
 
 def check_folder(folder: Path, name: str, settings: str) -> None:
-    """Make sure, before hours of work, that results of these settings may be written there.
+    """Check, before hours of work, that results of these settings may be written into a folder.
 
-    Raises InputError if the folder cannot be written, or holds results of that name and other settings.
+    Raises InputError if the folder cannot be written, or if it holds results of that name and other settings.
     """
     there = settings_path(folder, name)
     try:
@@ -46,7 +27,7 @@ def check_folder(folder: Path, name: str, settings: str) -> None:
         raise InputError(f"cannot write to the results folder {folder}: {error.strerror}") from None
     way_out = "choose another folder with --results, or replace them with --overwrite"
     if found is None and (folder / f"{name}.csv").exists():
-        raise InputError(f"{folder}/{name}.csv is there without {there.name}, which tells its origin: {way_out}")
+        raise InputError(f"{folder}/{name}.csv stands without {there.name}, which would say how it was made: {way_out}")
     if found not in (None, settings):
         difference = _describe_first_difference(str(found), settings)
         raise InputError(f"{folder} holds results of another configuration ({difference}): {way_out}")

@@ -1,5 +1,5 @@
-"""The trials of a configuration, each with its labels and its key in the run store, and which of our algorithms stand
-beside which peers.
+"""The trials of a configuration, each with its labels and its key in the run store, and the pairs of our algorithms and
+their peers.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -12,7 +12,7 @@ from algorithms.registry import load, peer_names
 from armlab.common.errors import InputError
 from bench.config import AlgorithmChoice, Experiment, ProblemChoice, find_algorithm, parse_params
 from bench.execute import Trial, build_problem
-from bench.provenance import fingerprint
+from bench.fingerprint import fingerprint
 from problem.registry import ProblemSettings, parse_problem
 
 
@@ -38,7 +38,7 @@ class _Contestant:
 
 @dataclass(frozen=True)
 class Series:
-    """The repetitions of one algorithm on one problem, by their labels; code: its `fingerprint`."""
+    """The repetitions of one algorithm on one problem, with their labels; code: its `fingerprint`."""
 
     problem: str
     algorithm: str
@@ -46,14 +46,14 @@ class Series:
     code: str
 
     def entry(self, repetition: int) -> Entry:
-        """One of them."""
+        """The entry of one repetition."""
         trial = replace(self.first, repetition=repetition)
         return Entry(self.problem, self.algorithm, trial, trial.key(self.code))
 
 
 @dataclass(frozen=True)
 class Plan(Sequence[Entry]):
-    """All trials of an experiment, each made when it is looked at: a million take no more memory than ten."""
+    """All trials of an experiment. Each is made when it is needed, so a million take no more memory than ten."""
 
     series: tuple[Series, ...]
     repetitions: int
@@ -83,19 +83,20 @@ class Plan(Sequence[Entry]):
         return [one.entry(repetition) for one in found for repetition in range(self.repetitions)]
 
     def first_entries(self) -> list[Entry]:
-        """The first repetition of each series: all labels and settings that there are."""
+        """The first repetition of each series; together they hold all labels and settings."""
         return [series.entry(0) for series in self.series]
 
 
 def plan_trials(experiment: Experiment, where: str) -> Plan:
     """All trials in the order of the configuration: problem, swarm size, budget, algorithm, repetition.
 
-    Raises InputError, in one line, for a problem, an algorithm or a hyper-parameter that is not right.
+    Raises InputError, in one line, for a problem, an algorithm or a hyper-parameter that is not right, and for output
+    'rivals' without a pair to compare.
     """
     problems = [(choice.label, _parse_problem(choice, where)) for choice in experiment.problem]
     contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
     codes = {
-        (label, contestant.label): fingerprint(contestant.algorithm, problem.model_dump(mode="json"))
+        (label, contestant.label): fingerprint(contestant.algorithm, problem)
         for (label, problem), contestant in product(problems, contestants)
     }
     series = [
@@ -110,11 +111,16 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
         for evaluations in experiment.budgets(swarm_size)
         for contestant in contestants
     ]
-    return Plan(tuple(series), experiment.repetitions)
+    plan = Plan(tuple(series), experiment.repetitions)
+    if experiment.output == "rivals" and not rival_pairs(plan.first_entries()):
+        raise InputError(
+            f"output 'rivals' of {where} should have a peer and, in 'algorithms', our algorithm of the same kind"
+        )
+    return plan
 
 
 def _parse_problem(choice: ProblemChoice, where: str) -> ProblemSettings:
-    """The problem's settings, after it was built once: not all mistakes show before."""
+    """The problem's settings. The problem is built once, because some mistakes show only then."""
     place = f"problem of {where}"
     settings = parse_problem(choice.settings, place)
     try:
@@ -133,7 +139,6 @@ def _make_contestant(choice: AlgorithmChoice, where: str) -> _Contestant:
 def _first_trial(
     experiment: Experiment, problem: ProblemSettings, contestant: _Contestant, swarm_size: int, evaluations: int
 ) -> Trial:
-    """The first repetition."""
     return Trial(
         problem=problem,
         algorithm=contestant.name,
@@ -147,7 +152,7 @@ def _first_trial(
 
 
 def rival_pairs(entries: Iterable[Entry]) -> list[tuple[str, str]]:
-    """Labels of ours and theirs, for every peer whose rival takes part."""
+    """Labels of our algorithm and of the peer, for every peer whose counterpart takes part."""
     labels = dict.fromkeys((entry.algorithm, entry.trial.algorithm) for entry in entries)
     ours = {name: label for label, name in reversed(labels)}
     peers = [(label, _rival_name(name)) for label, name in labels if name in peer_names()]

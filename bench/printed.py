@@ -1,4 +1,4 @@
-"""The numbers that the paper prints, to stand beside ours; they are in `printed.yaml`, each with its place."""
+"""The numbers that the paper prints; they stand in `printed.yaml`, each with its place in the paper."""
 
 from functools import lru_cache
 from pathlib import Path
@@ -35,7 +35,7 @@ class PrintedRow(Settings):
 
 
 class PrintedFigure2(Settings):
-    """What the text says of Figure 2; costs and seconds by swarm size."""
+    """Statements of the text about Figure 2; costs and seconds by swarm size."""
 
     iterations: int
     repetitions: int
@@ -55,7 +55,7 @@ class PrintedTable3(Settings):
 
 
 class PrintedFigure3(Settings):
-    """What the text says of Figure 3."""
+    """Statements of the text about Figure 3."""
 
     mutated_at_iteration: int
 
@@ -70,7 +70,7 @@ class PrintedOptimum(Settings):
 
 
 class PrintedCounts(Settings):
-    """How many of the parameters are said to be identifiable, and how."""
+    """How many parameters the paper calls identifiable, alone or in sums."""
 
     parameters: int
     alone: int
@@ -104,7 +104,7 @@ class PrintedConclusion(Settings):
 
 
 class Printed(Settings):
-    """All of it."""
+    """All numbers of the paper that are compared with ours."""
 
     table1: tuple[PrintedJoint, ...]
     table2: dict[str, dict[str, Number]]
@@ -133,5 +133,5 @@ def times_pi(fraction: Fraction) -> float:
 
 
 def display_name(label: str) -> str:
-    """An algorithm's name as the paper writes it; any other label as it is."""
+    """An algorithm's name as the paper writes it; other labels stay as they are."""
     return {"mupso": "MuPSO"}.get(label, label.upper() if label in read_printed().table2 else label)

@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from armlab.common.files import write_whole
 from bench.config import Experiment
-from bench.files import settings_path, write_whole
+from bench.files import settings_path
 from bench.plan import Plan, rival_pairs
 from bench.store import RunStore
 from bench.tables import as_csv, convergence_table, summary_page, summary_table, tidy_frame, times_table
@@ -12,9 +13,9 @@ Files = dict[str, str | bytes]
 
 
 def write_results(experiment: Experiment, entries: Plan, settings: str, store: RunStore, folder: Path) -> list[Path]:
-    """Write what the experiment's `output` names; returns the files.
+    """Write the files that the experiment's `output` names; returns their paths.
 
-    The settings come last, so that results cut off half-way are not taken for whole ones.
+    The settings are written last, so that incomplete results are never taken for complete ones.
     """
     make = {
         "table": _table_files,

@@ -1,4 +1,4 @@
-"""Our algorithms against other packages' of the same kind: result and time of both, pair by pair."""
+"""Our algorithms beside the same algorithms of other packages: result and time, pair by pair."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -22,14 +22,14 @@ answer: the figure is what a comparison here takes, not the peer's own overhead.
 
 
 def rivals_table(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> pd.DataFrame:
-    """One row a problem and pair, ours and theirs by their labels; frame: tidy, as `tidy_frame` gives it."""
+    """One row a problem and pair, with the labels of both; frame: as `tidy_frame` returns it."""
     return pd.DataFrame(
         [row for _, cell in frame.groupby(_CELL_COLUMNS, sort=False) for row in _pair_rows(cell, pairs)]
     )
 
 
 def rivals_page(table: pd.DataFrame) -> str:
-    """Markdown text of the table."""
+    """The table as a Markdown page."""
     headings = ["problem", "ours", "median", "us", "theirs", "median", "us", "ours better", "p"]
     rows = [
         (

@@ -1,42 +1,43 @@
-"""One experiment from its configuration to its results: check, run what is missing, write; or only list what a run
-would do.
-"""
+"""The flow of one experiment, from its configuration to its results; and what a run would do, without doing it."""
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
 import yaml
 
-from armlab.common.errors import InputError
 from bench.config import Experiment, read_experiment
-from bench.dispatch import Failures, count_missing, make_failure_error, run_missing
+from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing
+from bench.errors import StoppedError, TrialsFailedError
 from bench.execute import Failure, run_batch
+from bench.executors.choice import open_executor
 from bench.executors.contract import ExecutorSettings
 from bench.files import check_folder
-from bench.plan import Plan, Series, plan_trials, rival_pairs
-from bench.store import open_store
+from bench.plan import Entry, Plan, Series, plan_trials
+from bench.store import RunStore, open_store
 
 
 class Progress(Protocol):
-    """What tells the user how far a run is, e.g. a tqdm bar."""
+    """Shows the user how far a run is, e.g. a tqdm bar."""
 
     def update(self, n: int) -> object: ...
 
 
 ProgressBar = Callable[[int, int], AbstractContextManager[Progress]]
+"""Makes a progress bar from the number of all trials and of those already done."""
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """How an experiment is run; nothing here changes a result.
 
-    fresh: forget the outcomes that are kept and compute them again.
-    overwrite: replace results of another configuration. executor: instead of the configuration's.
+    store: file of the run store. results: folder of the result files. workers: processes, where no cluster is named.
+    fresh: forget the stored outcomes and compute them again. overwrite: replace results of another configuration.
+    executor: replaces the one of the configuration.
     """
 
     store: Path
@@ -45,6 +46,33 @@ class RunOptions:
     fresh: bool = False
     overwrite: bool = False
     executor: ExecutorSettings | None = None
+
+
+def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Path]:
+    """Run the missing trials of a configuration and write its results; returns the written files.
+
+    Raises InputError, StoppedError, TrialsFailedError; finished trials stay in the store in any case.
+    """
+    loaded = load_experiment(path)  # validate the configuration, plan its trials
+    experiment, entries = loaded.experiment, loaded.entries
+    if not options.overwrite:
+        check_folder(options.results, experiment.name, loaded.settings)
+    with open_store(options.store) as store:
+        if options.fresh:
+            store.forget(entry.key for entry in entries)
+        missing = count_missing(entries, store)  # look up the finished ones
+        with bar(len(entries), len(entries) - missing) as progress:
+            run_missing(  # execute and store
+                entries,
+                store,
+                options.workers,
+                progress=progress.update,
+                executor=options.executor or experiment.executor,
+                timeout_s=experiment.trial_timeout_s,
+            )
+        from bench.results import write_results  # pandas takes longer to import than a small run
+
+        return write_results(experiment, entries, loaded.settings, store, options.results)  # tables and figures
 
 
 @dataclass(frozen=True)
@@ -57,42 +85,10 @@ class LoadedExperiment:
 
 
 def load_experiment(path: Path) -> LoadedExperiment:
-    """Read and check a configuration; raises InputError, in one line, for any mistake in it."""
+    """Read and check a configuration and plan its trials; raises InputError, in one line, for any mistake in it."""
     experiment = read_experiment(path)
     entries = plan_trials(experiment, str(path))
-    if experiment.output == "rivals" and not rival_pairs(entries.first_entries()):
-        raise InputError(
-            f"output 'rivals' of {path} should have a peer and, in 'algorithms', the one that it stands beside"
-        )
     return LoadedExperiment(experiment, entries, _settings_text(experiment, entries))
-
-
-def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Path]:
-    """Run the missing trials of a configuration and write its results; returns the written files.
-
-    bar: makes a progress bar for the number of all trials and of those already done.
-    Raises InputError, StoppedError, TrialsFailedError; finished trials are kept in any case.
-    """
-    return run_loaded_experiment(load_experiment(path), options, bar)
-
-
-def run_loaded_experiment(loaded: LoadedExperiment, options: RunOptions, bar: ProgressBar) -> list[Path]:
-    """`run_experiment` for a configuration that is read already."""
-    if not options.overwrite:
-        check_folder(options.results, loaded.experiment.name, loaded.settings)
-    with open_store(options.store) as store:
-        if options.fresh:
-            store.forget(entry.key for entry in loaded.entries)
-        left = count_missing(loaded.entries, store)
-        with bar(len(loaded.entries), len(loaded.entries) - left) as progress:
-            executor = options.executor or loaded.experiment.executor
-            limit = loaded.experiment.trial_timeout_s
-            run_missing(loaded.entries, store, options.workers, progress.update, executor, limit)
-        from bench.results import (
-            write_results,
-        )  # pandas and matplotlib take longer to import than a small run
-
-        return write_results(loaded.experiment, loaded.entries, loaded.settings, store, options.results)
 
 
 def _settings_text(experiment: Experiment, entries: Plan) -> str:
@@ -109,18 +105,78 @@ def _settings_text(experiment: Experiment, entries: Plan) -> str:
     return text
 
 
+def run_missing(
+    entries: Sequence[Entry],
+    store: RunStore,
+    workers: int,
+    *,
+    progress: Callable[[int], object] = lambda trials: None,
+    executor: ExecutorSettings | None = None,
+    timeout_s: float | None = None,
+) -> None:
+    """Run the entries that the store lacks and store each outcome as it comes; a failure is never stored.
+
+    workers: processes, where no cluster is named. progress: is called with the number of trials of each batch that is
+    done. timeout_s: a trial that takes longer is ended and counts as failed. None of them changes an outcome.
+    Raises StoppedError on Ctrl-C, and TrialsFailedError at the end if trials failed.
+    """
+    missing, batches = count_missing_work(entries, store)
+    failures = _Failures()
+    try:
+        with (
+            open_executor(executor or ExecutorSettings(), min(workers, max(batches, 1)), timeout_s) as opened,
+            claim_order(entries, store.path) as ordered,
+        ):
+            for report in execute_missing(ordered, store, opened, timeout_s):
+                if report.outcomes:
+                    store.add(report.outcomes, report.origin)
+                failures.add(report.failures)
+                progress(len(report.results))
+    except KeyboardInterrupt:
+        left = count_missing(entries, store)
+        raise StoppedError(
+            f"stopped: {missing - left} trials are finished and kept, {left} are left; "
+            "the same command goes on from here"
+        ) from None
+    if failures.count:
+        raise failures.error()
+
+
+_MAX_FAILURES_LISTED = 100
+
+
+@dataclass
+class _Failures:
+    """How many trials failed, and the first of them."""
+
+    count: int = 0
+    listed: list[Failure] = field(default_factory=list)
+
+    def add(self, failures: Sequence[Failure]) -> None:
+        """Count failures; list no more than a person can read."""
+        self.count += len(failures)
+        self.listed += failures[: _MAX_FAILURES_LISTED - len(self.listed)]
+
+    def error(self) -> TrialsFailedError:
+        """The error that lists the failures, at least one, each with its trial."""
+        lines = [f"{failure.trial}: {failure.traceback.strip().splitlines()[-1]}" for failure in self.listed]
+        lines += [f"and {self.count - len(self.listed)} more"] if self.count > len(self.listed) else []
+        head = f"{self.count} trials raised an error and are not kept; the first one:"
+        return TrialsFailedError("\n".join([head, self.listed[0].traceback, "all of them:", *lines]))
+
+
 _TIMED_POPULATIONS = 4
 
 
 def describe_run(path: Path, options: RunOptions) -> Iterator[str]:
-    """Lines that list the trials of a configuration and estimate the time; nothing is run or kept."""
+    """Lines that list the trials of a configuration and estimate the time; nothing is run or stored."""
     entries = load_experiment(path).entries
-    left = _count_missing_by_series(entries, options)
+    missing = _count_missing_by_series(entries, options)
     for series in entries.series:
-        yield _describe_series(series, entries.repetitions, left[series])
-    total = sum(left.values())
+        yield _describe_series(series, entries.repetitions, missing[series])
+    total = sum(missing.values())
     yield f"{len(entries)} trials, {len(entries) - total} done, {total} to do"
-    seconds = _estimate_seconds(left) / options.workers
+    seconds = _estimate_seconds(missing) / options.workers
     yield f"about {seconds:.1f} s on {options.workers} cores, if otherwise idle, start not counted"
 
 
@@ -134,24 +190,24 @@ def _count_missing_by_series(entries: Plan, options: RunOptions) -> dict[Series,
         }
 
 
-def _describe_series(series: Series, repetitions: int, left: int) -> str:
+def _describe_series(series: Series, repetitions: int, missing: int) -> str:
     trial = series.first
     return (
         f"{series.problem}: {series.algorithm}, swarm size {trial.swarm_size}, {trial.evaluations} evaluations: "
-        f"{repetitions} repetitions, {repetitions - left} done"
+        f"{repetitions} repetitions, {repetitions - missing} done"
     )
 
 
-def _estimate_seconds(left: Mapping[Series, int]) -> float:
+def _estimate_seconds(missing: Mapping[Series, int]) -> float:
     """Seconds on one core, from a few timed populations of each series."""
     seconds = 0.0
-    for series, count in left.items():
+    for series, count in missing.items():
         trial = series.first
         if not count:
             continue
         short = replace(trial, evaluations=min(trial.evaluations, _TIMED_POPULATIONS * trial.swarm_size))
         _, (_, outcome) = run_batch([("to warm the caches", short), ("to time", short)])
         if isinstance(outcome, Failure):
-            raise make_failure_error(Failures(1, [outcome]))
+            raise _Failures(1, [outcome]).error()
         seconds += outcome.seconds / outcome.evaluations * trial.evaluations * count
     return seconds

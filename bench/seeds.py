@@ -1,18 +1,10 @@
-"""Random streams that are derived from names, never from the order of work or the number of workers."""
-
-import hashlib
-import json
+"""The first population and the random stream of a trial."""
 
 import numpy as np
 
 from algorithms.contract import Box
 from armlab.common.arrays import Array
-
-
-def named_generator(*names: str | int) -> np.random.Generator:
-    """A PCG64 generator whose seed is the SHA-256 of the names; other names give an independent stream."""
-    digest = hashlib.sha256(json.dumps(names).encode()).digest()
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(int.from_bytes(digest, "big"))))
+from armlab.common.streams import named_generator
 
 
 def first_population(seed: int, problem: str, repetition: int, swarm_size: int, box: Box) -> Array:

@@ -1,5 +1,5 @@
-"""The run store: finished trials in one SQLite file that survives crashes and two runners at once; and how to salvage
-a damaged one.
+"""The run store: finished trials in one SQLite file, safe against crashes and shared by several runners; and the
+salvage of a damaged one.
 """
 
 import sqlite3
@@ -34,7 +34,7 @@ _LOCK_TIMEOUT_S = 60.0
 
 
 class OutcomeFigures(NamedTuple):
-    """The figures of an `Outcome`; dimension: how many numbers were searched."""
+    """The numbers of an `Outcome` without its arrays; dimension: of the search space."""
 
     value: float
     violation: float
@@ -45,20 +45,20 @@ class OutcomeFigures(NamedTuple):
 
 
 class RunStore:
-    """Outcomes by trial key. An outcome that is there is never written again; a commit is on the disk."""
+    """Outcomes by trial key. A stored outcome is never replaced; a commit is on the disk when it returns."""
 
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self._connection = connection
         self.path = path
 
     def has(self, key: str) -> bool:
-        """Whether the outcome of a key is there."""
+        """Whether the outcome of a key is stored."""
         with _errors_in_one_line(self.path):
             find = "SELECT 1 FROM trials WHERE key = ?"
             return self._connection.execute(find, (key,)).fetchone() is not None
 
     def add(self, outcomes: Sequence[tuple[str, Outcome]], provenance: str) -> None:
-        """Write outcomes by key in one durable transaction; keys that another runner has written stay."""
+        """Write outcomes by key in one durable transaction; keys that another runner has written stay as they are."""
         with _errors_in_one_line(self.path), _transaction(self._connection) as sql:
             sql.execute("INSERT INTO provenance (facts) VALUES (?) ON CONFLICT DO NOTHING", (provenance,))
             (source,) = sql.execute("SELECT id FROM provenance WHERE facts = ?", (provenance,)).fetchone()
@@ -66,7 +66,7 @@ class RunStore:
                 _insert_outcome(sql, key, outcome, source)
 
     def get(self, key: str) -> Outcome:
-        """The outcome of a key; raises KeyError if it is not there."""
+        """The outcome of a key; raises KeyError if it is not stored."""
         figures = self.figures(key)
         with _errors_in_one_line(self.path):
             find = "SELECT name, dtype, data FROM arrays WHERE key = ?"
@@ -76,7 +76,7 @@ class RunStore:
         return Outcome(*figures[:-1], best_x, Curves(**arrays))
 
     def figures(self, key: str) -> OutcomeFigures:
-        """The figures of an outcome without its arrays; raises KeyError if it is not there."""
+        """The numbers of an outcome without its arrays; raises KeyError if it is not stored."""
         find = (
             "SELECT value, violation, fitness, evaluations, seconds, length(data) FROM trials "
             f"JOIN arrays ON arrays.key = trials.key AND name = '{_BEST_X}' WHERE trials.key = ?"
@@ -102,7 +102,7 @@ class RunStore:
             return [key for (key,) in self._connection.execute(find, (prefix, f"{prefix}g")).fetchall()]
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Drop outcomes, so that they are computed again."""
+        """Delete outcomes, so that they are computed again."""
         with _errors_in_one_line(self.path), _transaction(self._connection) as sql:
             for key in keys:
                 sql.execute("DELETE FROM arrays WHERE key = ?", (key,))
@@ -111,10 +111,10 @@ class RunStore:
 
 @contextmanager
 def open_store(path: Path) -> Iterator[RunStore]:
-    """The store in a file, made if there is none.
+    """The store in a file, which is made if it does not exist.
 
-    Raises InputError, in one line, for a folder or file that cannot be written, a corrupt file, another
-    program's file, and a store of another version of the schema.
+    Raises InputError, in one line, for a folder or file that cannot be written, a corrupt file, another program's file,
+    and a store of another version of the schema.
     """
     with _errors_in_one_line(path):
         connection = _connect(path)
@@ -177,7 +177,7 @@ def _transaction(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]
 
 @contextmanager
 def _errors_in_one_line(path: Path) -> Iterator[None]:
-    """What a file system or SQLite complains of, in one line; our own mistakes in SQL pass through."""
+    """Errors of the file system and of SQLite as InputError, in one line; mistakes in our own SQL stay as they are."""
     try:
         yield
     except OSError as error:
@@ -189,10 +189,10 @@ def _errors_in_one_line(path: Path) -> Iterator[None]:
 
 
 def _advice_on_error(error: sqlite3.DatabaseError, path: Path) -> str:
-    """What to do about it, and that nothing is lost."""
+    """What the user can do about an error."""
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF  # the rest says more than anyone wants to know
     if code in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-        return "; all that was kept before is still there: make room, and the same command goes on"
+        return "; all outcomes stored before are safe: free some space, and the same command continues"
     if code == sqlite3.SQLITE_CORRUPT:
         return f"; `armlab salvage {path} --out NEW` takes what is readable into a new store"
     return ""
@@ -204,20 +204,20 @@ StoredOutcome = tuple[str, Outcome, str]
 
 
 def salvage(damaged: Path, out: Path) -> int:
-    """Take every outcome that can be read into a new store; returns how many those are. The damaged one stays as it is.
+    """Copy every outcome that can be read into a new store; returns their number. The damaged file is not changed.
 
-    Raises InputError if there is no such file, nothing of it can be read, or the new store exists.
+    Raises InputError if there is no such file, if nothing of it can be read, or if the new store exists.
     """
     if not damaged.is_file():
         raise InputError(f"there is no run store {damaged}")
     if out.exists():
-        raise InputError(f"{out} is there already: name a new file with --out")
+        raise InputError(f"{out} exists already: name a new file with --out")
     with closing(sqlite3.connect(f"{damaged.resolve().as_uri()}?mode=ro", uri=True)) as connection:
         connection.execute("PRAGMA writable_schema = ON")  # else SQLite reads nothing of a file that is too short
         found = _read_outcomes(RunStore(connection, damaged))
         first = next(found, None)
         if first is None:
-            raise InputError(f"nothing of {damaged} can be read: it, or its beginning, is no store's")
+            raise InputError(f"nothing of {damaged} can be read: it is no run store, or its beginning is damaged")
         return _write_outcomes([first], found, out)
 
 
@@ -240,7 +240,9 @@ def _read_outcomes(store: RunStore) -> Iterator[StoredOutcome]:
 
 
 def _read_keys(store: RunStore, prefix: str) -> list[str]:
-    """Of a prefix, or, where it leads over a damaged page, of those longer ones that do not."""
+    """The keys with a prefix, or, where the prefix leads over a damaged page, those with the longer prefixes that can
+    be read.
+    """
     try:
         return store.keys(prefix)
     except InputError:

@@ -1,6 +1,4 @@
-"""Tables of outcomes: one row a trial, summaries by algorithm, times, average convergence, and the summary as a
-Markdown page.
-"""
+"""Tables of outcomes: trials, summaries, times, average convergence, and the summary as a Markdown page."""
 
 from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import asdict
@@ -24,7 +22,7 @@ _ROWS_PER_PIECE = 4096  # that are Python objects at a time; in the table a row 
 
 
 def tidy_frame(entries: Iterable[Entry], store: RunStore) -> pd.DataFrame:
-    """One row a trial in the order of the entries, which must all be in the store; their arrays stay there."""
+    """One row a trial in the order of the entries, which must all be in the store; arrays are not read."""
     rows = (_trial_row(entry, store) for entry in entries)
     return pd.concat(_frame_pieces(rows), ignore_index=True)
 
@@ -35,12 +33,12 @@ def _frame_pieces(rows: Iterator[dict[str, object]]) -> Iterator[pd.DataFrame]:
 
 
 def _trial_row(entry: Entry, store: RunStore) -> dict[str, object]:
-    """The facts of one trial by column."""
+    """The numbers and labels of one trial by column."""
     return entry_labels(entry) | store.figures(entry.key)._asdict()
 
 
 def entry_labels(entry: Entry) -> dict[str, object]:
-    """Which trial it is, by column."""
+    """The labels of a trial by column."""
     return {
         "problem": entry.problem,
         "swarm_size": entry.trial.swarm_size,
@@ -56,7 +54,7 @@ SUMMARY_COLUMNS = ["algorithm", *Summary.__dataclass_fields__, "evaluations"]
 def summary_table(frame: pd.DataFrame) -> pd.DataFrame:
     """One row a problem, swarm size, budget and algorithm, in the order of the frame.
 
-    evaluations: average over the repetitions. A tidy frame of one problem and swarm size gives COLUMNS alone.
+    evaluations: average over the repetitions. Problem and swarm size are left out where there is only one.
     """
     rows = [
         {
@@ -70,7 +68,7 @@ def summary_table(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def times_table(frame: pd.DataFrame) -> pd.DataFrame:
-    """Seconds of search on one core, by the same groups: of a run on average, its deviation, and in total."""
+    """Processor time of the search, s, by the same groups: average of a run, standard deviation, and total."""
     seconds = frame.groupby(GROUP_COLUMNS, sort=False)["seconds"]
     table = seconds.agg(average_seconds="mean", standard_deviation="std", total_seconds="sum").reset_index()
     return table[[*_varying_columns(frame), "algorithm", "average_seconds", "standard_deviation", "total_seconds"]]
@@ -81,15 +79,15 @@ def _varying_columns(frame: pd.DataFrame) -> list[str]:
 
 
 def as_csv(table: pd.DataFrame) -> str:
-    """CSV text with six significant digits, which rounding differences between machines rarely reach."""
+    """CSV text with six significant digits, which rounding differences between machines rarely change."""
     return table.to_csv(index=False, float_format="%.6g", na_rep="nan", lineterminator="\n")
 
 
 def convergence_table(entries: Sequence[Entry], store: RunStore) -> pd.DataFrame:
     """One row an algorithm and iteration; iteration 0 is the first population.
 
-    best_so_far, present_best: averages over the repetitions whose point is feasible at that time, NaN without
-    any; the two shares say how many those are.
+    best_so_far, present_best: averages over the repetitions whose point is feasible at that time, NaN if there are
+    none; the two shares give how many those are.
     """
     labels = dict.fromkeys(entry.algorithm for entry in entries)
     return pd.concat(
@@ -125,16 +123,16 @@ def _average_convergence(label: str, curves: Sequence[Curves]) -> pd.DataFrame:
 
 
 def _align_curves(moments: Array, curves: Sequence[Curves], rows: Sequence[Array]) -> Array:
-    """Rows below each other at common numbers of evaluations (n, moments): populations need not be of one size.
+    """The rows at common numbers of evaluations, (n, moments); populations need not be of one size.
 
-    Before its first population a run has the figure of that; after its end it stays where it ended.
+    Before its first population a run has the value of that population, and after its end the value of its end.
     """
     places = [np.searchsorted(curve.evaluations, moments, side="right") - 1 for curve in curves]
     return np.stack([row[np.maximum(place, 0)] for row, place in zip(rows, places, strict=True)])
 
 
 def _feasible_mean(values: Array, violations: Array) -> tuple[Array, Array]:
-    """Averages over the feasible entries of each column (n, k) and the shares of those."""
+    """Averages over the feasible entries of each column of (n, k), and the shares of these entries."""
     feasible = is_feasible(values, violations)
     count = feasible.sum(axis=0)
     total = np.where(feasible, values, 0.0).sum(axis=0)
@@ -166,7 +164,7 @@ _PRINTED_COLUMNS = ("minimum", "average", "standard_deviation")
 
 
 def summary_page(table: pd.DataFrame, experiment: Experiment) -> str:
-    """Markdown text of a summary table."""
+    """A summary table as a Markdown page."""
     names = [name for name in table.columns if name not in _SUMMARY_HEADINGS]
     headings = [*names, *_SUMMARY_HEADINGS.values(), *(["seconds (paper)"] if experiment.printed else [])]
     rows = [_summary_cells(row, names, experiment.printed) for row in table.to_dict("records")]

@@ -1,5 +1,6 @@
-"""Trajectories as files for robot controllers: sampled at the controller's rate, refused if a limit is broken there,
-as CSV, ROS 2 message or RAPID module.
+"""Trajectories as files for robot controllers, sampled at the controller's rate: CSV, ROS 2 message or RAPID module.
+
+A trajectory that breaks a limit at that rate is refused.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,7 +21,7 @@ MAX_RATE_AT_REST = 1e-9  # rad/s and rad/s2 (m): what rounding leaves
 
 @dataclass(frozen=True, eq=False)
 class SampledTrajectory:
-    """A motion (samples, joints) at a rate, by joint names; kinds: revolute or prismatic."""
+    """A motion (samples, joints) at a rate; kinds: of the joints, revolute or prismatic."""
 
     name: str
     joint_names: tuple[str, ...]
@@ -62,7 +63,7 @@ def _check_rest_at_ends(motion: Motion, name: str) -> None:
 
 
 def _describe_worst_violation(constraints: Constraints, motion: Motion) -> str:
-    """The limit of joint motion that is exceeded most, relative to its size."""
+    """The most exceeded limit of joint motion, relative to its size."""
     told: dict[str, float] = {}
     for joint, limits, peak in zip(constraints.arm.joints, constraints.limits, peaks(motion)[0], strict=True):
         low, high, speed, acceleration = (float(value) for value in peak)
@@ -110,7 +111,7 @@ def to_csv(trajectory: SampledTrajectory) -> str:
 
 
 def to_ros2(trajectory: SampledTrajectory) -> str:
-    """A message trajectory_msgs/msg/JointTrajectory as YAML: rad (m), from the start of the motion."""
+    """A message trajectory_msgs/msg/JointTrajectory as YAML: rad (m), s from the start of the motion."""
     names = ", ".join(trajectory.joint_names)
     lines = ["header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}", f"joint_names: [{names}]", "points:"]
     for index, parts in enumerate(zip(*_motion_parts(trajectory), strict=True)):
@@ -123,7 +124,7 @@ def to_ros2(trajectory: SampledTrajectory) -> str:
 
 
 def to_rapid(trajectory: SampledTrajectory) -> str:
-    """A RAPID module for a six-axis robot, axes behind the arm's at zero; raises InputError for another arm."""
+    """A RAPID module for a six-axis robot; axes that the arm lacks stay at zero. Raises InputError for another arm."""
     joints = trajectory.motion.joints
     if joints > ROBOT_AXES or "prismatic" in trajectory.kinds:
         raise InputError(f"RAPID has six turning robot axes; {trajectory.name} moves {', '.join(trajectory.kinds)}")

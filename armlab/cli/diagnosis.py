@@ -44,7 +44,11 @@ def next_experiment(
     out: Path,
     seed: int,
 ) -> None:
-    """Design the motion that decides between the rivals of VERDICT: CSV, ROS 2, RAPID, card and picture."""
+    """Design the motion that decides between rival effects.
+
+    VERDICT: a verdict whose findings have rivals. Writes the motion as CSV, ROS 2 message and RAPID module, with a
+    card and a picture.
+    """
     from armlab.cli.next_experiment import write_next_experiment
     from armlab.diagnosis.next.motion import Budget
 
@@ -67,7 +71,10 @@ def next_experiment(
 def diagnose(
     recording: Path, out: Path, baseline: str | None, seed: int, old: Path | None, without: tuple[str, ...]
 ) -> None:
-    """Say where the simulation of RECORDING is wrong, what physics is missing, and how much better it then predicts."""
+    """Find the physics that the simulation of RECORDING lacks.
+
+    Says where the simulation is wrong, which effects are missing, and how much better it predicts with them.
+    """
     from armlab.diagnosis.compare.report import compare_recordings
     from armlab.diagnosis.report.write import diagnose_recording
 
@@ -86,7 +93,10 @@ def diagnose(
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("out", type=click.Path(path_type=Path))
 def export_model(model: Path, out: Path) -> None:
-    """Write MODEL, a model.yaml with links, as OUT: a .urdf or an MJCF .xml file."""
+    """Export MODEL as URDF or MJCF.
+
+    MODEL: a model.yaml with links. OUT: a .urdf file, or an .xml file for MJCF.
+    """
     from armlab.identification.export import export_model as write
 
     for line in write(model, out):
@@ -108,7 +118,7 @@ real = click.Command(
     "real",
     params=identify_real.params,
     callback=_identify_and_diagnose,
-    help="Identify and diagnose the public recordings of real arms: tables and pages in results/real.",
+    help="Identify and diagnose public recordings of real arms.\n\nWrites tables and pages into results/real.",
 )
 
 
@@ -117,7 +127,11 @@ real = click.Command(
 @click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
 def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> None:
-    """Conceal something in public recordings of real arms, diagnose them, and judge: concealed.md, .csv and .svg."""
+    """Judge diagnoses of effects concealed in real recordings.
+
+    Conceals effects in public recordings of real arms, diagnoses them, and compares. Writes concealed.md,
+    concealed.csv and concealed.svg.
+    """
     from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 
     with ProgressLine() as progress:
@@ -133,7 +147,9 @@ def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> No
 @click.option("--joints", type=click.IntRange(min=1), help="How many of its first joints move [default: all].")
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the card as page, tables and pictures.")
 def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints: int | None, out: Path | None) -> None:
-    """Say which effects TRAJECTORY on ROBOT could not tell apart, before anyone records it.
+    """List the effects that TRAJECTORY cannot tell apart.
+
+    Needs no recording: it tells before anyone records the trajectory.
 
     ROBOT: a file or a built-in name. TRAJECTORY: a CSV with t, q1, ... in s and rad, a recording folder, or the name
     of a trajectory in results/best_known.json.

@@ -20,13 +20,13 @@ _DEFAULT_STORE = Path(".armlab/runs.sqlite")
 
 def _run_options(command: Callable[..., None], results: str = "results") -> Callable[..., None]:
     options = (
-        click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core]."),
+        click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core]."),
         click.option(
             "--store",
             type=click.Path(path_type=Path),
             default=_DEFAULT_STORE,
             show_default=True,
-            help="File that keeps finished trials.",
+            help="File of the run store, which keeps finished trials.",
         ),
         click.option(
             "--results",
@@ -38,11 +38,11 @@ def _run_options(command: Callable[..., None], results: str = "results") -> Call
         click.option(
             "--executor",
             type=click.Choice(["loky", "dask", "ray"]),
-            help="Engine [default: that of the configuration, else loky: processes on this machine].",
+            help="Where the trials run [default: as configured, else loky: processes on this machine].",
         ),
-        click.option("--address", help="Of a running Dask or Ray cluster [default: processes on this machine]."),
+        click.option("--address", help="Address of a running Dask or Ray cluster [default: start processes here]."),
         click.option("--dry-run", is_flag=True, help="List the trials and estimate the time; run nothing."),
-        click.option("--fresh", is_flag=True, help="Compute again what is already kept."),
+        click.option("--fresh", is_flag=True, help="Compute stored trials again."),
         click.option("--overwrite", is_flag=True, help="Replace results of another configuration."),
     )
     for option in reversed(options):
@@ -54,35 +54,41 @@ def _run_options(command: Callable[..., None], results: str = "results") -> Call
 @click.argument("config", type=click.Path(path_type=Path))
 @_run_options
 def run(config: Path, **options: Any) -> None:
-    """Run what is missing of an experiment and write its results."""
+    """Run the missing trials of CONFIG and write its results."""
     _run_configs([config], **options)
 
 
 @click.command()
 @_run_options
 def table3(**options: Any) -> None:
-    """Table 3 of the paper: configs/table3.yaml."""
+    """Make Table 3 of the paper: configs/table3.yaml."""
     _run_configs([Path("configs/table3.yaml")], **options)
 
 
 @click.command()
 @_run_options
 def figure2(**options: Any) -> None:
-    """Figure 2, as published and at equal evaluations: configs/figure2*.yaml."""
+    """Make Figure 2 of the paper: configs/figure2*.yaml.
+
+    Once as published, and once at equal evaluations.
+    """
     _run_configs([Path("configs/figure2.yaml"), Path("configs/figure2_equal_evaluations.yaml")], **options)
 
 
 @click.command()
 @_run_options
 def figure3(**options: Any) -> None:
-    """Figure 3 of the paper: configs/figure3.yaml."""
+    """Make Figure 3 of the paper: configs/figure3.yaml."""
     _run_configs([Path("configs/figure3.yaml")], **options)
 
 
 @click.command()
 @partial(_run_options, results="results/paper")
 def paper(**options: Any) -> None:
-    """All tables and figures of the paper, and what of it could be reproduced: results/paper/."""
+    """Make all tables and figures of the paper.
+
+    Writes them into results/paper/, with a report on which claims of the paper could be reproduced.
+    """
     from bench.studies.paper.replication import describe_paper, make_paper
 
     _make_study(make_paper, describe_paper, **options)
@@ -91,7 +97,11 @@ def paper(**options: Any) -> None:
 @click.command()
 @partial(_run_options, results="results/study")
 def study(**options: Any) -> None:
-    """The comparison where the paper stops: six joints, frames, budgets, MuPSO's ingredients: results/study/."""
+    """Compare the algorithms beyond the paper's cases.
+
+    Six joints, randomly shifted coordinates, equal evaluations, larger budgets, and MuPSO's ingredients one by one.
+    Writes into results/study/.
+    """
     from bench.studies.beyond_paper.study import describe_study, make_study
 
     _make_study(make_study, describe_study, **options)
@@ -128,7 +138,10 @@ def _read_run_options(workers: int | None, executor: str | None, address: str | 
 
 @click.command("list")
 def list_names() -> None:
-    """The algorithms, problems and arms that a configuration can name."""
+    """List the algorithms, problems and arms by their names.
+
+    A configuration uses these names.
+    """
     from algorithms import registry as algorithms
     from problem import registry as problems
     from problem.robot_file import built_in_arms
@@ -146,7 +159,10 @@ def list_names() -> None:
 @click.argument("robot")
 @click.option("--columns", type=click.Choice(["later_columns", "earlier_columns"]), default="later_columns")
 def base(robot: str, columns: str) -> None:
-    """The base parameters of ROBOT: a built-in arm, a robot file or a URDF."""
+    """Show the base parameters of ROBOT.
+
+    ROBOT: the name of a built-in arm, a robot file or a URDF.
+    """
     from problem.base_parameters import base_parameters
     from problem.robot_file import load_arm
 
@@ -160,7 +176,7 @@ def base(robot: str, columns: str) -> None:
 @click.command()
 @click.argument("algorithm")
 def check(algorithm: str) -> None:
-    """Test whether an algorithm keeps the promises of its contract."""
+    """Test whether ALGORITHM keeps its contract."""
     from algorithms.check import BrokenPromiseError, check_algorithm
     from bench.config import find_algorithm
 
@@ -173,7 +189,7 @@ def check(algorithm: str) -> None:
 
 _PATH = click.Path(path_type=Path)
 _STORE_OPTION = click.option(
-    "--store", type=_PATH, default=Path(".armlab/runs.sqlite"), show_default=True, help="File with finished trials."
+    "--store", type=_PATH, default=_DEFAULT_STORE, show_default=True, help="File of the run store."
 )
 
 
@@ -182,7 +198,11 @@ _STORE_OPTION = click.option(
 @_STORE_OPTION
 @click.option("--out", type=_PATH, help="HTML file [default: results/NAME_report.html].")
 def report(results: Path, store: Path, out: Path | None) -> None:
-    """One self-contained HTML page about RESULTS: a configuration file, or a folder that `share` wrote."""
+    """Write one HTML page about RESULTS.
+
+    RESULTS: a configuration file whose trials were run, or a folder that `share` wrote. The page needs no other
+    file.
+    """
     from bench.report.page import write_report
 
     click.echo(write_report(results, store, out))
@@ -194,7 +214,11 @@ def report(results: Path, store: Path, out: Path | None) -> None:
 @_STORE_OPTION
 @click.option("--out", type=_PATH, help="Folder for comparison.md and .csv [default: print only].")
 def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
-    """What changed from the results FIRST to SECOND, algorithm by algorithm and problem by problem."""
+    """Show what changed between two sets of results.
+
+    Compares SECOND with FIRST, algorithm by algorithm and problem by problem. Each is a configuration file whose
+    trials were run, or a folder that `share` wrote.
+    """
     from bench.result_sets.compare import compare_results
 
     click.echo(compare_results(first, second, store, out), nl=False)
@@ -206,7 +230,11 @@ def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
 @click.option("--as", "form", type=click.Choice(["csv", "parquet", "ioh"]), default="csv", show_default=True)
 @click.option("--out", type=_PATH, required=True, help="Folder to write into.")
 def share(results: Path, store: Path, form: str, out: Path) -> None:
-    """Write RESULTS as tidy tables (csv, parquet) or in the format of IOHprofiler (ioh)."""
+    """Write RESULTS as tables or in IOHprofiler's format.
+
+    csv, parquet: tidy tables. ioh: the format of IOHprofiler. RESULTS: a configuration file whose trials were run,
+    or a folder that `share` wrote.
+    """
     from bench.result_sets.formats import share_results
 
     for path in share_results(results, store, form, out):
@@ -217,7 +245,10 @@ def share(results: Path, store: Path, form: str, out: Path) -> None:
 @click.argument("damaged", type=_PATH)
 @click.option("--out", type=_PATH, required=True, help="File of the new store.")
 def salvage(damaged: Path, out: Path) -> None:
-    """Take what is readable of a DAMAGED run store into a new one; the rest is computed again by the next run."""
+    """Copy what is readable of a DAMAGED run store.
+
+    The copy is a new store; the next run computes what it lacks.
+    """
     from bench.store import salvage as save
 
     click.echo(f"{save(damaged, out)} outcomes of {damaged} are in {out}")
@@ -227,7 +258,11 @@ def salvage(damaged: Path, out: Path) -> None:
 @click.argument("algorithms", nargs=-1)
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
 def properties(algorithms: tuple[str, ...], results: Path) -> None:
-    """Translation, scale, noise, bounds and overhead of ALGORITHMS [default: all]: properties.md and .csv."""
+    """Measure general properties of ALGORITHMS [default: all].
+
+    Behaviour under translation, scale and noise, use of the bounds, and overhead. Writes properties.md and
+    properties.csv.
+    """
     from bench.studies.properties import write_properties
 
     for path in write_properties(algorithms, results):
@@ -239,10 +274,13 @@ _RESULTS_OPTION = click.option("--results", type=click.Path(path_type=Path), def
 
 @click.command("best-known")
 @click.option("--minutes", type=click.FloatRange(min=0), default=10.0, show_default=True)
-@click.option("--problem", help="One of configs/best_known.yaml [default: all in turn].")
+@click.option("--problem", help="Name of a problem in configs/best_known.yaml [default: all in turn].")
 @_RESULTS_OPTION
 def best_known(minutes: float, problem: str | None, results: Path) -> None:
-    """Search on for better trajectories: best_known.json; stop it at any time, it goes on from there."""
+    """Search for better trajectories than the best known.
+
+    Updates best_known.json. You can stop the search at any time; the next call continues from there.
+    """
     from bench.studies.best_known.search import improve_best_known
 
     for line in improve_best_known(results, minutes, problem):
@@ -250,10 +288,13 @@ def best_known(minutes: float, problem: str | None, results: Path) -> None:
 
 
 @click.command("does-it-help")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core].")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_RESULTS_OPTION
 def does_it_help(workers: int | None, results: Path) -> None:
-    """Does a small condition number help to identify the arm? Writes paper/does_it_help.*."""
+    """Test whether a small condition number helps.
+
+    Identifies a simulated arm with trajectories of many condition numbers. Writes paper/does_it_help.*.
+    """
     from joblib import cpu_count
 
     from bench.studies.does_it_help.study import make_does_it_help as answer
@@ -266,11 +307,16 @@ def does_it_help(workers: int | None, results: Path) -> None:
 @click.argument("problem", type=click.Path(path_type=Path))
 @click.option("--record", required=True, help="Name of a record in best_known.json.")
 @click.option("--format", "form", type=click.Choice(["csv", "ros2", "rapid"]), default="csv", show_default=True)
-@click.option("--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Hz.")
+@click.option(
+    "--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Sampling rate, Hz."
+)
 @click.option("--out", type=click.Path(path_type=Path), required=True)
 @_RESULTS_OPTION
 def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> None:
-    """Write the best trajectory known for a robot, if it keeps the limits of PROBLEM at the controller's rate."""
+    """Write a best known trajectory for a robot controller.
+
+    Refuses a trajectory that breaks a limit of PROBLEM at the controller's rate.
+    """
     from bench.studies.best_known.export import export_record as write
     from bench.studies.best_known.records import RECORDS_FILE
 

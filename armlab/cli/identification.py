@@ -24,7 +24,10 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
 def identify(
     recording: Path, out: Path | None, method: str, cutoff_hz: float | None, tolerance: float | None, choose: bool
 ) -> None:
-    """Identify the parameters of the arm of RECORDING, a recording folder."""
+    """Identify the parameters of an arm from RECORDING.
+
+    RECORDING: a recording folder.
+    """
     from armlab.identification.identify import IdentifyOptions, identify_recording
 
     for line in identify_recording(recording, out or recording, IdentifyOptions(method, cutoff_hz, tolerance, choose)):
@@ -36,7 +39,10 @@ def identify(
 @click.argument("recording", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for the predicted torques, a CSV a run.")
 def predict(model: Path, recording: Path, out: Path | None) -> None:
-    """Compare the torque of MODEL, a model.yaml, with that of RECORDING."""
+    """Compare the torque of MODEL with that of RECORDING.
+
+    MODEL: a model.yaml. RECORDING: a recording folder.
+    """
     from armlab.identification.identify import predict_recording
 
     for line in predict_recording(model, recording, out):
@@ -63,7 +69,10 @@ def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | N
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
 def coverage(experiments: int, seed: int, results: Path) -> None:
-    """How often 95 % intervals hold the truth, over simulated experiments: coverage.json."""
+    """Measure how often 95 % intervals contain the truth.
+
+    Simulates experiments and identifies them. Writes coverage.json.
+    """
     from armlab.identification.coverage import write_coverage
 
     for line in write_coverage(experiments, seed, results):
@@ -97,7 +106,10 @@ def payload(
     counterbalance: int | None,
     cutoff_hz: float | None,
 ) -> None:
-    """Identify the load that the arm carries in LOADED, a recording folder."""
+    """Identify the load that an arm carries in LOADED.
+
+    LOADED: a recording folder.
+    """
     from armlab.identification.payload import PayloadSetting, Place, payload_lines
 
     for line in payload_lines(loaded, without, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)):
@@ -119,7 +131,10 @@ def gains(
     counterbalance: int | None,
     cutoff_hz: float | None,
 ) -> None:
-    """Find how much each joint's torque reading is too large, from the known load that the arm carries in LOADED."""
+    """Estimate the error of the torque gains of all joints.
+
+    Uses the known load that the arm carries in LOADED, a recording folder.
+    """
     from armlab.identification.payload import PayloadSetting, Place, gains_lines
 
     for line in gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)):

@@ -10,7 +10,10 @@ from armlab.cli.harness import trial_bar
 @click.command()
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
 def speed(results: Path) -> None:
-    """How fast, beside Pinocchio, mealpy, pygmo and scipy: speed.json and speed.md (extras `engines`, `peers`)."""
+    """Measure speed beside that of other packages.
+
+    The others are Pinocchio, mealpy, pygmo and scipy (extras `engines`, `peers`). Writes speed.json and speed.md.
+    """
     from bench.studies.speed.report import write_speed_report
 
     for path in write_speed_report(results):
@@ -22,11 +25,15 @@ _PATH = click.Path(path_type=Path)
 
 @click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
-@click.option("--kills", type=click.IntRange(min=1), help="Instead: kill the command, and its workers, so many times.")
+@click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")
 @click.option("--results", type=_PATH, default=Path("results"), show_default=True)
 @click.pass_context
 def scale(context: click.Context, trials: int, kills: int | None, results: Path) -> None:
-    """Memory, overhead and efficiency of large sweeps: scale.md. With --kills: kills.md, exit code 1 after a loss."""
+    """Measure memory, overhead and efficiency of large sweeps.
+
+    Writes scale.md. With --kills: kills processes at random times and writes kills.md; exit code 1 if an outcome
+    was lost.
+    """
     from bench.studies.scale.report import write_kills, write_scale
 
     configs, unharmed = Path("configs"), True
@@ -43,14 +50,19 @@ def _print_progress(text: str) -> None:
 
 
 @click.command()
-@click.option("--update-baseline", "task", flag_value="update_baseline", help="Accept the present code as it is.")
-@click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power; takes minutes.")
-@click.option("--workers", type=click.IntRange(min=1), help="Processes [default: one a core].")
+@click.option(
+    "--update-baseline", "task", flag_value="update_baseline", help="Make the results of the present code the baseline."
+)
+@click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power (minutes).")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @click.option("--config", type=click.Path(path_type=Path), default=Path("configs/regression.yaml"), show_default=True)
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
 @click.pass_context
 def regression(context: click.Context, task: str | None, workers: int | None, config: Path, results: Path) -> None:
-    """Compare a short fixed sweep with the committed baseline; exit code 1 if a condition number changed."""
+    """Compare a short fixed sweep with the committed baseline.
+
+    Exit code 1 if a condition number changed.
+    """
     from joblib import cpu_count
 
     from bench.studies.regression.tasks import RegressionTasks

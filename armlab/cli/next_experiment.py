@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import get_args
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.diagnosis.next.card import card_content, card_lines, draw_card
 from armlab.diagnosis.next.experiment import Experiment, design_experiment
 from armlab.diagnosis.next.motion import Budget
 from armlab.diagnosis.next.prepare import LinkKnowledge
-from bench.files import write_whole
 from bench.trajectory_files import TRAJECTORY_FORMATS, sample_trajectory
 
 MOTION_FILES = {"csv": "next.csv", "ros2": "next.ros2.yaml", "rapid": "next.mod"}

@@ -13,7 +13,10 @@ import click
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/proof"), show_default=True)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int) -> None:
-    """Diagnose concealed cases with each guard off in turn: what is it worth? (extra `engines`)"""
+    """Measure what each guard of the diagnosis is worth.
+
+    Diagnoses concealed cases with one guard off at a time (extra `engines`).
+    """
     from armlab.concealed.ablation import AblationSettings
     from armlab.concealed.ablation import ablate as run
     from armlab.diagnosis.ablation import verdicts_without_each
@@ -34,7 +37,11 @@ _LOOP_FOLDER = click.Path(path_type=Path)
 @click.option("--results", type=_LOOP_FOLDER, help="Folder for table and picture [default: OUT/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> None:
-    """Ambiguous recording, diagnosis, second motion, both diagnosed: how often is the right name left? (`engines`)"""
+    """Measure how well a second motion decides between rivals.
+
+    Makes ambiguous recordings, diagnoses them, adds a second motion, diagnoses both, and counts how often the right
+    name is left (extra `engines`).
+    """
     from tqdm import tqdm
 
     from armlab.cli.second_motion import plan_second_motion
@@ -71,7 +78,10 @@ _PROOF_FOLDER = click.Path(path_type=Path)
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--out", type=_PROOF_FOLDER, required=True, help="Folder for observations, truth and manifest.")
 def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs: int, out: Path) -> None:
-    """Make recordings with hidden effects, and seal the answers (extra `engines`)."""
+    """Make recordings with hidden effects and sealed answers.
+
+    Needs the extra `engines`.
+    """
     from tqdm import tqdm
 
     from armlab.concealed.sets import MANIFEST_FILE, file_digest, make_set_settings
@@ -89,7 +99,10 @@ def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
 @click.option("--out", type=_PROOF_FOLDER, help="Folder for the score [default: VERDICTS/score].")
 def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> None:
-    """Compare verdicts with the sealed answers of the concealed set in FOLDER."""
+    """Score verdicts against the sealed answers of FOLDER.
+
+    FOLDER: a concealed set.
+    """
     from armlab.concealed.score.scoring import format_lines
     from armlab.concealed.score.scoring import score_set as count
 
@@ -108,7 +121,10 @@ def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) 
 def prove(
     quick: bool, development: int | None, cases: int, nulls: int, work: Path | None, results: Path | None, jobs: int
 ) -> None:
-    """Conceal, diagnose blindly, score, and log; what was interrupted goes on (extra `engines`)."""
+    """Prove the diagnosis: conceal, diagnose blindly, score.
+
+    Logs the score. After an interruption the same command continues (extra `engines`).
+    """
     from armlab.concealed.prove import choose_proof
     from armlab.concealed.prove import prove as run
 

@@ -30,7 +30,10 @@ def recording() -> None:
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="The page [default: NAME-check.html, here].")
 def check(folder: Path, out: Path | None) -> None:
-    """Say what is wrong with a recording, what was repaired, and draw it (one HTML page)."""
+    """Check a recording and draw it on one HTML page.
+
+    Says what is wrong with it and what was repaired.
+    """
     from armlab.recordings.check import check_recording
     from armlab.recordings.check_report import write_check_page
 
@@ -47,7 +50,10 @@ def check(folder: Path, out: Path | None) -> None:
 @click.argument("name", type=click.Choice(PUBLIC_RECORDING_NAMES))
 @click.option("--out", type=click.Path(path_type=Path), help="New folder [default: NAME, here].")
 def fetch(name: str, out: Path | None) -> None:
-    """Fetch a public recording of a real arm and write it as a recording folder."""
+    """Fetch a public recording of a real arm.
+
+    Writes it as a recording folder.
+    """
     from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
 
     folder = fetch_recording(name, out or Path(name))
@@ -74,7 +80,9 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--topic", help="Topic of the joint states in a bag.")
 @click.option("--ask/--no-ask", default=None, help="Ask for what is missing [default: at a terminal].")
 def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
-    """Bring files of another format into a new recording folder: .mat, ROS bags, MCAP, odd CSV.
+    """Import files of another format: .mat, ROS bags, MCAP, CSV.
+
+    Writes a new recording folder.
 
     NAMES are column names with commas between them; * and ? stand for any characters.
     """

@@ -1,12 +1,11 @@
 """The plan of a case: drawn from its seed and number alone, before anything is simulated."""
 
-import hashlib
-import json
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from armlab.common.streams import named_generator
 from armlab.concealed.arms import Machine, make_machine, with_stretched_link
 from armlab.concealed.effects.channels import Offset
 from armlab.concealed.effects.friction import Coulomb, Viscous
@@ -19,9 +18,8 @@ from problem.arm import Arm
 
 
 def random_stream(*names: str | int) -> np.random.Generator:
-    """A PCG64 generator whose seed is the SHA-256 of the names; other names give an independent stream."""
-    digest = hashlib.sha256(json.dumps(["concealed", *names]).encode()).digest()
-    return np.random.Generator(np.random.PCG64(int.from_bytes(digest, "big")))
+    """The generator of these names, independent of every one outside of the truth machine."""
+    return named_generator("concealed", *names)
 
 
 Tier = Literal["clean", "realistic"]

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from armlab.common.arrays import Array
+from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report.words import (
     effect_in_words,
@@ -22,7 +23,6 @@ from armlab.diagnosis.report.words import (
     verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.diagnosis.verdict_files import write_texts
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE

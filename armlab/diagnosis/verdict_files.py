@@ -3,8 +3,7 @@
 import json
 import math
 import os
-import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
 from armlab.effects.parameters import ParameterValue
@@ -45,39 +45,6 @@ def check_output_folder(folder: Path, recording: Recording) -> None:
     nearest = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
     if not nearest.is_dir() or not os.access(nearest, os.W_OK):
         raise InputError(f"cannot write into {nearest}: give --out a folder that can be written")
-
-
-def write_texts(texts: Mapping[str, str], folder: Path) -> tuple[Path, ...]:
-    """Writes all texts under their names, or none: first into a folder of their own, then by renames.
-
-    Other files that stand in the folder are left alone.
-    """
-    folder = folder.absolute()
-    there = folder.is_dir()
-    draft = (folder if there else folder.parent) / f".armlab.{os.getpid()}"
-    try:
-        for name, text in texts.items():
-            (draft / name).parent.mkdir(parents=True, exist_ok=True)
-            (draft / name).write_text(text, encoding="utf-8")
-        if not there:
-            draft.replace(folder)
-        else:
-            _move_files(draft, texts, folder)
-    except OSError as error:
-        raise InputError(f"cannot write into {folder}: {error.strerror}") from None
-    finally:
-        shutil.rmtree(draft, ignore_errors=True)
-    return tuple(folder / name for name in texts)
-
-
-def _move_files(draft: Path, names: Iterable[str], folder: Path) -> None:
-    places = {name: folder / name for name in names}
-    for place in places.values():
-        place.parent.mkdir(parents=True, exist_ok=True)
-        if place.is_dir():
-            raise InputError(f"{place} is a folder, where a file of the verdict should stand")
-    for name, place in places.items():
-        (draft / name).replace(place)
 
 
 VERDICT_SCHEMA = "verdict/1"

@@ -250,6 +250,12 @@ CONVERTERS: dict[str, Callable[..., Draft]] = {
 LOCAL_COPIES_VARIABLE = "ARMLAB_RECORDINGS"
 
 
+def local_copies() -> Path | None:
+    """The folder that the environment variable ARMLAB_RECORDINGS names; None where it is unset or blank."""
+    folder = os.environ.get(LOCAL_COPIES_VARIABLE, "").strip()
+    return Path(folder) if folder else None
+
+
 def fetch_recording(name: str, folder: Path) -> Path:
     """Writes a public recording into a new folder and returns its path.
 
@@ -265,10 +271,10 @@ def fetch_recording(name: str, folder: Path) -> Path:
 
 def find_raw_file(recording: PublicRecording, file: RemoteFile) -> Path:
     """Path of one raw file whose content is as registered; from the local copies, else downloaded."""
-    local = os.environ.get(LOCAL_COPIES_VARIABLE)
-    if not local:
+    folder = local_copies()
+    if folder is None:
         return _download(recording, file)
-    path = Path(local) / recording.folder / file.name
+    path = folder / recording.folder / file.name
     try:
         found = hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
@@ -280,8 +286,7 @@ def find_raw_file(recording: PublicRecording, file: RemoteFile) -> Path:
 
 def is_available(recording: PublicRecording) -> bool:
     """True if all raw files are on this machine: in the folder that ARMLAB_RECORDINGS names, else in the cache."""
-    local = os.environ.get(LOCAL_COPIES_VARIABLE)
-    folder = Path(local) if local else cache_folder()
+    folder = local_copies() or cache_folder()
     return folder is not None and all((folder / recording.folder / file.name).is_file() for file in recording.files)
 
 

@@ -1,6 +1,4 @@
-"""The contract between the dispatch of trials and an executor: batches of work, reports, settings, and what a worker
-does with a batch.
-"""
+"""What the dispatch of trials and an executor agree on: batches, reports, settings, and the work of a worker."""
 
 import faulthandler
 import os
@@ -15,7 +13,8 @@ from pydantic import Field, model_validator
 
 from armlab.common.settings import Settings
 from bench.execute import Failure, Outcome, Trial, load_algorithm, run_batch
-from bench.provenance import fingerprint, provenance
+from bench.fingerprint import fingerprint
+from bench.provenance import provenance
 from problem.registry import ProblemSettings
 
 Work = Sequence[tuple[str, Trial]]
@@ -23,10 +22,20 @@ Work = Sequence[tuple[str, Trial]]
 
 
 class WorkReport(NamedTuple):
-    """What became of a batch, trial by trial, and the provenance of the worker."""
+    """The results of a batch, trial by trial, and the provenance of the worker."""
 
     results: list[tuple[str, Outcome | Failure]]
     origin: str
+
+    @property
+    def outcomes(self) -> list[tuple[str, Outcome]]:
+        """The outcomes, each with its key in the run store."""
+        return [(key, result) for key, result in self.results if isinstance(result, Outcome)]
+
+    @property
+    def failures(self) -> list[Failure]:
+        """The trials that failed."""
+        return [result for _, result in self.results if isinstance(result, Failure)]
 
 
 def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:
@@ -35,7 +44,7 @@ def run_work(work: Work, timeout_s: float | None = None) -> WorkReport:
 
 
 def run_in_worker(work: Work, timeout_s: float | None = None) -> WorkReport:
-    """`do` in a process of its own, after a look whether it holds the code that the keys speak of."""
+    """`run_work` in a process of its own; a trial fails if its key was made with other code than this process has."""
     strangers = [
         (key, trial) for key, trial in work if trial.key(_code_fingerprint(trial.algorithm, trial.problem)) != key
     ]
@@ -56,8 +65,8 @@ def _run_with_time_limit(key: str, trial: Trial, timeout_s: float | None) -> Out
 def _time_limit(timeout_s: float | None) -> Iterator[None]:
     """End the process if the block takes longer.
 
-    The watchdog is a thread in C with a clock that nobody sets: it needs neither the interpreter's lock nor the main
-    thread, so that it ends a loop in compiled code as well.
+    The watchdog is a thread in C with a monotonic clock. It needs neither the interpreter's lock nor the main thread,
+    so it also ends a loop in compiled code.
     """
     if timeout_s is None:
         yield
@@ -72,11 +81,14 @@ def _time_limit(timeout_s: float | None) -> Iterator[None]:
 
 @lru_cache(maxsize=512)
 def _code_fingerprint(algorithm: str, problem: ProblemSettings) -> str:
-    return fingerprint(load_algorithm(algorithm), problem.model_dump(mode="json"))
+    return fingerprint(load_algorithm(algorithm), problem)
 
 
 def _other_code_message() -> str:
-    return f"OtherCodeError: the worker on {platform.node()} has other code or files than the place of the start"
+    return (
+        f"OtherCodeError: the worker on {platform.node()} has other code or files, or another release of a package, "
+        "than the process that started the run"
+    )
 
 
 @lru_cache
@@ -85,7 +97,7 @@ def _worker_provenance() -> str:
 
 
 class ExecutorSettings(Settings):
-    """backend: the engine. address: of a cluster that is running; without one, processes on this machine.
+    """backend: the executor. address: of a running cluster; without one, processes on this machine are started.
 
     Dask: `tcp://HOST:PORT` of the scheduler. Ray: `HOST:PORT` of the head, or `auto`.
     """
@@ -101,10 +113,10 @@ class ExecutorSettings(Settings):
 
 
 class BatchExecutor(Protocol):
-    """Takes batches and gives futures of their reports.
+    """Takes batches and returns futures of their reports.
 
-    slots: batches that keep all workers busy; more should not be under way. crashes: what a future raises when the
-    worker died.
+    slots: how many batches keep all workers busy; no more are submitted at a time. crashes: errors that a future raises
+    if its worker died.
     """
 
     @property
@@ -114,5 +126,5 @@ class BatchExecutor(Protocol):
     def crashes(self) -> tuple[type[BaseException], ...]: ...
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future of the batch; it may hold one of `crashes`."""
+        """A future of the report; it may raise one of `crashes`."""
         ...

@@ -18,8 +18,10 @@ _CONNECT_TIMEOUT_S = 30
 
 @dataclass(frozen=True)
 class DaskExecutor:
-    """Batches through the client's own pool of futures. A batch whose worker dies is given to another by Dask itself,
-    and is a crash when it has cost so many workers as the scheduler allows.
+    """Batches through the client's own pool of futures.
+
+    If a worker dies, Dask itself gives its batch to another one. It reports a crash after as many dead workers as the
+    scheduler allows.
     """
 
     pool: Pool
@@ -28,15 +30,14 @@ class DaskExecutor:
     crashes: tuple[type[BaseException], ...] = (KilledWorker,)
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future of the batch."""
         return self.pool.submit(run_in_worker, list(work), self.timeout_s)
 
 
 @contextmanager
 def dask_executor(address: str | None, workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
-    """A running cluster, or one of this machine for the time of the run.
+    """A running cluster, or a cluster on this machine for the time of the run.
 
-    Raises InputError if no cluster answers, or its workers have several threads.
+    Raises InputError if no cluster answers, or if its workers have several threads.
     """
     with _connect_client(address, workers) as client:
         threads = client.nthreads()

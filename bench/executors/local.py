@@ -7,11 +7,10 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from joblib.externals.loky import get_reusable_executor
-from joblib.externals.loky.process_executor import BrokenProcessPool
+from joblib.externals.loky.process_executor import BrokenProcessPool, ProcessPoolExecutor
 
 from bench.executors.contract import BatchExecutor, Work, WorkReport, run_in_worker, run_work
 
@@ -23,13 +22,13 @@ _POLL_INTERVAL_S = 1.0  # long against the milliseconds in which loky sees that 
 
 
 class InProcessExecutor:
-    """One batch after the other, here."""
+    """Runs each batch at once, in this process."""
 
     slots = 1
     crashes: tuple[type[BaseException], ...] = ()
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future that is done."""
+        """A future that is done already."""
         future: Future[WorkReport] = Future()
         future.set_result(run_work(work))
         return future
@@ -37,62 +36,73 @@ class InProcessExecutor:
 
 @dataclass
 class LokyExecutor:
-    """Processes of loky; a pool that broke with a worker is replaced by a new one. present: the pool used last."""
+    """A pool of loky's processes, one BLAS thread each; a pool that broke because a worker died is replaced.
+
+    The pool belongs to this executor. loky's reusable pool is shared by the whole process, and `joblib.Parallel` would
+    take it for its own.
+    """
 
     workers: int
     timeout_s: float | None
     crashes: tuple[type[BaseException], ...] = (BrokenProcessPool,)
-    present: Any = None
+    pool: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.pool = self._start_pool()
 
     @property
     def slots(self) -> int:
-        """Batches under way."""
+        """How many batches are submitted at a time."""
         return _BATCHES_PER_WORKER * self.workers
 
-    def pool(self) -> Any:
-        """The present pool; one BLAS thread a worker."""
-        start = {"initializer": _prepare_worker, "initargs": (os.getpid(),), "env": _ONE_THREAD_ENVIRONMENT}
-        self.present = get_reusable_executor(self.workers, **start)
-        return self.present
-
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future of the batch."""
         try:
-            future: Future[WorkReport] = self.pool().submit(run_in_worker, list(work), self.timeout_s)
-        except BrokenProcessPool as error:  # it broke between the two calls
-            future = Future()
-            future.set_exception(error)
+            return self._submit_to_pool(work)
+        except BrokenProcessPool:
+            self.pool.shutdown(wait=True, kill_workers=True)
+            self.pool = self._start_pool()
+            return self._submit_to_pool(work)
+
+    def _submit_to_pool(self, work: Work) -> "Future[WorkReport]":
+        future: Future[WorkReport] = self.pool.submit(run_in_worker, list(work), self.timeout_s)
         return future
+
+    def _start_pool(self) -> Any:
+        return ProcessPoolExecutor(
+            self.workers, initializer=_prepare_worker, initargs=(os.getpid(),), env=_ONE_THREAD_ENVIRONMENT
+        )
 
 
 @contextmanager
 def local_executor(workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
-    """One worker is this process itself, unless a time limit might end it."""
+    """Processes on this machine; a single worker without a time limit is this process itself."""
     if workers == 1 and timeout_s is None:
         yield InProcessExecutor()
         return
-    engine = LokyExecutor(workers, timeout_s)
+    executor = LokyExecutor(workers, timeout_s)
     over = threading.Event()
-    threading.Thread(target=_watch_workers, args=(engine, over), daemon=True).start()
+    threading.Thread(target=_watch_workers, args=(executor, over), daemon=True).start()
     try:
-        yield engine
+        yield executor
     except BaseException:
-        engine.pool().shutdown(wait=True, kill_workers=True)  # no one waits for what is under way any more
+        executor.pool.shutdown(wait=True, kill_workers=True)  # no one waits for what is under way any more
         raise
+    else:
+        executor.pool.shutdown(wait=True)
     finally:
         over.set()
 
 
-def _watch_workers(engine: LokyExecutor, over: threading.Event) -> None:
-    """Breaks a pool that has not noticed for a while that a worker died.
+def _watch_workers(executor: LokyExecutor, over: threading.Event) -> None:
+    """Break a pool that has not noticed for a while that a worker died.
 
-    A worker that dies while it writes a report leaves half of it in the pipe, and loky would wait for the other half
-    for ever: this process holds the pipe open itself.
+    A worker that dies while it writes a report leaves a part of it in the pipe. loky then waits for the rest without
+    end, because this process holds the pipe open itself.
     """
     before: set[int] = set()
     while not over.wait(_POLL_INTERVAL_S):
-        pool = engine.present
-        workers = dict(pool._processes or {}) if pool else {}
+        pool = executor.pool
+        workers = dict(pool._processes or {})
         dead = {pid for pid, worker in workers.items() if worker.exitcode is not None}
         if dead & before:
             for pid in workers.keys() - dead:
@@ -103,13 +113,13 @@ def _watch_workers(engine: LokyExecutor, over: threading.Event) -> None:
 
 
 def _prepare_worker(parent: int) -> None:
-    """In a worker: a terminal sends Ctrl-C to all processes, but it is for the parent to stop the work."""
+    """Ignore Ctrl-C, which a terminal sends to all processes: only the parent stops the work."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_exit_with_parent, args=(parent,), daemon=True).start()
 
 
 def _exit_with_parent(parent: int) -> None:
-    """A parent that is killed cannot stop its workers, and loky leaves them behind."""
+    """End this worker when its parent is gone: loky leaves the workers of a killed process running."""
     while os.getppid() == parent:
         time.sleep(_POLL_INTERVAL_S)
     os._exit(1)

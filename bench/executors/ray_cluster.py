@@ -20,7 +20,7 @@ _CONNECT_TIMEOUT_S = 30
 
 @dataclass(frozen=True)
 class RayExecutor:
-    """Batches as Ray tasks of one core each. The runner deals with crashes: Ray shall not try again by itself."""
+    """Batches as Ray tasks of one core each. The dispatch handles crashes, so Ray itself does not retry."""
 
     task: Any
     slots: int
@@ -34,14 +34,13 @@ class RayExecutor:
     )
 
     def submit(self, work: Work) -> "Future[WorkReport]":
-        """A future of the batch."""
         future: Future[WorkReport] = self.task.remote(list(work), self.timeout_s).future()
         return future
 
 
 @contextmanager
 def ray_executor(address: str | None, workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
-    """A running cluster, or one of this machine for the time of the run.
+    """A running cluster, or a cluster on this machine for the time of the run.
 
     Raises InputError if no cluster answers.
     """
@@ -61,7 +60,7 @@ def ray_executor(address: str | None, workers: int, timeout_s: float | None) -> 
 
 
 def _check_address_answers(address: str) -> None:
-    """See whether anyone listens at HOST:PORT, for which Ray itself waits for many minutes."""
+    """Check that a process listens at HOST:PORT; Ray itself would wait for many minutes."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if host:
         socket.create_connection((host, int(port)), timeout=_CONNECT_TIMEOUT_S).close()

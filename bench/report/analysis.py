@@ -1,4 +1,4 @@
-"""All that the report says of one problem, computed once."""
+"""Everything that the report shows of one problem, computed once."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,10 +29,11 @@ QUARTILES = (0.25, 0.5, 0.75)
 
 @dataclass(frozen=True, eq=False)
 class RunProgress:
-    """The runs of one algorithm, condensed: what is left of them takes no more memory for more repetitions.
+    """The runs of one algorithm, condensed, so that more repetitions take no more memory.
 
-    quartiles: of the best so far at the moments (3, moments). hits: running times to the targets. expected: running
-    time to each target (targets,). area: median of that under the curve, NaN if nothing feasible was found by anyone.
+    quartiles: of the best so far at the moments (3, moments). hits: running times to the targets. expected: expected
+    running time to each target (targets,). area: median area under the curve, NaN if no algorithm found a feasible
+    point.
     """
 
     quartiles: Array
@@ -43,10 +44,10 @@ class RunProgress:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """One problem, swarm size and budget: its trials, and what became of its runs by algorithm.
+    """One problem, swarm size and budget: its trials, and the progress of its runs by algorithm.
 
-    moments: numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget.
-    targets: from the worst of the first feasible values to the best of all; empty if nothing feasible was found.
+    moments: numbers of evaluations, evenly spaced in the logarithm, from the first population to the budget. targets:
+    from the worst of the first feasible values to the best of all; empty if nothing feasible was found.
     """
 
     label: str
@@ -93,14 +94,14 @@ class Cell:
 
 
 def analyse_cells(results: ResultSet) -> list[Cell]:
-    """All cells in the order of the configuration; the runs of one at a time are in memory."""
+    """All cells in the order of the configuration; the runs of only one cell are in memory at a time."""
     return [
         analyse_cell(label, trials, _sort_runs(runs_by_algorithm(curves))) for label, trials, curves in results.cells()
     ]
 
 
 def analyse_cell(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[Run]]) -> Cell:
-    """The cell of runs by algorithm; trials: tidy, of one budget."""
+    """A cell from its runs by algorithm; trials: tidy, of one budget."""
     budget = int(trials["budget"].iloc[0])
     first = min(run.evaluations[0] for some in runs.values() for run in some)
     moments = np.unique(np.geomspace(first, max(budget, first), CURVE_POINTS).round())
@@ -110,7 +111,7 @@ def analyse_cell(label: str, trials: pd.DataFrame, runs: Mapping[str, Sequence[R
 
 
 def share_of_targets_reached(cells: Sequence[Cell], algorithm: str, moments: Array) -> Array:
-    """Share of targets reached at moments (moments,), over all runs and cells that have any."""
+    """Share of targets reached at moments (moments,), over all runs and all cells with targets."""
     found = [cell.progress[algorithm].hits for cell in cells if len(cell.targets)]
     return share_reached(found, moments) if found else np.zeros(len(moments))
 
@@ -139,7 +140,7 @@ def _summarise_progress(runs: Sequence[Run], moments: Array, targets: Array, bud
 
 
 def block_losses(cells: list[Cell]) -> pd.DataFrame:
-    """Losses to rank, a row a problem: medians of log10; with one problem only, a row a repetition."""
+    """Losses to rank: one row a problem, medians of log10; with one problem only, one row a repetition."""
     if len(cells) == 1:
         return pd.DataFrame(cells[0].losses)
     return pd.DataFrame([{name: float(np.median(ends)) for name, ends in cell.losses.items()} for cell in cells])

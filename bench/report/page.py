@@ -1,4 +1,4 @@
-"""The report about a result set as one HTML file that asks nothing of the network: sections, style, scripts and the
+"""The report about a result set as one HTML file that loads nothing from the network: sections, style, scripts and the
 data of the charts.
 """
 
@@ -15,7 +15,7 @@ import yaml
 
 from algorithms.registry import names as registered
 from armlab.common.arrays import Array
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.report import sections
 from bench.report.analysis import Cell, analyse_cells, block_losses, share_of_targets_reached
 from bench.report.ranking_chart import chart_style
@@ -30,7 +30,7 @@ _CURVE_POINTS = 60
 
 
 def page_data(cells: Sequence[Cell], algorithms: Sequence[str]) -> str:
-    """JSON text; numbers have four digits, a null is an infinite one."""
+    """The data of the charts as JSON; numbers have four digits, null stands for an infinite one."""
     content = {
         "algorithms": list(algorithms),
         "problems": [_problem_data(cell) for cell in cells],
@@ -79,7 +79,7 @@ _SCRIPTS = ("scales.js", "lines.js", "boxes.js", "page.js")
 
 
 def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[AlgorithmProperties]) -> str:
-    """HTML text; facts: of the algorithms that took part, as far as they are known here."""
+    """The page as HTML; facts: properties of the algorithms that took part and are registered here."""
     looks = {name: chart_style(index) for index, name in enumerate(results.algorithms)}
     found = critical_difference(block_losses(list(cells)))
     parts = [
@@ -120,6 +120,6 @@ def write_report(where: Path, store: Path, out: Path | None) -> Path:
 
 
 def _measure_participants(results: ResultSet) -> list[AlgorithmProperties]:
-    """Of the algorithms that took part and are registered here: results may come from elsewhere."""
+    """Properties of the algorithms that took part and are registered here; results may come from elsewhere."""
     took_part = dict.fromkeys(entry["name"] for entry in yaml.safe_load(results.settings)["algorithms"].values())
     return properties_of_algorithms([name for name in took_part if name in registered()])

@@ -1,6 +1,4 @@
-"""The critical-difference chart as SVG, turned so that it is readable on a phone, and the colour and dash of each
-algorithm.
-"""
+"""The critical-difference chart as SVG, upright so that it can be read on a phone, and the style of each algorithm."""
 
 from collections.abc import Iterator, Mapping
 from html import escape
@@ -22,7 +20,7 @@ class ChartStyle(NamedTuple):
 
 
 def chart_style(index: int) -> ChartStyle:
-    """The look of the index-th algorithm; where colours begin anew, each has another dash than before."""
+    """The style of the index-th algorithm; where the colours repeat, the dashes differ."""
     turn, place = divmod(index, len(_CHART_COLORS))
     return ChartStyle(_CHART_COLORS[place], _CHART_DASHES[(place + turn) % len(_CHART_DASHES)])
 
@@ -33,7 +31,7 @@ _MIN_LABEL_SPACING = 24  # the least from one number of the axis to the next
 
 
 def draw_critical_difference(found: CriticalDifference, looks: Mapping[str, ChartStyle]) -> str:
-    """SVG text: average ranks as dots, and bars on the right beside those that cannot be told apart."""
+    """The chart as SVG: average ranks as dots, and a bar on the right beside each group without a difference."""
     count = len(found.ranks)
     plot = _WIDTH - _NAME - 14 - _BAR_SPACING * (len(found.groups) + 1)
     height = _TOP + _ROW * count + 8

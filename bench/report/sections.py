@@ -19,7 +19,7 @@ _TARGET_SHARES = (0.25, 0.5, 0.75)  # of the way from easy to hard
 
 
 def html_table(headings: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """An HTML table in a frame that scrolls sideways; the first cell of a row is its heading."""
+    """An HTML table that scrolls sideways; the first cell of a row is its heading."""
     head = "".join(f'<th scope="col">{escape(heading)}</th>' for heading in headings)
     body = "".join(_html_row(row) for row in rows)
     parts = f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
@@ -49,7 +49,7 @@ def _ends_row(cell: Cell, name: str, places: Sequence[int]) -> list[str]:
 
 
 def duels_table(cell: Cell) -> str:
-    """The algorithm of the least median against all others."""
+    """The algorithm with the least median against all others."""
     best = min(cell.algorithms, key=lambda name: float(np.median(cell.losses[name])))
     fought = [_duel_from_side_of(best, duel) for duel in cell.all_duels if best in (duel.subject, duel.rival)]
     rows = [[duel.rival, _format_effect(duel), f"{duel.p:.2g}", _duel_outcome(duel)] for duel in fought]
@@ -89,7 +89,7 @@ def _tally_cell(won: dict[tuple[str, str], int], name: str, other: str) -> str:
 
 
 def power_table(powers: Sequence[Power], repetitions: int, comparisons: int) -> str:
-    """What the test can see on one problem."""
+    """The effects that the test can detect on one problem."""
     names = ("small", "medium", "large")
     rows = [
         [f"{name}, A12 = {power.superiority:.2f}", f"{power.alone:.0%}", f"{power.first_step:.0%}"]
@@ -101,7 +101,7 @@ def power_table(powers: Sequence[Power], repetitions: int, comparisons: int) -> 
 
 
 def format_number(value: float) -> str:
-    """Three digits; infinite and unknown as signs."""
+    """A number with three digits; signs for infinite and unknown."""
     if np.isnan(value):
         return "–"
     if np.isinf(value):
@@ -115,7 +115,7 @@ def _html_row(cells: Sequence[str]) -> str:
 
 
 def header_section(results: ResultSet, cells: Sequence[Cell], found: CriticalDifference) -> str:
-    """What was compared, and the verdict in a sentence."""
+    """What was compared, and the result in one sentence."""
     trials = results.trials
     best = next(iter(found.ranks))
     equals = [name for group in found.groups if best in group for name in group if name != best]
@@ -132,7 +132,7 @@ def header_section(results: ResultSet, cells: Sequence[Cell], found: CriticalDif
 
 
 def algorithm_buttons(looks: Mapping[str, ChartStyle]) -> str:
-    """One button an algorithm, which is the legend of all charts too."""
+    """One button an algorithm; the buttons are also the legend of all charts."""
     items = "".join(
         f'<button type="button" aria-pressed="true" data-algorithm="{escape(name)}" data-color="{color}" '
         f'data-dash="{dash}"><svg width="26" height="10" aria-hidden="true"><line x1="0" x2="26" y1="5" y2="5" '
@@ -145,7 +145,7 @@ def algorithm_buttons(looks: Mapping[str, ChartStyle]) -> str:
 def ranking_section(
     found: CriticalDifference, cells: Sequence[Cell], names: list[str], looks: Mapping[str, ChartStyle]
 ) -> str:
-    """The critical-difference picture, and who beats whom on how many problems."""
+    """The critical-difference chart, and on how many problems each algorithm beats each other one."""
     text = (
         f"Average ranks over {found.blocks} {_block_name(cells)}, 1 the best. A bar joins algorithms that "
         "cannot be told "
@@ -165,7 +165,7 @@ def ranking_section(
 
 
 def _block_name(cells: Sequence[Cell]) -> str:
-    """What is ranked: medians of problems, or the repetitions of the only one."""
+    """What is ranked: medians of problems, or the repetitions of a single problem."""
     return "problems" if len(cells) > 1 else "repetitions"
 
 
@@ -202,7 +202,7 @@ def problem_section(cells: Sequence[Cell]) -> str:
 
 
 def power_section(cells: Sequence[Cell]) -> str:
-    """What the paired test can see with this number of repetitions."""
+    """The effects that the paired test can detect with this number of repetitions."""
     repetitions = min(cell.repetitions for cell in cells)
     count = len(cells[0].all_duels)
     shown = power_table(powers(repetitions, max(count, 1)), repetitions, max(count, 1))
@@ -214,7 +214,7 @@ def power_section(cells: Sequence[Cell]) -> str:
 
 
 def properties_section(facts: Sequence[AlgorithmProperties]) -> str:
-    """What each algorithm does to a problem that is moved, scaled or noise."""
+    """The behaviour of each algorithm on a problem that is shifted, scaled or pure noise."""
     if not facts:
         return ""
     shown = html_table(properties_table.PROPERTY_HEADINGS, properties_table.property_rows(facts))
@@ -222,7 +222,7 @@ def properties_section(facts: Sequence[AlgorithmProperties]) -> str:
 
 
 def origin_section(results: ResultSet) -> str:
-    """Provenance, settings, and the commands that repeat it."""
+    """Provenance, settings, and the commands that repeat the results."""
     rows = [[key, *(str(origin.get(key, "–")) for origin in results.origins)] for key in _origin_keys(results)]
     headings = ["", *(f"machine {k}" for k in range(1, len(results.origins) + 1))]
     settings = yaml.safe_load(results.settings)

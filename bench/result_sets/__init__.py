@@ -1,1 +1,1 @@
-"""Results as data that travel: collected from the run store, compared, as tidy tables, in the format of IOHprofiler."""
+"""Results as data: read from the run store, compared, and written as tidy tables or in IOHprofiler's format."""

@@ -1,6 +1,4 @@
-"""Two result sets beside each other: what changed, algorithm by algorithm and problem by problem, as a table and a
-page.
-"""
+"""Comparison of two result sets, algorithm by algorithm and problem by problem, as a table and a page."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -11,22 +9,23 @@ import pandas as pd
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
-from bench.files import write_whole
+from armlab.common.statistics import adjust_by_holm
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import CELL_COLUMNS, ResultSet
 from bench.statistics import is_feasible, quantile
-from bench.statistics.pairwise import holm, log_losses, signed_rank_p, superiority, superiority_unpaired
+from bench.statistics.pairwise import log_losses, signed_rank_p, superiority, superiority_unpaired
 from bench.studies.regression.check import location_p_value
 from bench.tables import as_csv
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One algorithm on one problem in both sets; medians of the value, an infeasible end counting as infinite.
+    """One algorithm on one problem in both sets; medians of the value, where an infeasible end counts as infinite.
 
-    superiority: chance that an end of the second set is better than one of the first (A12), with a 95 % interval.
-    p: of equality, two-sided, after Holm over all comparisons.
+    superiority: probability that an end of the second set is better than one of the first (A12), with a 95 % interval.
+    p: of equality, two-sided, after Holm's correction over all comparisons.
     """
 
     problem: str
@@ -41,14 +40,14 @@ class Comparison:
     p: float
 
     def change(self, rate: float = 0.05) -> str:
-        """What became of the algorithm from the first set to the second."""
+        """The change from the first set to the second, in words."""
         if self.p > rate:
             return "="
         return "better" if self.superiority > 0.5 else "worse"
 
 
 def are_paired(first: ResultSet, second: ResultSet) -> bool:
-    """Whether equal repetitions began with equal populations: the same seed gives them."""
+    """Whether equal repetitions began with equal populations, which equal seeds give."""
     return first.seed == second.seed
 
 
@@ -59,16 +58,16 @@ def changed_problems(first: ResultSet, second: ResultSet) -> list[str]:
 
 
 def compare_sets(first: ResultSet, second: ResultSet) -> pd.DataFrame:
-    """One row a `Comparison` with its `change`, for all that both sets have; empty if they have nothing in common."""
+    """One row a `Comparison` with its `change`, for all cells that both sets have; empty if they share none."""
     raw = [_compare_cell(*shared, paired=are_paired(first, second)) for shared in _shared_trials(first, second)]
-    adjusted = holm(np.array([comparison.p for comparison in raw]))
+    adjusted = adjust_by_holm(np.array([comparison.p for comparison in raw]))
     found = [Comparison(**{**asdict(c), "p": float(p)}) for c, p in zip(raw, adjusted, strict=True)]
     columns = [*Comparison.__dataclass_fields__, "change"]
     return pd.DataFrame([asdict(c) | {"change": c.change()} for c in found], columns=columns)
 
 
 def _shared_trials(first: ResultSet, second: ResultSet) -> Iterator[tuple[str, str, pd.DataFrame, pd.DataFrame]]:
-    """Problem, algorithm and the trials of both sets, for what stands in both under the same labels and budget."""
+    """Problem, algorithm and the trials of both sets, for all cells with the same labels and budget in both."""
     theirs = dict(list(second.trials.groupby([*CELL_COLUMNS, "algorithm"], sort=False)))
     for label, trials in first.ends():
         for key, rows in trials.groupby([*CELL_COLUMNS, "algorithm"], sort=False):

@@ -1,9 +1,9 @@
-"""Result sets on the disk: tidy tables (CSV, Parquet) to write and read, and the format of IOHprofiler to write.
+"""Result sets as files: tidy tables (CSV, Parquet), read and written, and the format of IOHprofiler, written.
 
-IOHprofiler (Doerr 2018, arXiv 1810.05281), for IOHanalyzer, iohinspector and others: a folder an algorithm; in it, a
-problem's JSON file and its table of evaluations and best values. An infeasible best has no number in that format: it is
-written as the largest double. Readers know a run by its row at evaluation 1, but runs are kept population by
-population: that row has the same largest double, "nothing known yet".
+IOHprofiler (Doerr 2018, arXiv 1810.05281; read by IOHanalyzer and iohinspector) has a folder for each algorithm; in it
+are a problem's JSON file and its table of evaluations and best values. The format has no number for an infeasible best:
+the largest double stands for it. Readers recognise a run by its row at evaluation 1, but only whole populations are
+stored: that row has the largest double too.
 """
 
 import json
@@ -20,7 +20,7 @@ import yaml
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.result_sets.result_set import TRIAL_COLUMNS, ResultSet, TableOfCurves, read_stored_results, runs_by_algorithm
 from bench.statistics.performance import Run
 
@@ -57,7 +57,7 @@ def write_tidy(results: ResultSet, folder: Path, form: str) -> list[Path]:
 
 
 def read_tidy(folder: Path) -> ResultSet:
-    """The result set in a folder that `write_tidy` made; raises InputError, in one line, if it is none."""
+    """The result set in a folder that `write_tidy` wrote; raises InputError, in one line, if it is none."""
     try:
         settings = (folder / SETTINGS).read_text()
         origins = json.loads((folder / ORIGINS).read_text())
@@ -88,7 +88,7 @@ def _read_checked_table(reader: Callable[[Path], pd.DataFrame], path: Path) -> p
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder for results; raises InputError if that is not possible."""
+    """Make a folder for results; raises InputError if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -101,7 +101,7 @@ def _to_csv(pieces: Iterator[pd.DataFrame]) -> Iterator[bytes]:
 
 
 def _to_parquet(pieces: Iterator[pd.DataFrame]) -> bytes:
-    """A row group a piece; compressed, the whole is small enough for the memory."""
+    """Parquet bytes with one row group a piece; the compressed table fits into memory."""
     try:
         from pyarrow import Table
         from pyarrow.parquet import ParquetWriter
@@ -191,7 +191,7 @@ SHARED_FORMATS: Mapping[str, Callable[[ResultSet, Path], list[Path]]] = MappingP
 
 
 def read_results(where: Path, store: Path) -> ResultSet:
-    """The results of a configuration (its YAML file; outcomes from the store), or those in a folder of tidy tables.
+    """The results of a configuration (a YAML file; its outcomes are in the store) or of a folder of tidy tables.
 
     Raises InputError, in one line, if there are none.
     """
@@ -203,5 +203,5 @@ def read_results(where: Path, store: Path) -> ResultSet:
 
 
 def share_results(where: Path, store: Path, form: str, folder: Path) -> list[Path]:
-    """Write results in one of FORMS into a folder; returns the files."""
+    """Write results in one of the formats into a folder; returns the files."""
     return SHARED_FORMATS[form](read_results(where, store), folder)

@@ -1,4 +1,4 @@
-"""A result set: the outcomes of an experiment as tidy tables, with the settings and the machines they come from."""
+"""A result set: the outcomes of an experiment as tidy tables, with their settings and provenance."""
 
 import json
 from collections.abc import Iterator, Sequence
@@ -27,13 +27,13 @@ CellKey = tuple[Any, ...]
 
 
 class CurveSource(Protocol):
-    """Where the curves are: one row a trial and population, TRIAL, evaluations, value and violation of the best so far.
+    """Gives the curves: one row a trial and population, with evaluations, value and violation of the best so far.
 
-    They take most of the space, so that no more than those of one cell are asked for at a time.
+    The curves take most of the space, so only those of one cell are read at a time.
     """
 
     def of(self, cell: CellKey) -> pd.DataFrame:
-        """Those of one problem, swarm size and budget, in the order of the trials."""
+        """The curves of one problem, swarm size and budget, in the order of the trials."""
         ...
 
 
@@ -44,7 +44,6 @@ class TableOfCurves:
     table: pd.DataFrame
 
     def of(self, cell: CellKey) -> pd.DataFrame:
-        """Those rows."""
         wanted = np.logical_and.reduce(
             [self.table[name] == value for name, value in zip(CELL_COLUMNS, cell, strict=True)]
         )
@@ -53,13 +52,12 @@ class TableOfCurves:
 
 @dataclass(frozen=True, eq=False)
 class StoredCurves:
-    """Curves that stay in the run store."""
+    """Curves that stay in the run store until they are needed."""
 
     store: Path
     plan: Plan
 
     def of(self, cell: CellKey) -> pd.DataFrame:
-        """Read now."""
         entries = self.plan.of(*cell)
         with open_store(self.store) as store:
             return _curve_table(entries, [store.get(entry.key).curves for entry in entries])
@@ -67,7 +65,7 @@ class StoredCurves:
 
 @dataclass(frozen=True, eq=False)
 class ResultSet:
-    """trials: one row a trial, as `bench.tables` has it. settings: YAML text. origins: who computed them."""
+    """trials: one row a trial, as `bench.tables` makes it. settings: YAML text. origins: provenance of the outcomes."""
 
     name: str
     settings: str

@@ -1,4 +1,4 @@
-"""Average ranks over many problems, and which algorithms cannot be distinguished: a critical-difference chart."""
+"""Average ranks over many problems, and groups of algorithms without a significant difference."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -8,7 +8,8 @@ import pandas as pd
 from scipy.stats import friedmanchisquare, rankdata
 
 from armlab.common.arrays import Array
-from bench.statistics.pairwise import holm, signed_rank_p
+from armlab.common.statistics import adjust_by_holm
+from bench.statistics.pairwise import signed_rank_p
 
 Pair = tuple[str, str]
 ERROR_RATE = 0.05
@@ -16,9 +17,10 @@ ERROR_RATE = 0.05
 
 @dataclass(frozen=True)
 class CriticalDifference:
-    """Average ranks, best first; groups: those of more than one of which no two differ, each as long as it can be.
+    """Average ranks, best first; groups: the longest runs of neighbours of which no two differ significantly.
 
-    p: of every pair, after Holm over all of them. friedman_p: that all are equal, NaN for fewer than three.
+    p: of every pair, after Holm's correction over all of them. friedman_p: that all are equal, NaN for fewer than three
+    algorithms.
     """
 
     ranks: dict[str, float]
@@ -29,30 +31,30 @@ class CriticalDifference:
 
     @property
     def has_too_few_blocks(self) -> bool:
-        """Whether so few blocks cannot tell any pair apart: even the least p-value, of equal signs, is too large."""
+        """Whether no pair can differ significantly: even the smallest possible p-value is too large."""
         return len(self.p) * 2.0 ** (1 - self.blocks) > ERROR_RATE
 
 
 def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> CriticalDifference:
-    """From losses, finite, a row a block (a problem, or a repetition of one) and a column an algorithm."""
+    """From finite losses: one row a block (a problem, or a repetition of one problem), one column an algorithm."""
     ranks = average_ranks(losses)
     pairs = list(combinations(ranks, 2))
     raw = np.array([signed_rank_p(losses[a].to_numpy(), losses[b].to_numpy()) for a, b in pairs])
-    p = dict(zip(pairs, holm(raw).tolist(), strict=True))
+    p = dict(zip(pairs, adjust_by_holm(raw).tolist(), strict=True))
     return CriticalDifference(
         ranks, p, indistinguishable_groups(list(ranks), p, rate), _friedman_p(losses), len(losses)
     )
 
 
 def average_ranks(losses: pd.DataFrame) -> dict[str, float]:
-    """Mean over the rows of the rank in a row, 1 the smallest loss, ties shared; best first."""
+    """Mean rank over the rows, best first; rank 1 is the smallest loss of a row, ties share their mean."""
     means = rankdata(losses.to_numpy(), axis=1).mean(axis=0)
     order = np.argsort(means, kind="stable")
     return {str(losses.columns[k]): float(means[k]) for k in order}
 
 
 def indistinguishable_groups(names: list[str], p: dict[Pair, float], rate: float) -> tuple[tuple[str, ...], ...]:
-    """Runs of neighbours in the ranking of which no pair differs; none that lies in another."""
+    """Runs of neighbours in the ranking of which no pair differs; none lies within another."""
     found: list[tuple[int, int]] = []
     for first in range(len(names)):
         last = first

@@ -1,5 +1,5 @@
-"""Summaries of the ends of runs, some of them infeasible, and percentile bootstrap intervals of their quantiles, also
-where ends are infinite.
+"""Summaries of the ends of runs, some of them infeasible, and percentile bootstrap intervals of their quantiles, which
+may be infinite.
 """
 
 import math
@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from bench.seeds import named_generator
+from armlab.common.streams import named_generator
 
 
 @dataclass(frozen=True)
 class Summary:
-    """Minimum, average and sample standard deviation (n - 1) are of the feasible ends alone, NaN without any.
+    """Minimum, average and sample standard deviation (n - 1) of the feasible ends; NaN if there are none.
 
-    Median and quartiles are of all ends, an infeasible one counting as infinite.
+    Median and quartiles are of all ends; an infeasible end counts as infinite.
     """
 
     minimum: float
@@ -50,12 +50,12 @@ def is_feasible(values: Array, violations: Array) -> NDArray[np.bool_]:
 
 
 def quantile(values: Array, share: float) -> float:
-    """Linear between neighbours, as numpy's default, but right for infinite values, where numpy gives NaN."""
+    """Linear interpolation as in numpy, but correct for infinite values, where numpy returns NaN."""
     return float(row_quantiles(values[None], share)[0])
 
 
 def row_quantiles(rows: Array, share: float) -> Array:
-    """`quantile` of each row of (m, n), (m,)."""
+    """`quantile` of each row: (m, n) -> (m,)."""
     ordered = np.sort(rows, axis=1)
     place = share * (rows.shape[1] - 1)
     below = math.floor(place)
@@ -70,7 +70,7 @@ INTERVAL_LEVEL = 0.95
 
 
 def resamples(n: int, *names: str) -> NDArray[np.int64]:
-    """Rows of indices drawn with replacement, (RESAMPLES, n); always the same ones for an n and names."""
+    """Rows of indices drawn with replacement, (BOOTSTRAP_RESAMPLES, n); the same ones for the same n and names."""
     return named_generator("bootstrap", *names, n).integers(n, size=(BOOTSTRAP_RESAMPLES, n))
 
 

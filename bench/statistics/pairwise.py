@@ -10,29 +10,19 @@ import pandas as pd
 from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
+from armlab.common.statistics import adjust_by_holm
 from bench.statistics.ends import is_feasible, percentile_interval, resamples
-
-
-def holm(p: Array) -> Array:
-    """P-values (..., k) after Holm's correction, valid however the comparisons depend on each other."""
-    order = np.argsort(p, axis=-1, kind="stable")
-    factors = np.arange(p.shape[-1], 0, -1)
-    adjusted = np.maximum.accumulate(np.take_along_axis(p, order, axis=-1) * factors, axis=-1)
-    result = np.empty_like(adjusted)
-    np.put_along_axis(result, order, np.minimum(adjusted, 1.0), axis=-1)
-    return result
-
 
 _NUMBERS_PER_PIECE = 1_000_000  # numbers of a piece of work
 
 
 @dataclass(frozen=True)
 class Duel:
-    """A subject against a rival over paired repetitions.
+    """A comparison of a subject with a rival over paired repetitions.
 
-    superiority: chance that an end of the subject is better than one of the rival, ties counting half (A12, Vargha and
-    Delaney 2000), with a 95 % bootstrap interval. p: two-sided Wilcoxon signed-rank test on log10 of the ends, after
-    Holm over the duels that were fought together.
+    superiority: probability that an end of the subject is better than one of the rival, ties counting half (A12, Vargha
+    and Delaney 2000), with a 95 % bootstrap interval. p: two-sided Wilcoxon signed-rank test on log10 of the ends,
+    after Holm's correction over the duels of one call.
     """
 
     subject: str
@@ -43,16 +33,18 @@ class Duel:
     p: float
 
     def winner(self, rate: float = 0.05) -> str | None:
-        """Who is better where the test rejects equality at that rate, else None."""
+        """The better one if the test rejects equality at that rate, else None."""
         if self.p > rate:
             return None
         return self.subject if self.superiority > 0.5 else self.rival
 
 
 def duels(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> list[Duel]:
-    """Duels of (subject, rival) labels in a tidy frame of one problem, swarm size and budget, Holm over all of them."""
+    """Duels of (subject, rival) labels in a tidy frame of one problem, swarm size and budget, with Holm's correction
+    over all of them.
+    """
     losses = log_losses(frame)
-    p = holm(np.array([signed_rank_p(losses[subject], losses[rival]) for subject, rival in pairs]))
+    p = adjust_by_holm(np.array([signed_rank_p(losses[subject], losses[rival]) for subject, rival in pairs]))
     return [
         Duel(subject, rival, *superiority(losses[subject], losses[rival]), float(adjusted))
         for (subject, rival), adjusted in zip(pairs, p, strict=True)
@@ -67,8 +59,8 @@ def duels_against_all(frame: pd.DataFrame, subject: str) -> list[Duel]:
 def log_losses(frame: pd.DataFrame) -> dict[str, Array]:
     """By algorithm, log10 of its ends in the order of the repetitions.
 
-    An infeasible end is worse than every feasible one of the frame by more than those differ, so that ranks see it as
-    the worst; two infeasible ends are equal.
+    An infeasible end gets a loss above every feasible one of the frame, so that it has the worst rank; two infeasible
+    ends are equal.
     """
     values, violations = frame["value"].to_numpy(), frame["violation"].to_numpy()
     feasible = is_feasible(values, violations)
@@ -82,8 +74,8 @@ def log_losses(frame: pd.DataFrame) -> dict[str, Array]:
 def signed_rank_p(subject: Array, rival: Array) -> float:
     """Two-sided p-value of Wilcoxon's signed-rank test with Pratt's treatment of equal pairs; 1 if all are equal.
 
-    Exact up to 50 pairs without ties, since the normal approximation cannot give the small p-values that Holm's
-    correction asks of few pairs.
+    Exact up to 50 pairs without ties, because the normal approximation cannot give the small p-values that Holm's
+    correction needs with few pairs.
     """
     difference = subject - rival
     if not difference.any():
@@ -101,7 +93,7 @@ def superiority(subject: Array, rival: Array) -> tuple[float, float, float]:
 
 
 def _weighted_superiority(subject: Array, rival: Array, counts: Array) -> Array:
-    """A12 (m,) where repetitions stand as often as the rows of counts (m, n) say; all sums are of halves, so exact."""
+    """A12 (m,) where each repetition counts as often as the rows of counts (m, n) say; sums of halves, so exact."""
     n = len(subject)
     order = np.argsort(rival)
     below, up_to = (np.searchsorted(rival[order], subject, side=side) for side in ("left", "right"))
@@ -111,7 +103,7 @@ def _weighted_superiority(subject: Array, rival: Array, counts: Array) -> Array:
 
 
 def superiority_unpaired(subject: Array, rival: Array) -> tuple[float, float, float]:
-    """A12 of losses (n,) and (m,) that have nothing in common, with a 95 % percentile interval."""
+    """A12 of independent losses (n,) and (m,), with a 95 % percentile interval."""
     wins = _win_matrix(subject, rival)
     drawn = zip(resamples(len(subject)), resamples(len(rival), "rival"), strict=True)
     resampled = np.array([wins[np.ix_(rows, columns)].mean() for rows, columns in drawn])

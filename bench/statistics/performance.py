@@ -47,9 +47,9 @@ def expected_running_time(times: Array, spent: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTimes:
-    """Running times of many runs and targets, condensed: as short for a thousand runs as for ten.
+    """Running times of many runs and targets, condensed, so that a thousand runs take no more memory than ten.
 
-    times: the finite ones in ascending order, each once (k,); counts: how many are no later (k,); of: all of them.
+    times: the distinct finite ones in ascending order (k,); counts: how many are no later (k,); of: the number of all.
     """
 
     times: Array
@@ -58,13 +58,13 @@ class CondensedTimes:
 
 
 def condense_times(times: Array) -> CondensedTimes:
-    """Condensed running times, of any shape."""
+    """Condensed running times from an array of any shape."""
     once, counts = np.unique(times[np.isfinite(times)], return_counts=True)
     return CondensedTimes(once, counts.cumsum(), times.size)
 
 
 def share_reached(found: Sequence[CondensedTimes], evaluations: Array) -> Array:
-    """The share of all times, of whatever runs, problems and targets, within each number of evaluations (k,)."""
+    """The share of all times, over runs, problems and targets, within each number of evaluations (k,)."""
     reached = [np.append(0, one.counts)[np.searchsorted(one.times, evaluations, side="right")] for one in found]
     return np.asarray(np.sum(reached, axis=0) / sum(one.of for one in found))
 
@@ -72,8 +72,8 @@ def share_reached(found: Sequence[CondensedTimes], evaluations: Array) -> Array:
 def area_under_curve(run: Run, best: float, worst: float, budget: int) -> float:
     """Mean over the evaluations of log10 of the best so far, scaled to 0 at `best` and 1 at `worst`.
 
-    Smaller is better; 1 minus it is IOHprofiler's area over the convergence curve. Values beyond the two count as the
-    two, as does what is not known yet as `worst`.
+    Smaller is better; 1 minus the area is IOHprofiler's area over the convergence curve. Values beyond the two limits
+    count as the limits; evaluations before the first known value count as `worst`.
     """
     level = np.append(1.0, _scale_log(run.best, best, worst))
     ends = np.concatenate([[0.0], np.minimum(run.evaluations, budget), [float(budget)]])
@@ -90,9 +90,9 @@ def _scale_log(values: Array, best: float, worst: float) -> Array:
 
 
 def performance_ratios(costs: pd.DataFrame) -> pd.DataFrame:
-    """Costs, positive, a row a problem and a column an algorithm, over the least of the row.
+    """Positive costs, one row a problem and one column an algorithm, divided by the least of the row.
 
-    An infinite cost is a failure; where all fail, all ratios are infinite.
+    An infinite cost is a failure; if all algorithms fail, all ratios are infinite.
     """
     least = costs.min(axis=1)
     ratios = costs.div(least.where(np.isfinite(least), 1.0), axis=0)

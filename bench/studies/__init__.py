@@ -1,1 +1,1 @@
-"""Studies made with the harness: the paper, where it stops, best trajectories, regression guard, speed and scale."""
+"""Studies made with the harness: the paper and beyond, best known trajectories, regression check, speed and scale."""

@@ -1,4 +1,4 @@
-"""What happens inside MuPSO's runs: when it mutates, and when it finds its best."""
+"""Mutations inside MuPSO's runs: when they happen, and whether the best point comes before or after them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,9 +15,9 @@ from bench.plan import Entry
 
 @dataclass(frozen=True)
 class MutationHistory:
-    """One run: iterations whose population was drawn anew, and the iteration of its last improvement.
+    """One run: the iterations whose population was drawn anew, and the iteration of its last improvement.
 
-    iterations: how many followed the first population.
+    iterations: number of iterations after the first population.
     """
 
     mutations: tuple[int, ...]
@@ -31,7 +31,7 @@ class MutationHistory:
 
 
 def replay_mutations(entries: Sequence[Entry], workers: int, **changed: Any) -> list[MutationHistory]:
-    """The runs of MuPSO once more, with other hyper-parameters where `changed` names them."""
+    """Repeat the runs of MuPSO, with other hyper-parameters where `changed` names them."""
     trials = [replace(entry.trial, params=replace(entry.trial.params, **changed)) for entry in entries]
     with parallel_config(backend="loky", inner_max_num_threads=1):
         return list(Parallel(n_jobs=workers)(delayed(_replay_mutations_of_trial)(trial) for trial in trials))

@@ -1,5 +1,5 @@
-"""Properties of the algorithms: what each does to a problem that is only moved, scaled or noise, and what it costs;
-`armlab properties`.
+"""Properties of the algorithms, `armlab properties`: behaviour on a problem that is shifted, scaled or pure noise, and
+overhead.
 """
 
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ import pandas as pd
 
 from algorithms.properties import measure_properties
 from algorithms.registry import names as registered
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.config import find_algorithm
-from bench.files import write_whole
 from bench.result_sets.formats import make_folder
 from bench.studies.speed.clock import median_seconds
 from bench.studies.speed.overhead import armlab_task
@@ -42,7 +42,7 @@ class AlgorithmProperties:
 
     @property
     def verdict(self) -> str:
-        """What a reader of a ranking should know."""
+        """What the properties mean for a ranking, in words."""
         said = []
         if self.translation > MAX_PATH_DEVIATION:
             said.append("depends on where the origin of coordinates lies")
@@ -56,7 +56,7 @@ class AlgorithmProperties:
 
 
 def properties_of_algorithms(names: Sequence[str]) -> list[AlgorithmProperties]:
-    """Facts of algorithms by their registered names, with their default parameters.
+    """Properties of algorithms by their registered names, with their default parameters.
 
     Raises InputError for a name that is not registered.
     """

@@ -125,7 +125,7 @@ def test_results_of_another_configuration_are_refused_unless_told_to_replace_the
 def test_results_of_unknown_origin_are_refused(small: Path) -> None:
     Path("results").mkdir()
     Path("results/small.csv").write_text("precious")
-    assert "results/small.csv is there without small.settings.yaml" in _refusal(small.name)
+    assert "results/small.csv stands without small.settings.yaml" in _refusal(small.name)
     assert Path("results/small.csv").read_text() == "precious"
 
 

@@ -193,7 +193,7 @@ def test_each_mistake_is_told_in_one_line(tmp_path: Path, plan: Callable[[str], 
     assert torque == "t: a best-known record needs limits of position, velocity and acceleration alone"
     sphere = told("name: t\nseed: 0\nproblems: {t: {preset: sphere}}\n")
     assert sphere == "t: should be a trajectory of an arm in its own coordinates, not 'sphere'"
-    assert "t starts from the record of 's', which is not there yet" in told(
+    assert "t starts from the record of 's', which does not exist yet" in told(
         "name: t\nseed: 0\nproblems: {t: {preset: joint-fourier}, s: {preset: joint-fourier}}\nstart_from: {t: s}\n"
     )
 
@@ -202,7 +202,9 @@ def test_a_record_of_other_settings_is_not_overwritten(tmp_path: Path, plan: Cal
     list(improve_best_known(tmp_path, 0.0, config=plan(PLAN)))
     other = plan(PLAN.replace('"samples": 30', '"samples": 31'))
     told = refusal(lambda: list(improve_best_known(tmp_path, 0.0, config=other)))
-    assert told == f"{tmp_path / RECORDS_FILE}: 'tiny' has other settings there: rename the problem or remove it"
+    assert (
+        told == f"{tmp_path / RECORDS_FILE}: 'tiny' has other settings there: rename the problem or remove its record"
+    )
 
 
 def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:

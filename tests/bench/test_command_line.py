@@ -6,6 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pandas as pd
+from click.testing import CliRunner
+
+from armlab.cli.main import main
 
 Armlab = Callable[..., "subprocess.CompletedProcess[str]"]
 COLUMNS = "algorithm,minimum,average,standard_deviation,median,lower_quartile,upper_quartile,feasible_share,evaluations"
@@ -17,6 +20,13 @@ def test_help_imports_nothing_heavy() -> None:
     names = {line.rsplit("|", 1)[-1].strip().split(".")[0] for line in imported.splitlines()}
     assert "click" in names
     assert not names & {"numpy", "pandas", "scipy", "matplotlib", "pydantic", "joblib", "yaml", "tqdm", "algorithms"}
+
+
+def test_the_help_line_of_every_command_fits_into_a_terminal_of_eighty_columns() -> None:
+    for group in ([], ["recording"]):
+        told = CliRunner().invoke(main, [*group, "--help"], terminal_width=80)
+        assert told.exit_code == 0
+        assert "..." not in told.output.partition("Commands:")[2]
 
 
 def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, tmp_path: Path) -> None:
@@ -111,6 +121,6 @@ def test_check_names_the_broken_promise(armlab: Armlab, plug_in: Callable[[str],
 
 
 def test_a_reader_that_goes_away_is_no_traceback(small: Path) -> None:
-    command = f"{sys.executable} -m bench.cli list | true"
+    command = f"{sys.executable} -m armlab.cli.main list | true"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
     assert done.stderr == ""

@@ -117,7 +117,7 @@ def test_the_jury_predicts_the_torque_of_its_own_trajectories(arm_problem: Excit
 
 
 def command_stream(seed: int, number: int) -> np.random.Generator:
-    from bench.seeds import named_generator
+    from armlab.common.streams import named_generator
 
     return named_generator("does it help", "independent", seed, number)
 

@@ -9,8 +9,8 @@ from refusals import refusal
 
 from armlab.cli.main import main
 from bench.config import read_experiment
-from bench.dispatch import open_executor
 from bench.execute import Failure
+from bench.executors.choice import open_executor
 from bench.executors.contract import ExecutorSettings, run_in_worker
 from bench.run import load_experiment
 

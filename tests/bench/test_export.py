@@ -191,7 +191,7 @@ def test_a_limit_that_is_kept_at_the_samples_but_broken_at_the_rate_is_refused(t
             "gentle",
             50.0,
             {"duration": 5.0},
-            "{path}: 'duration' is 5.0, the record 'gentle' has 4.0: another one",
+            "{path}: 'duration' is 5.0, the record 'gentle' has 4.0: it is of another trajectory",
         ),
     ],
 )

@@ -14,9 +14,8 @@ import pytest
 from refusals import refusal
 
 from armlab.common.errors import InputError
-from bench.dispatch import run_missing
 from bench.execute import run_trial
-from bench.run import load_experiment
+from bench.run import load_experiment, run_missing
 from bench.statistics import summarise
 from bench.store import open_store, salvage
 from problem.contract import Evaluation
@@ -46,8 +45,8 @@ def test_a_full_disk_is_told_keeps_what_was_kept_and_the_run_goes_on_when_there_
         store._connection.execute("PRAGMA max_page_count = 60")  # SQLite itself then says that the disk is full
         said = refusal(run_missing, entries, store, 1)
     assert said == (
-        f"cannot use the run store {path}: database or disk is full; all that was kept before is still there: "
-        "make room, and the same command goes on"
+        f"cannot use the run store {path}: database or disk is full; all outcomes stored before are safe: "
+        "free some space, and the same command continues"
     )
     assert 50 <= _count(path) < MANY
     with open_store(path) as store:
@@ -65,7 +64,7 @@ def test_a_file_that_may_not_grow_is_a_line_and_exit_code_2(many: Path) -> None:
     )
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
-    assert "make room, and the same command goes on" in done.stderr
+    assert "free some space, and the same command continues" in done.stderr
 
 
 def _damaged(many: Path, where: float, what: bytes) -> tuple[Path, int]:
@@ -115,7 +114,7 @@ def test_a_truncated_store_is_told_and_saved_as_far_as_it_goes(many: Path) -> No
 def test_what_cannot_be_saved_is_told(many: Path, tmp_path: Path) -> None:
     path, _ = _damaged(many, 0.0, b"\xff" * 4096)
     assert "nothing of " in refusal(salvage, path, tmp_path / "new.sqlite")
-    assert "is there already" in refusal(salvage, path, many)
+    assert "exists already" in refusal(salvage, path, many)
     assert "there is no run store" in refusal(salvage, tmp_path / "none", tmp_path / "new.sqlite")
     assert not (tmp_path / "new.sqlite").exists()
 
@@ -156,7 +155,7 @@ def test_a_trial_that_hangs_is_ended_and_told_and_the_others_are_kept(
     assert done.returncode == 1
     assert f"{len(stuck)} trials raised an error and are not kept" in done.stderr
     for entry in stuck:
-        assert f"{entry.trial}: WorkerLostError: twice the worker process died with this trial" in done.stderr
+        assert f"{entry.trial}: WorkerLostError: the worker process died twice with this trial" in done.stderr
     assert "trial_timeout_s = 0.5" in done.stderr
     assert _count(small.parent / ".armlab" / "runs.sqlite") == len(entries) - len(stuck)
 

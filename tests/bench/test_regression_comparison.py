@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.statistics.pairwise import holm
+from armlab.common.statistics import adjust_by_holm
 from bench.studies.regression.check import best_p_value, compare_ends, location_p_value, p_values
 from bench.studies.regression.sweep import Cell
 
@@ -32,8 +32,8 @@ def test_the_chance_of_leading_is_that_of_all_ways_to_split_the_ends(m: int) -> 
 
 
 def test_holm_multiplies_the_smallest_most_and_never_reverses_an_order() -> None:
-    np.testing.assert_allclose(holm(np.array([0.01, 0.04, 0.03])), [0.03, 0.06, 0.06])
-    np.testing.assert_allclose(holm(np.array([[0.5, 0.9], [0.2, 0.001]])), [[1.0, 1.0], [0.2, 0.002]])
+    np.testing.assert_allclose(adjust_by_holm(np.array([0.01, 0.04, 0.03])), [0.03, 0.06, 0.06])
+    np.testing.assert_allclose(adjust_by_holm(np.array([[0.5, 0.9], [0.2, 0.001]])), [[1.0, 1.0], [0.2, 0.002]])
 
 
 @given(finite_ends, finite_ends)
@@ -81,7 +81,7 @@ def test_equal_distributions_raise_an_alarm_no_more_often_than_stated() -> None:
     rng = np.random.default_rng(2)
     runs, cells, rate = 1000, 14, 0.05
     p = p_values(rng.random((runs, cells, 100)), rng.random((runs, cells, 40)))
-    alarms = (holm(p.reshape(runs, -1)) <= rate).any(axis=1).mean()
+    alarms = (adjust_by_holm(p.reshape(runs, -1)) <= rate).any(axis=1).mean()
     assert 0.005 < alarms < rate + 3 * np.sqrt(rate * (1 - rate) / runs)
 
 

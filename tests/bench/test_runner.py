@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.dispatch import missing_entries, run_missing
+from bench.dispatch import missing_entries
 from bench.errors import StoppedError, TrialsFailedError
 from bench.execute import run_trial
 from bench.plan import Entry
-from bench.run import load_experiment
+from bench.run import load_experiment, run_missing
 from bench.store import open_store
 from bench.tables import as_csv, summary_table, tidy_frame
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from algorithms.contract import Box
-from bench.seeds import first_population, named_generator, own_stream
+from armlab.common.streams import named_generator
+from bench.seeds import first_population, own_stream
 
 BOX = Box(np.array([-1.0, 10.0]), np.array([1.0, 20.0]))
 

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from armlab.common.statistics import adjust_by_holm
 from bench.statistics.critical_difference import critical_difference, indistinguishable_groups
 from bench.statistics.ends import quantile_interval
-from bench.statistics.pairwise import holm, signed_rank_p, superiority, superiority_unpaired
+from bench.statistics.pairwise import signed_rank_p, superiority, superiority_unpaired
 from bench.statistics.performance import (
     Run,
     area_under_curve,
@@ -82,7 +83,7 @@ def test_wilcoxons_test_of_demsars_example_rejects_equality_of_c45_with_and_with
 
 
 def test_holms_correction_of_its_textbook_example() -> None:
-    np.testing.assert_allclose(holm(np.array([0.01, 0.04, 0.03, 0.005])), [0.03, 0.06, 0.06, 0.02])
+    np.testing.assert_allclose(adjust_by_holm(np.array([0.01, 0.04, 0.03, 0.005])), [0.03, 0.06, 0.06, 0.02])
 
 
 def test_groups_are_the_longest_runs_of_neighbours_of_which_no_pair_differs() -> None:

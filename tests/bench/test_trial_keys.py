@@ -8,8 +8,9 @@ import pytest
 from armlab.common.settings import Settings
 from bench.config import Experiment, find_algorithm, read_experiment
 from bench.execute import Trial
+from bench.fingerprint import fingerprint
 from bench.plan import plan_trials
-from bench.provenance import fingerprint
+from problem.registry import parse_problem
 
 
 class Bowl(Settings):
@@ -25,6 +26,7 @@ class Params:
     inertia: float = 0.72
 
 
+SPHERE = parse_problem({"preset": "sphere", "dimension": 3}, "test")
 TRIAL = Trial(Bowl(), "spso", Params(), 50, 1550, "clip", 2024, 0)
 
 
@@ -72,18 +74,22 @@ def test_iterations_and_the_same_budget_in_evaluations_are_the_same_trials(small
     assert _keys(read_experiment(small)) == _keys(experiment)
 
 
-def test_the_fingerprint_of_a_third_party_is_that_of_its_own_file_too(plug_in: object) -> None:
+def test_the_fingerprint_of_a_third_party_is_that_of_its_own_file_too(plug_in: object, tmp_path: Path) -> None:
     assert callable(plug_in)
     plug_in("pass")
-    assert fingerprint(find_algorithm("plug-in", ""), {}) != fingerprint(find_algorithm("de", ""), {})
+    plug_in_file, algorithm = tmp_path / "site" / "plug_in.py", find_algorithm("plug-in", "")
+    before = fingerprint(algorithm, SPHERE)
+    plug_in_file.write_text(plug_in_file.read_text() + "FACTOR = 2\n")
+    assert fingerprint(algorithm, SPHERE) != before
 
 
 def test_a_file_that_the_problem_names_belongs_to_the_fingerprint(tmp_path: Path) -> None:
     robot, algorithm = tmp_path / "robot.yaml", find_algorithm("de", "")
     robot.write_text("mass: 1")
-    before = fingerprint(algorithm, {"arm": {"file": str(robot)}})
-    robot.write_text("mass: 2")
-    assert fingerprint(algorithm, {"arm": {"file": str(robot)}}) != before
+    problem = parse_problem({"preset": "paper", "arm": str(robot)}, "test")
+    before = fingerprint(algorithm, problem)
+    robot.write_text("mass: 2.0")
+    assert fingerprint(algorithm, problem) != before
 
 
 def _keys(experiment: Experiment) -> list[str]:

@@ -7,6 +7,7 @@ import pytest
 from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
+from armlab.common.statistics import wilson_interval
 from armlab.concealed.score.cases import categorize_finding
 from armlab.concealed.score.measures import (
     Measure,
@@ -14,7 +15,6 @@ from armlab.concealed.score.measures import (
     confusion_table,
     detection_table,
     effect_table,
-    wilson_interval,
 )
 from armlab.concealed.score.rows import ScoreRows, make_rows
 

@@ -13,9 +13,10 @@ from refusals import refusal
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
+from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.report import comparison_content, comparison_lines, comparison_sentences
-from armlab.diagnosis.compare.structure import Change, holm_correction, predict_torque
+from armlab.diagnosis.compare.structure import Change, predict_torque
 from armlab.effects.contract import Scene
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
@@ -116,8 +117,8 @@ def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
 
 
 def test_holm_multiplies_the_smallest_by_all_and_keeps_the_order() -> None:
-    assert_allclose(holm_correction(np.array([0.04, 0.01, 0.5])), [0.08, 0.03, 0.5])
-    assert_allclose(holm_correction(np.array([0.02, 0.01])), [0.02, 0.02])
+    assert_allclose(adjust_by_holm(np.array([0.04, 0.01, 0.5])), [0.08, 0.03, 0.5])
+    assert_allclose(adjust_by_holm(np.array([0.02, 0.01])), [0.02, 0.02])
 
 
 def test_the_command_writes_page_and_json(tmp_path: Path) -> None:

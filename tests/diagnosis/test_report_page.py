@@ -14,6 +14,7 @@ import yaml
 from told_recordings import frame, recording_in
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report.charts import (
     FLOOR_LOOK,
@@ -27,7 +28,7 @@ from armlab.diagnosis.report.residuals import correlation_seconds, filter_correl
 from armlab.diagnosis.report.words import verdict_lines
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
-from armlab.diagnosis.verdict_files import verdict_texts, write_texts
+from armlab.diagnosis.verdict_files import verdict_texts
 from armlab.recordings.load import load_recording
 
 HOSTILE = "x<script>alert(1)<!script>\"&'<img src=y onerror=alert(2)>"
@@ -208,7 +209,7 @@ def test_where_one_file_cannot_be_written_none_is(found: Diagnosis, tmp_path: Pa
 
 def test_a_folder_that_stands_where_a_file_should_stand_stops_all_of_them(found: Diagnosis, tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
-    with pytest.raises(InputError, match="is a folder, where a file of the verdict should stand"):
+    with pytest.raises(InputError, match="is a folder, where a file should be written"):
         write_texts(verdict_texts(found, tmp_path) | report_texts(found), tmp_path)
     assert [each.name for each in tmp_path.rglob("*.*")] == ["report.html"]
 

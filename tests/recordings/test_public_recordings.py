@@ -4,7 +4,6 @@ The raw files are looked for in the folder that ARMLAB_RECORDINGS names and in t
 """
 
 import json
-import os
 from pathlib import Path
 
 import jsonschema
@@ -25,6 +24,7 @@ from armlab.recordings.public import (
     fetch_recording,
     find_raw_file,
     is_available,
+    local_copies,
 )
 from armlab.recordings.recording import Recording
 from armlab.recordings.recording_file import FILE_NAME
@@ -103,11 +103,11 @@ def test_axes_5_and_6_of_the_tx40_are_coupled_as_published(tmp_path: Path) -> No
     assert_allclose(np.diag(transmission.torque), np.diag(gears))
 
 
-@pytest.mark.skipif(
-    LOCAL_COPIES_VARIABLE not in os.environ, reason=f"{LOCAL_COPIES_VARIABLE} names no folder with the URDF of the TX40"
-)
+@pytest.mark.skipif(local_copies() is None, reason=f"{LOCAL_COPIES_VARIABLE} names no folder with the URDF of the TX40")
 def test_the_tx40_is_that_of_its_urdf() -> None:
-    published = read_urdf(Path(os.environ[LOCAL_COPIES_VARIABLE]) / "staubli_tx40" / "tx40_mdh_modified.urdf")
+    folder = local_copies()
+    assert folder is not None
+    published = read_urdf(folder / "staubli_tx40" / "tx40_mdh_modified.urdf")
     built_in = load_arm("staubli-tx40")
     for position in np.random.default_rng(0).uniform(-2, 2, (5, 6)):
         for one, other in zip(link_poses(published, position), link_poses(built_in, position), strict=True):
@@ -153,6 +153,21 @@ def test_a_missing_local_copy_is_told_in_one_line(tmp_path: Path, monkeypatch: p
     monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path))
     assert "cannot read" in refusal(fetch_recording, "emps", tmp_path / "new")
     assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.parametrize("blank", ["", " "])
+def test_a_blank_folder_of_local_copies_is_read_as_unset(
+    blank: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = PUBLIC_RECORDINGS["emps"]
+    copy = tmp_path / recording.folder / recording.files[0].name
+    copy.parent.mkdir()
+    copy.touch()  # in the current folder, which a blank name would mean
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, blank)
+    monkeypatch.setattr("armlab.recordings.public._download", lambda recording, file: Path("downloaded"))
+    assert local_copies() is None
+    assert find_raw_file(recording, recording.files[0]) == Path("downloaded")
 
 
 def test_a_download_without_connection_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,7 +12,7 @@ from recording_folders import folder_with, frame
 from armlab.cli.recordings import recording
 from armlab.common.errors import InputError
 from armlab.recordings.load import load_recording
-from armlab.recordings.public import LOCAL_COPIES_VARIABLE
+from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 
 
 def call(*words: object, answers: str = "") -> Result:
@@ -81,7 +81,7 @@ def test_import_asks_for_what_was_not_said(tmp_path: Path) -> None:
     assert load_recording(tmp_path / "new").arm.name == "irb120-arm"
 
 
-@pytest.mark.skipif(LOCAL_COPIES_VARIABLE not in os.environ, reason=f"{LOCAL_COPIES_VARIABLE} names no local copies")
+@pytest.mark.skipif(local_copies() is None, reason=f"{LOCAL_COPIES_VARIABLE} names no local copies")
 def test_fetch_names_source_and_licence(tmp_path: Path) -> None:
     result = call("fetch", "emps", "--out", tmp_path / "emps")
     assert "forgi86/sysid-neural-continuous, licence Apache-2.0" in result.output

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
+from armlab.common.statistics import wilson_interval
 from armlab.concealed.loop.case import MOTION_KINDS
-from armlab.concealed.score.measures import wilson_interval
 
 ENDS = ("right", "wrong", "open")
 EXPECTED_COLUMNS = tuple(f"expected {end}" for end in ENDS)

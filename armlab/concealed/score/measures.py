@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
-from scipy.stats import norm
 
+from armlab.common.statistics import wilson_interval
 from armlab.concealed.score.rows import ScoreRows
 
 CONFIDENCE_LEVEL = 0.95
@@ -53,17 +53,6 @@ class Measure:
             return True
         least, most = WANTED_BOUNDS[self.wanted]
         return least <= self.low and self.high <= most if self.is_met else self.high < least or self.low > most
-
-
-def wilson_interval(hits: int, number: int) -> tuple[float, float]:
-    """Wilson's score interval of a share (1927)."""
-    if number == 0:
-        return 0.0, 1.0
-    z = float(norm.ppf((1 + CONFIDENCE_LEVEL) / 2))
-    seen, spread = hits / number, z**2 / number
-    middle = (seen + spread / 2) / (1 + spread)
-    half = z / (1 + spread) * np.sqrt(seen * (1 - seen) / number + spread / (4 * number))
-    return (float(middle - half) if hits else 0.0), (float(middle + half) if hits < number else 1.0)
 
 
 def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
@@ -115,7 +104,7 @@ def share_measure(name: str, flags: "pd.Series[Any]", wanted: str) -> Measure:
     hits, number = int(flags.astype(bool).sum()), len(flags)
     if not number:
         return Measure(name, None, None, None, 0, wanted, "share")
-    return Measure(name, hits / number, *wilson_interval(hits, number), number, wanted, "share")
+    return Measure(name, hits / number, *wilson_interval(hits, number, CONFIDENCE_LEVEL), number, wanted, "share")
 
 
 def _middle_measure(name: str, values: "pd.Series[float]", wanted: str, middle: Any = np.median) -> Measure:

@@ -12,6 +12,7 @@ from typing import Any, get_args
 import numpy as np
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.structure import SIGNIFICANCE_LEVEL, Change
 from armlab.diagnosis.report import sections
@@ -40,7 +41,7 @@ from armlab.diagnosis.report.words import (
     place_in_words,
 )
 from armlab.diagnosis.settings import Baseline
-from armlab.diagnosis.verdict_files import check_output_folder, verdict_content, write_texts
+from armlab.diagnosis.verdict_files import check_output_folder, verdict_content
 from armlab.recordings.load import load_recording
 
 COMPARISON_SCHEMA = "comparison/1"

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from armlab.common.arrays import Array
+from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.columns import base_columns
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.found_model import model_found
@@ -179,7 +180,7 @@ def changes_between(old: Diagnosis, new: Diagnosis) -> tuple[Change, ...]:
         candidates = select_separable(each, candidates, base)
     fits = fit_structure(old, candidates, base), fit_structure(new, candidates, base)
     rows = [*_effect_changes(candidates, *fits), *_base_changes(old, base, *fits)]
-    adjusted = holm_correction(np.array([each.p_value for each in rows]))
+    adjusted = adjust_by_holm(np.array([each.p_value for each in rows]))
     return tuple(replace(each, p_value=float(p)) for each, p in zip(rows, adjusted, strict=True))
 
 
@@ -236,13 +237,3 @@ def _build_change(
     half = float(student.ppf(0.975, degrees)) * error
     p_value = float(2 * student.sf(abs(new - old) / max(error, 1e-300), degrees))
     return Change(effect, joint, joints, name, old, new, (new - old - half, new - old + half), unit, p_value)
-
-
-def holm_correction(p_values: Array) -> Array:
-    """p-values after Holm's (1979) correction, in their order."""
-    order = np.argsort(p_values)
-    count = len(p_values)
-    steps = np.maximum.accumulate((count - np.arange(count)) * p_values[order])
-    out = np.empty(count)
-    out[order] = np.minimum(steps, 1.0)
-    return out

@@ -14,6 +14,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.diagnosis.confusability.card import (
     CERTAIN_STANDARD_ERRORS,
     MIN_CONFUSED_COSINE,
@@ -25,7 +26,6 @@ from armlab.diagnosis.confusability.card import (
 )
 from armlab.diagnosis.report.charts import PALE_COLOR, shorten_text, svg_element, svg_picture, svg_text
 from armlab.diagnosis.report.html import folded_details, html_document, html_table, paragraph, section
-from armlab.diagnosis.verdict_files import write_texts
 from armlab.effects.library import library
 from problem.arm import Arm
 from problem.robot_file import load_arm

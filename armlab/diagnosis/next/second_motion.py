@@ -10,6 +10,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.next.decision import Chances, decision_chances
 from armlab.diagnosis.next.experiment import (
@@ -29,7 +30,7 @@ from armlab.diagnosis.next.motion import (
 from armlab.diagnosis.next.problem import TellApartProblem, tell_apart_problem
 from armlab.diagnosis.next.question import Name
 from armlab.diagnosis.next.verdict_file import RivalGroup, read_verdict
-from armlab.diagnosis.verdict_files import verdict_texts, write_texts
+from armlab.diagnosis.verdict_files import verdict_texts
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.arm import Arm

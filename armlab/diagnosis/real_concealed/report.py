@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.real_concealed.examine import Outcome, ReportedFinding, open_outcomes
 from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
 from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
 from armlab.diagnosis.report.words import effect_in_words, format_number, format_unit, place_in_words
-from armlab.diagnosis.verdict_files import write_texts
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE
 

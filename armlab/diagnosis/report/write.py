@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report import sections
 from armlab.diagnosis.report.gallery import Gallery, draw_gallery
@@ -22,7 +23,6 @@ from armlab.diagnosis.verdict_files import (
     check_output_folder,
     predicted_texts,
     verdict_texts,
-    write_texts,
 )
 from armlab.recordings.load import load_recording
 

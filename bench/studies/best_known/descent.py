@@ -20,9 +20,8 @@ from problem.motion import Motion
 class LimitRows:
     """Distances of positions, velocities and accelerations at all samples to their limits.
 
-    First those to the upper limits, then those to the lower, each in halves of the range between the two;
-    infinite where there is no limit. `margin` is the share of that half by which limits are drawn in, so that
-    rounding breaks none.
+    First to the upper limits, then to the lower ones, in units of half of the range between the two; infinite where
+    there is no limit. margin: share of that half by which the limits are tightened, so that rounding breaks none.
     """
 
     problem: ExcitationProblem
@@ -52,10 +51,10 @@ class LimitRows:
 
 
 def smooth_log_condition(power: float) -> SpectralFunction:
-    """log of the p-norms of sigma and of 1 / sigma: above log(cond) by at most 2 log(n) / p.
+    """log(||sigma||_p ||1 / sigma||_p), which exceeds log(cond) by at most 2 log(n) / p.
 
-    At a good trajectory several singular values meet at either end, and the condition number has no gradient;
-    this function of the whole spectrum has one, and its limit for large p is the condition number.
+    At a good trajectory several singular values meet at either end of the spectrum, and the condition number has no
+    gradient. This function of the whole spectrum has one, and its limit for large p is the condition number.
     """
 
     def function(values: Array) -> tuple[float, Array]:
@@ -77,7 +76,7 @@ _OUT_OF_REACH_VALUE = 1e3  # log of a condition number: where a line search leav
 
 @dataclass(frozen=True, eq=False)
 class SearchEnd:
-    """Where a search ended: point (dimension,), its condition number and violation, and what it took."""
+    """The end of a search: point (dimension,), its condition number and violation, and the effort."""
 
     point: Array
     value: float
@@ -91,28 +90,28 @@ class SearchEnd:
         return self.violation == 0.0 and bool(np.isfinite(self.value))
 
     def better_than(self, other: "SearchEnd | None") -> bool:
-        """Whether this may stand in a record and the other one is worse."""
+        """Whether this end may replace the other one in a record."""
         return self.feasible and (other is None or not other.feasible or self.value < other.value)
 
 
 def evaluate_point(problem: ExcitationProblem, point: Array) -> SearchEnd:
-    """What the problem itself says of a point (dimension,)."""
+    """The problem's own evaluation of a point (dimension,)."""
     told = problem.evaluate(point[None])
     return SearchEnd(point, float(told.value[0]), float(told.violation[0]), evaluations=1)
 
 
 def check_supported(problem: ExcitationProblem, name: str) -> None:
-    """Raise InputError where a problem has limits that no derivatives are known for."""
+    """Raise InputError if a problem has limits whose derivatives are not known."""
     torques = any(np.isfinite(limit.torque) for limit in problem.constraints.limits)
     if torques or problem.constraints.workspace.limited:
         raise InputError(f"{name}: a best-known record needs limits of position, velocity and acceleration alone")
 
 
 def descend(problem: ExcitationProblem, start: Array) -> SearchEnd:
-    """The best feasible point on the way down from `start` (dimension,), else the last point.
+    """The best feasible point on the descent from `start` (dimension,), else the last point.
 
-    Each stage sharpens the smoothing. Only rows near their limits are handed to the solver; where its answer
-    breaks others, those are added and it goes on.
+    Each stage sharpens the smoothing. The solver gets only the rows near their limits; if its answer breaks others,
+    they are added and the stage is repeated.
     """
     rows = LimitRows(problem, LIMIT_MARGIN)
     best, point = evaluate_point(problem, start), start

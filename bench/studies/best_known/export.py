@@ -1,12 +1,12 @@
-"""`armlab export`: the trajectory of a record, checked at the controller's rate, into a file."""
+"""`armlab export`: the trajectory of a record, checked at the controller's rate, as a file."""
 
 from pathlib import Path
 from typing import Any
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import read_yaml, suggest_name
 from bench.execute import canonical
-from bench.files import write_whole
 from bench.studies.best_known.records import Record, build_excitation, read_records
 from bench.studies.best_known.search import record_point
 from bench.trajectory_files import TRAJECTORY_FORMATS, SampledTrajectory, sample_trajectory
@@ -53,4 +53,4 @@ def _check_same_trajectory(settings: ProblemSettings, record: Record, path: Path
     for key in own.keys() | record.settings.keys():
         here, there = (canonical(given.get(key)) for given in (own, record.settings))
         if key not in _KEYS_THAT_MAY_DIFFER and here != there:
-            raise InputError(f"{path}: '{key}' is {here}, the record '{name}' has {there}: another one")
+            raise InputError(f"{path}: '{key}' is {here}, the record '{name}' has {there}: it is of another trajectory")

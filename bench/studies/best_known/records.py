@@ -1,4 +1,4 @@
-"""Records of the best known trajectories: which problems have one, the file, and how far a condition number is from
+"""Records of the best known trajectories: the problems that have one, the file, and the gap of a condition number to
 its record.
 """
 
@@ -10,9 +10,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from bench.execute import canonical
-from bench.files import write_whole
 from bench.plan import Entry
 from problem.excitation import ExcitationProblem
 from problem.registry import ProblemSettings, parse_problem
@@ -21,7 +21,7 @@ from problem.registry import ProblemSettings, parse_problem
 class SearchPlan(Settings):
     """Problems by name, as `problem.registry` reads them.
 
-    start_from: problems whose starts are the record of another one and kicks of their own best, in turn.
+    start_from: problems that start in turn from the record of another problem and from perturbations of their own best.
     """
 
     name: str
@@ -65,9 +65,9 @@ class Record(Settings):
     """The best trajectory known for one problem.
 
     settings: of the problem, in full. value: its condition number. coefficients: the point by the names of its
-    numbers. method, seed, start: what found it. evaluations, gradients: spent over all starts so far.
-    versions: of the packages that found it. ends: by method the values at which the starts ended, in order;
-    null for an infeasible one.
+    coordinates. method, seed, start: the search that found it. evaluations, gradients: sum over all starts so far.
+    versions: of the packages that found it. ends: by method the values at which the starts ended, in order; null for an
+    infeasible one.
     """
 
     settings: dict[str, Any]
@@ -87,7 +87,7 @@ class Record(Settings):
         return sum(map(len, self.ends.values()))
 
     def count_agreeing(self, tolerance: float) -> tuple[int, int]:
-        """How many starts from scratch ended within a share of the best, and of how many; no kicks, no warm starts."""
+        """How many starts from scratch ended within a share of the best, and how many there were."""
         ends = [end for method in METHODS_FROM_SCRATCH for end in self.ends.get(method, ())]
         return sum(end is not None and end <= self.value * (1 + tolerance) for end in ends), len(ends)
 
@@ -125,7 +125,7 @@ _IGNORED_SETTINGS = ("criterion", "penalty", "frame_seed")  # they change neithe
 
 
 def record_key(settings: ProblemSettings) -> str:
-    """Canonical text of what decides the values and limits of a problem: equal text, equal best."""
+    """Canonical text of the settings that decide the values and limits of a problem: equal text, equal best."""
     kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _IGNORED_SETTINGS}
     if kept["preset"] == "random-frame":
         kept["preset"] = "joint-fourier"  # the same trajectories in other coordinates
@@ -144,7 +144,7 @@ def records_by_problem(path: Path) -> dict[str, Record]:
 def gap_to_best_known(settings: ProblemSettings, value: float, known: dict[str, Record]) -> float | None:
     """Relative excess of a condition number over the best known, 0.1 for 10 % more; None without a record.
 
-    known: as `best_known` gives it. Negative for a value that beats the record.
+    known: as `best_known_values` returns it. Negative for a value that beats the record.
     """
     record = known.get(record_key(settings))
     return None if record is None else value / record.value - 1

@@ -1,7 +1,7 @@
 """The search for better trajectories, `armlab best-known`.
 
-Start after start, from random points, from ends of CMA-ES and from kicks of the best known; the records are written
-after each.
+Each start is a random point, the end of a CMA-ES run or a perturbation of the best known; the records are written after
+each start.
 """
 
 import json
@@ -18,10 +18,10 @@ from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.streams import named_generator
 from bench.config import find_algorithm
 from bench.execute import canonical
 from bench.provenance import provenance
-from bench.seeds import named_generator
 from bench.studies.best_known.descent import SearchEnd, check_supported, descend, evaluate_point
 from bench.studies.best_known.records import (
     RECORDS_FILE,
@@ -47,14 +47,14 @@ KICKED_POINTS = 4  # kicked points, the best of which is a start: of more, the b
 
 @dataclass(frozen=True)
 class SearchStart:
-    """One start of a problem's search: decided by seed, name and number (and for a kick by the best known)."""
+    """One start of a problem's search; seed, name and number decide it, and for a perturbation the best known too."""
 
     seed: int
     name: str
     number: int
 
     def run(self, problem: ExcitationProblem, best: Array | None) -> tuple[str, SearchEnd]:
-        """How this start began, and its end; best: the point (dimension,) to kick, if there is one yet."""
+        """How this start began, and its end; best: the point (dimension,) to perturb, if there is one yet."""
         rng = self._stream()
         box = Box(problem.lower, problem.upper)
         if not problem.spectral:
@@ -113,7 +113,7 @@ def _run_cmaes(
 
 
 def _without_criterion(problem: ExcitationProblem) -> ExcitationProblem:
-    """The same with nothing to minimise but the condition number and the penalty."""
+    """The same problem, where the fitness is the condition number and the penalty alone."""
     return replace(problem, criterion=Criterion("eq44"))
 
 
@@ -133,11 +133,11 @@ _END_DIGITS = 6  # of the ends, which are there to be compared
 def improve_best_known(
     results: Path, minutes: float, problem: str | None = None, config: Path = CONFIG_FILE
 ) -> Iterator[str]:
-    """Search on for better trajectories, of one problem or of all in turn; yields a line after each start.
+    """Continue the search for better trajectories, of one problem or of all in turn; yields a line after each start.
 
-    It goes on where the records in the folder `results` end, so it can be stopped at any time; a record is
-    only ever replaced by a better one. minutes: no start begins later; each problem gets at least one.
-    Raises InputError, in one line, for any mistake in the configuration or the records.
+    It continues from the records in the folder `results`, so it can be stopped at any time; only a better one replaces
+    a record. minutes: no start begins later; each problem gets at least one. Raises InputError, in one line, for any
+    mistake in the configuration or the records.
     """
     plan = read_search_plan(config)
     searches = [_make_search(plan, name, results / RECORDS_FILE) for name in ([problem] if problem else plan.problems)]
@@ -159,7 +159,7 @@ def _make_search(plan: SearchPlan, name: str, path: Path) -> "_ProblemSearch":
 
 @dataclass(frozen=True, eq=False)
 class _ProblemSearch:
-    """The search for one problem; all that it knows of earlier starts stands in the file."""
+    """The search for one problem; all that it knows of earlier starts is in the file."""
 
     plan: SearchPlan
     name: str
@@ -168,7 +168,7 @@ class _ProblemSearch:
     path: Path
 
     def step(self) -> str:
-        """Make one start more, or so many that one is feasible for the first time; tell how it ended."""
+        """Make one more start, or as many as it takes to find the first feasible point; returns a line about it."""
         records = read_records(self.path)
         record = old = self._check_record(records.get(self.name))
         spent = _Effort(old.ends, old.evaluations, old.gradients) if old else _Effort({}, 0, 0)
@@ -190,7 +190,9 @@ class _ProblemSearch:
     def _check_record(self, record: Record | None) -> Record | None:
         """The record, if it is of this very problem."""
         if record is not None and canonical(record.settings) != canonical(self.settings):
-            raise InputError(f"{self.path}: '{self.name}' has other settings there: rename the problem or remove it")
+            raise InputError(
+                f"{self.path}: '{self.name}' has other settings there: rename the problem or remove its record"
+            )
         return record
 
     def _run(self, start: SearchStart, old: Record | None, records: dict[str, Record]) -> tuple[str, SearchEnd]:
@@ -201,13 +203,13 @@ class _ProblemSearch:
         if best is not None and start.number % 2:
             return "kick", start.descend_from_kick(self.problem, best)
         if source not in records:
-            raise InputError(f"{self.name} starts from the record of '{source}', which is not there yet")
+            raise InputError(f"{self.name} starts from the record of '{source}', which does not exist yet")
         return f"from {source}", descend(self.problem, record_point(records[source]))
 
     def _update_record(
         self, old: Record | None, start: SearchStart, method: str, end: SearchEnd, spent: "_Effort"
     ) -> Record | None:
-        """The old record with what was spent, or the new one in its place; None while nothing is feasible."""
+        """The old record with the added effort, or the new one; None while nothing is feasible."""
         if not end.feasible or (old is not None and end.value >= old.value):
             return old.model_copy(update=vars(spent)) if old else None
         return Record(
@@ -226,7 +228,7 @@ class _ProblemSearch:
 
 @dataclass(frozen=True)
 class _Effort:
-    """How the starts ended so far, by method, and what they took."""
+    """Ends of the starts so far, by method, and their effort."""
 
     ends: dict[str, tuple[float | None, ...]]
     evaluations: int
@@ -237,7 +239,7 @@ class _Effort:
         return sum(map(len, self.ends.values()))
 
     def plus(self, method: str, end: SearchEnd) -> "_Effort":
-        """With one start more."""
+        """The effort with one more start."""
         value = float(f"{end.value:.{_END_DIGITS}g}") if end.feasible else None
         ends = self.ends | {method: (*self.ends.get(method, ()), value)}
         return _Effort(ends, self.evaluations + end.evaluations, self.gradients + end.gradients)

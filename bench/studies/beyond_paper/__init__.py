@@ -1,1 +1,1 @@
-"""Where the paper stops: six joints, joint space, random frames, other budgets, the ingredients of MuPSO one by one."""
+"""Beyond the paper: six joints, joint space, random frames, other budgets, the ingredients of MuPSO one by one."""

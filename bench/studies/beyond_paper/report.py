@@ -19,10 +19,10 @@ DuelChooser = Callable[[pd.DataFrame], list[Duel]]
 
 
 def median_table(frame: pd.DataFrame, known: Mapping[str, float]) -> pd.DataFrame:
-    """One row a problem, swarm size and budget, as far as they vary; a column an algorithm: the median of its ends.
+    """One row a problem, swarm size and budget, as far as they vary; one column an algorithm: the median of its ends.
 
-    An infeasible end counts as infinite; where there are some, the share of the feasible ones stands in brackets.
-    known: the best condition number of a problem, as far as there is a record.
+    An infeasible end counts as infinite; if there are any, the share of the feasible ones stands in brackets. known:
+    the best condition number of a problem, as far as there is a record.
     """
     varying = [name for name in CELL_COLUMNS if frame[name].nunique() > 1]
     rows = []
@@ -81,7 +81,7 @@ def _duel_table(frame: pd.DataFrame, fight: DuelChooser) -> pd.DataFrame:
 
 
 def effect_table(table: pd.DataFrame) -> pd.DataFrame:
-    """A variants table for the eye: one row a variant, one column a problem and budget."""
+    """The duels of the variants to read: one row a variant, one column a problem and budget."""
     signs = np.select([table["winner"] == table["subject"], table["winner"] == table["rival"]], [" +", " -"], "")
     rows = table.assign(
         variant=table["subject"],
@@ -119,7 +119,7 @@ class StudyPart:
 
 
 def study_page(parts: Sequence[StudyPart], mutations: pd.DataFrame) -> str:
-    """Markdown text."""
+    """The study as a Markdown page."""
     sections = [section for part in parts for section in _part_sections(part)]
     shown = mutations.round(2).rename(columns=lambda name: str(name).replace("_", " "))
     return markdown_page(

@@ -1,4 +1,4 @@
-"""`armlab study`: runs what is missing of its experiments, then writes tables, figures and one page over all."""
+"""`armlab study`: runs the missing trials of its experiments and writes tables, figures and one page over all."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pandas as pd
 
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.plan import Plan
-from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_loaded_experiment
+from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
 from bench.studies.beyond_paper.report import (
@@ -42,21 +42,21 @@ class _Outcomes:
 
 
 def make_study(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
-    """Run what is missing and write everything into the results folder; yields the files as they are written.
+    """Run the missing trials and write all files into the results folder; yields the files as they are written.
 
-    configs: the folder with one configuration for each experiment. records: the best known trajectories. Raises as
-    `run_experiment` does; what is finished is kept, and the same command goes on from there.
+    configs: the folder with one configuration for each experiment. records: the best known trajectories. Raises the
+    errors of `run_experiment`; finished trials stay in the store.
     """
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
-    for experiment in loaded.values():
-        yield from run_loaded_experiment(experiment, options, bar)
+    for name in EXPERIMENTS:
+        yield from run_experiment(configs / f"{name}.yaml", options, bar)
     for name, content in _make_files(_read_outcomes(loaded, options), records, options.workers).items():
         write_whole(options.results / name, content)
         yield options.results / name
 
 
 def describe_study(configs: Path, options: RunOptions) -> Iterator[str]:
-    """What would be run, and how long it would take."""
+    """Lines that list the trials and estimate the time."""
     for name in EXPERIMENTS:
         yield from describe_run(configs / f"{name}.yaml", options)
 

@@ -1,4 +1,4 @@
-"""Identification of an arm from one period of a trajectory under noise, as it is done on a real arm."""
+"""Identification of an arm from one period of a trajectory under noise, as on a real arm."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ COULOMB_FRICTION = 1.0  # N m of Coulomb friction that the model lacks
 
 @dataclass(frozen=True)
 class MeasurementNoise:
-    """What disturbs a measurement; standard deviations in N m, or a share of the torque itself.
+    """Measurement noise; standard deviations in N m, or as a share of the torque itself.
 
-    counts: encoder counts a turn, None for exact positions. friction: N m of Coulomb friction in each joint
-    that the model lacks.
+    counts: encoder counts a turn, None for exact positions. friction: Coulomb friction in each joint, N m, which the
+    model lacks.
     """
 
     torque: float = 0.0
@@ -37,7 +37,7 @@ class MeasurementNoise:
     friction: float = 0.0
 
     def positions(self, exact: Array, rng: np.random.Generator) -> Array:
-        """Positions (samples, joints) as the encoders give them, their zeros anywhere within a count."""
+        """Positions (samples, joints) as the encoders give them; their zeros lie anywhere within a count."""
         if self.counts is None:
             return exact
         step = 2 * np.pi / self.counts

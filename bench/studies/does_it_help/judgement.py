@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from armlab.common.arrays import Array
-from bench.seeds import named_generator
+from armlab.common.streams import named_generator
 from bench.studies.does_it_help.identification import NOISE_KINDS, identification_errors
 from bench.studies.does_it_help.trajectories import Specimen, random_feasible
 from problem.excitation import ExcitationProblem
@@ -46,7 +46,7 @@ class Jury:
 
 
 def choose_jury(problem: ExcitationProblem, seed: int) -> Jury:
-    """Random feasible trajectories of a seed of their own."""
+    """Random feasible trajectories from a seed of their own."""
     streams = (named_generator("does it help", "independent", seed, number) for number in range(JURY_SIZE))
     points = np.array([random_feasible(problem, rng) for rng in streams])
     motions = problem.trajectory.motions(points, problem.times).motion
@@ -56,7 +56,7 @@ def choose_jury(problem: ExcitationProblem, seed: int) -> Jury:
 
 
 def judge_specimen(specimen: Specimen, panel: Jury, seed: int, repetitions: int) -> dict[str, str | float]:
-    """One row of the table: where the trajectory is from, its criteria, and the errors under each kind of noise."""
+    """One row of the table: the origin of the trajectory, its criteria, and the errors under each kind of noise."""
     problem, point = specimen.problem, specimen.point
 
     def streams(repetition: int) -> np.random.Generator:
@@ -97,8 +97,8 @@ SUBSETS = MappingProxyType({"all": "all trajectories", "better_half": "the bette
 def correlation_table(frame: pd.DataFrame, seed: int) -> pd.DataFrame:
     """Spearman's correlation of each criterion with each error, with a bootstrap interval of 95 %.
 
-    frame: one row a trajectory, as `judged` makes it. Whole groups are drawn again, since the trajectories of
-    one search are alike. Returns columns subset, noise, error, criterion, correlation, low, high, trajectories.
+    frame: one row a trajectory, as `judge_all` makes it. Whole groups are resampled, because the trajectories of one
+    search are alike. Returns columns subset, noise, error, criterion, correlation, low, high, trajectories.
     """
     return pd.concat(
         [_subset_correlations(name, rows, seed) for name, rows in split_subsets(frame).items()], ignore_index=True
@@ -111,10 +111,10 @@ def split_subsets(frame: pd.DataFrame) -> dict[str, pd.DataFrame]:
 
 
 def correlation_ceiling(frame: pd.DataFrame, kind: str, error: str) -> float:
-    """About the correlation with an error that a perfect criterion would have, given the error's own noise.
+    """Estimate of the correlation that a perfect criterion would have with an error, given the error's own noise.
 
-    From the correlation r of two halves of the repetitions: 2 r / (1 + r) for all of them (Spearman and Brown
-    1910), and its root for the attenuation by one noisy side. 0 where the halves do not agree at all.
+    From the correlation r of two halves of the repetitions: 2 r / (1 + r) for all of them (Spearman and Brown 1910),
+    and its root for the attenuation by one noisy side. 0 where the halves do not agree at all.
     """
     halves = (frame[[f"{kind}_{error}_{half}"]].to_numpy() for half in REPETITION_HALVES)
     agreement = max(float(spearman_correlations(*halves)[0, 0]), 0.0)

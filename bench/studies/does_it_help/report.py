@@ -135,7 +135,7 @@ half of the repetitions (Spearman and Brown 1910)."""
 
 
 def study_page(frame: pd.DataFrame, table: pd.DataFrame, apart: pd.DataFrame, base: int, repetitions: int) -> str:
-    """Markdown text from the trajectories, their correlations, and the best known for unit columns."""
+    """The study as a Markdown page, from the trajectories, their correlations, and the best known for unit columns."""
     counts = frame["source"].value_counts(sort=False)
     setting = _SETTING_TEXT.format(
         count=len(frame),
@@ -176,7 +176,7 @@ def _answer_text(frame: pd.DataFrame, table: pd.DataFrame) -> str:
 
 
 def _spread_text(frame: pd.DataFrame) -> str:
-    """How much there is to gain in the better half."""
+    """How far the errors differ in the better half."""
     half = split_subsets(frame)["better_half"]
     error = half["both_prediction"]
     return (

@@ -6,7 +6,7 @@ from pathlib import Path
 import pandas as pd
 from joblib import Parallel, delayed
 
-from bench.files import write_whole
+from armlab.common.files import write_whole
 from bench.studies.best_known.records import RECORDS_FILE, read_records
 from bench.studies.does_it_help.judgement import SUBSETS, Jury, choose_jury, correlation_table, judge_specimen
 from bench.studies.does_it_help.report import draw_correlations, draw_errors, study_page
@@ -19,9 +19,9 @@ REPETITIONS = 20
 
 
 def make_does_it_help(results: Path, workers: int) -> list[Path]:
-    """Write `results`/paper/does_it_help.* from the best-known records in `results`; returns the files.
+    """Write `results`/paper/does_it_help.* from the best known records in `results`; returns the files.
 
-    Nothing depends on the number of workers. Raises InputError, in one line, without a record to begin from.
+    The results do not depend on the number of workers. Raises InputError, in one line, if there is no record.
     """
     records = read_records(results / RECORDS_FILE)
     chosen, beside = make_specimens(SEED, records), unit_column_specimens(records)

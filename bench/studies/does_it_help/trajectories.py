@@ -10,8 +10,8 @@ from algorithms.contract import Box
 from algorithms.driver import minimise
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.streams import named_generator
 from bench.config import find_algorithm
-from bench.seeds import named_generator
 from bench.studies.best_known.records import Record, build_excitation
 from bench.studies.best_known.search import record_point
 from problem.excitation import ExcitationProblem
@@ -35,7 +35,7 @@ PATHS, STEPS = 12, (0.1, 0.25, 0.45, 0.7, 0.9)  # from the best known towards ra
 
 @dataclass(frozen=True, eq=False)
 class Specimen:
-    """One trajectory: a point (dimension,) of a problem. group: what was drawn together, e.g. one search."""
+    """One trajectory: a point (dimension,) of a problem. group: trajectories with a common origin, e.g. one search."""
 
     problem: ExcitationProblem
     point: Array
@@ -44,7 +44,7 @@ class Specimen:
 
 
 def make_specimens(seed: int, records: dict[str, Record]) -> list[Specimen]:
-    """All specimens, each feasible, none twice; raises InputError without a record of BEST."""
+    """All specimens, each feasible and different from the others; raises InputError without a record to start from."""
     if BEST_RECORD not in records:
         raise InputError(f"there is no best-known record of '{BEST_RECORD}': make one with `armlab best-known`")
     problem = build_excitation(parse_problem(PROBLEM_SETTINGS, "does-it-help"), "does-it-help")
@@ -86,7 +86,7 @@ def _random_specimens(problem: ExcitationProblem, seed: int) -> Iterator[Specime
 
 
 def _specimens_between(problem: ExcitationProblem, best: Array, seed: int) -> Iterator[Specimen]:
-    """Points between the best known and random ones: feasible, since the limits are convex in the numbers."""
+    """Points between the best known and random ones; they are feasible, because the limits are convex."""
     for number in range(PATHS):
         other = random_feasible(problem, named_generator("does it help", "path", seed, number))
         for step in STEPS:

@@ -1,1 +1,1 @@
-"""The paper made again: its tables and figures, and a report on which of its claims hold."""
+"""Replication of the paper: its tables and figures, and a report on which of its claims hold."""

@@ -21,9 +21,9 @@ PRINTED_TOLERANCE = 0.10
 
 @dataclass(frozen=True)
 class Claim:
-    """place: in the paper. says: what it prints. ours: what the command computed. why: for the verdict.
+    """place: in the paper. says: its statement. ours: our number. why: the reason of the verdict.
 
-    A claim that cannot be checked names in `why` the datum that is missing.
+    If a claim cannot be checked, `why` names the missing datum.
     """
 
     place: str
@@ -34,7 +34,7 @@ class Claim:
 
 
 def verdict_if(condition: bool) -> Verdict:
-    """Reproduced if the condition holds, else not."""
+    """`reproduced` if the condition holds, else `not reproduced`."""
     return "reproduced" if condition else "not reproduced"
 
 
@@ -44,7 +44,6 @@ def is_close_to_printed(ours: float, printed: float) -> bool:
 
 
 def percent_change(new: float, old: float) -> float:
-    """Change from old to new in per cent of old."""
     return 100 * (new / old - 1)
 
 
@@ -52,7 +51,7 @@ def percent_change(new: float, old: float) -> float:
 class Evidence:
     """frames: tidy outcomes by experiment. deviations, differences: from Tables 1 and 2.
 
-    lives: MuPSO's runs of Table 3 by the reading of eq. 6. readings: the paper's dynamics to the letter.
+    mutation_histories: MuPSO's runs of Table 3 by the reading of eq. 6. readings: the paper's dynamics as printed.
     """
 
     paper: Printed
@@ -75,5 +74,5 @@ class Evidence:
 
 
 def literal_readings(paper: Printed) -> list[tuple[Reading, Identifiability]]:
-    """What each literal reading of the paper's dynamics tells of the parameters."""
+    """The identifiability of the parameters under each literal reading of the paper's dynamics."""
     return [(reading, identifiability(literal_matrix(paper, reading))) for reading in READINGS]

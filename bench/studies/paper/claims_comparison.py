@@ -27,7 +27,7 @@ _MISSING_CONVENTIONS = "missing: search box, duration, samples, weight y, limits
 
 
 def comparison_claims(evidence: Evidence) -> list[Claim]:
-    """Table 3 number by number, then its rankings, then Figure 3."""
+    """Claims about Table 3 number by number, then about its rankings, then about Figure 3."""
     return [
         *_number_claims(evidence),
         _nearest_convention_claim(evidence),
@@ -78,7 +78,7 @@ def _convention_spans(frame: pd.DataFrame) -> Mapping[tuple[str, str], tuple[flo
 
 
 def _nearest_convention_claim(evidence: Evidence) -> Claim:
-    """Under which convention the minima and averages are of the printed size."""
+    """The convention under which the minima and averages have the printed size."""
     distances = {
         standing.problem: _distance_to_printed(standing, evidence.paper.table3.rows) for standing in evidence.ranking
     }
@@ -190,7 +190,7 @@ _EARLY_ITERATION = 10  # iterations of 30
 
 
 def conclusion_claims(evidence: Evidence) -> list[Claim]:
-    """Gains, times, and the swarm size once more."""
+    """Claims of section 6: gains, times, and the swarm size."""
     return [
         *_gain_claims(evidence),
         *_time_rank_claims(evidence),

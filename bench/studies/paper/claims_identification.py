@@ -108,7 +108,7 @@ def _condition_number_claims(evidence: Evidence) -> Iterator[Claim]:
 
 
 def identification_claims(evidence: Evidence) -> list[Claim]:
-    """Counts, literal readings, and the list."""
+    """Claims about the counts of identifiable parameters, the literal readings, and the list of parameters."""
     return [*_count_claims(evidence), *_reading_claims(evidence), *_list_claims(evidence)]
 
 
@@ -137,7 +137,7 @@ def _printed_counts(printed: PrintedCounts) -> tuple[int, int, int]:
 
 
 def _reading_claims(evidence: Evidence) -> Iterator[Claim]:
-    """The paper's own equations, read to the letter: what gives its counts, and what its list."""
+    """Which literal reading of the paper's equations gives its counts, and which its list."""
     printed, listed = evidence.paper.identifiable, set(evidence.paper.table4)
     last = list(evidence.paper.table4)[-printed.combinations :]
     for reading, found in evidence.readings:
@@ -159,7 +159,7 @@ def _reading_claims(evidence: Evidence) -> Iterator[Claim]:
 
 
 def _explain_reading(reading: Reading, found: Identifiability, counts: bool, extra: set[str], last: list[str]) -> str:
-    """last: with what Table 4 ends, where every parameter of it has an effect."""
+    """last: the end of the sentence if every parameter of Table 4 has an effect."""
     combined = _join_names(set(found.combined))
     if counts:
         return f"the counts, not the list; in combination are {combined}"

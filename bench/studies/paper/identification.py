@@ -10,9 +10,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.streams import named_generator
 from bench.execute import build_problem
 from bench.plan import Entry
-from bench.seeds import named_generator
 from bench.store import RunStore
 from bench.studies.paper.settings import Table4Settings
 from problem.arm import Arm
@@ -38,7 +38,7 @@ class BestRun:
 
     @property
     def title(self) -> str:
-        """Where it comes from, for the reader of a figure."""
+        """The origin of the trajectory, for the reader of a figure."""
         return f"repetition {self.repetition} of the search, condition number {self.value:.3g}"
 
 
@@ -123,7 +123,7 @@ def _sample_times(settings: Table4Settings, run: BestRun) -> Array:
 
 
 def _estimate_with_noise(settings: Table4Settings, run: BestRun, rng: np.random.Generator) -> tuple[Array, Array]:
-    """One experiment: the encoder's zero lies anywhere within a count, the torque's noise is white."""
+    """One experiment: the encoder's zero lies anywhere within a count, and the noise of the torque is white."""
     arm, times = run.problem.arm, _sample_times(settings, run)
     motion = run.motion(times)
     torque = rigid_body_torque(arm, motion)

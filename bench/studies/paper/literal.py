@@ -1,7 +1,7 @@
-"""The paper's dynamics read to the letter, to see which reading gives its counts of identifiable parameters.
+"""The paper's dynamics as printed, to see which reading gives its counts of identifiable parameters.
 
-This is a transcription of eq. 9-39, not the dynamics of this project (`problem.regressor`). The readings differ in
-what the equations leave open or print in two ways: whose motion and which frame of P eq. 11 means, the order of the
+This is a transcription of eq. 9-39, not the dynamics of this project (`problem.regressor`). The readings differ where
+the equations are open or contradict each other: whose motion and which frame of P eq. 11 means, the order of the
 inertia's columns (eq. 26 against eq. 28), which rows of the wrench count as measured, and gravity.
 """
 
@@ -66,7 +66,7 @@ class Identifiability:
 
 
 def identifiability(matrix: Array) -> Identifiability:
-    """What an observation matrix (rows, 10 * links) at many random states tells about each parameter."""
+    """Which parameters an observation matrix (rows, 10 * links) at many random states identifies."""
     links = range(1, matrix.shape[1] // 10 + 1)
     names = np.array([f"{name}{link}" for link in links for name in PARAMETER_NAMES])
     lengths = np.linalg.norm(matrix, axis=0)

@@ -1,4 +1,4 @@
-"""The ranking under each choice that the paper leaves open, and whether MuPSO differs from the others there."""
+"""The ranking under each choice that the paper leaves open, and whether MuPSO differs significantly from the others."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,8 @@ SUBJECT = "mupso"
 class Standing:
     """One choice of conventions. medians: by algorithm, infinite where half of the ends are infeasible.
 
-    duels: MuPSO against each other algorithm, Holm over them. best_known: condition number, None without a record.
+    duels: MuPSO against each other algorithm, with Holm's correction over them. best_known: condition number, None
+    without a record.
     """
 
     problem: str
@@ -30,7 +31,7 @@ class Standing:
 
     @property
     def usable(self) -> bool:
-        """Whether any algorithm found anything feasible."""
+        """Whether any algorithm found a feasible point."""
         return self.feasible_share > 0
 
     @property
@@ -40,7 +41,7 @@ class Standing:
         return winner if np.isfinite(self.medians[winner]) else None
 
     def count(self, outcome: str) -> int:
-        """How many rivals MuPSO is `better` or `worse` than, at 5 % after Holm."""
+        """To how many algorithms MuPSO is `better` or `worse`, at 5 % after Holm's correction."""
         winners = [duel.winner() for duel in self.duels]
         return sum(winner is not None and (winner == SUBJECT) == (outcome == "better") for winner in winners)
 
@@ -67,10 +68,10 @@ def _make_standing(problem: str, rows: pd.DataFrame, best_known: float | None) -
 
 
 def ranking_table(found: list[Standing]) -> pd.DataFrame:
-    """One row a choice: who has the least median, MuPSO's own, and MuPSO against each other algorithm.
+    """One row a choice: the algorithm with the least median, MuPSO's median, and MuPSO against each other algorithm.
 
-    `+` MuPSO is better, `-` worse, `=` no difference at 5 % after Holm; in brackets the chance that a run of MuPSO
-    ends better (A12) and the corrected p-value. A lone `-`: nothing is feasible.
+    `+` MuPSO is better, `-` worse, `=` no significant difference at 5 % after Holm's correction; in brackets the
+    probability that a run of MuPSO ends better (A12) and the corrected p-value. A single `-`: nothing is feasible.
     """
     return pd.DataFrame([_standing_row(standing) for standing in found])
 

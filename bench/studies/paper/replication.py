@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pandas as pd
 
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings
-from bench.files import write_whole
 from bench.printed import read_printed
-from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_loaded_experiment
+from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
 from bench.studies.mutations import MutationHistory, replay_mutations
@@ -36,7 +36,7 @@ Files = dict[str, str | bytes]
 
 @dataclass(frozen=True)
 class _ItemSettings:
-    """The settings of what is no experiment of its own."""
+    """The settings of the tables and figures that are no experiments."""
 
     table1: Table1Settings
     table2: Table2Settings
@@ -46,15 +46,15 @@ class _ItemSettings:
 
 
 def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
-    """Run what is missing and write everything into the results folder; yields the files as they are written.
+    """Run the missing trials and write all files into the results folder; yields the files as they are written.
 
-    configs: the folder with one configuration for each table and figure. records: the best known trajectories.
-    Raises as `run_experiment` does.
+    configs: the folder with one configuration for each table and figure. records: the best known trajectories. Raises
+    the errors of `run_experiment`.
     """
     items = _read_items(configs)
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
-    for experiment in loaded.values():
-        yield from run_loaded_experiment(experiment, options, bar)
+    for name in EXPERIMENTS:
+        yield from run_experiment(configs / f"{name}.yaml", options, bar)
     evidence = _gather_evidence(items, loaded, options, records)
     files = _make_files(items, loaded, evidence) | _settings_files(items)
     yield from _write_files(options.results, files)
@@ -62,7 +62,7 @@ def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressB
 
 
 def describe_paper(configs: Path, options: RunOptions) -> Iterator[str]:
-    """What would be run, and how long it would take."""
+    """Lines that list the trials and estimate the time."""
     for name in EXPERIMENTS:
         yield from describe_run(configs / f"{name}.yaml", options)
 

@@ -1,6 +1,4 @@
-"""The replication report: every claim with what we get instead, the ranking, and the figures, as Markdown and as one
-HTML file.
-"""
+"""The replication report as Markdown and as one HTML file: every claim with our result, ranking and figures."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -27,9 +25,9 @@ img { max-width: 100%; }
 
 
 def markdown_to_html(title: str, text: str, images: Mapping[str, bytes]) -> str:
-    """The page with PNG images, by the name under which the text shows them, as part of the file.
+    """The page with its PNG images, by the names in the text, embedded in the file.
 
-    Raises KeyError for an image that is not given.
+    Raises KeyError for a missing image.
     """
     parser = MarkdownIt("commonmark").enable("table")
     tokens = parser.parse(text)
@@ -83,7 +81,7 @@ limit."""
 
 
 def replication_page(evidence: Evidence) -> str:
-    """The report as Markdown."""
+    """The report as a Markdown page."""
     claims = {title: make(evidence) for title, make in CLAIM_SECTIONS.items()}
     parts = [_VERDICT_RULES, _verdict_table(claims), *_main_findings(evidence)]
     for title, found in claims.items():
@@ -111,7 +109,7 @@ def _count_verdicts(claims: Sequence[Claim], verdict: Verdict) -> int:
 
 
 def _main_findings(evidence: Evidence) -> list[str]:
-    """The few sentences that a reader should take away."""
+    """The main findings, a sentence each."""
     medians = evidence.column("table3", "median")
     rank = sorted(medians, key=medians.__getitem__).index(SUBJECT) + 1
     usable = [standing for standing in evidence.ranking if standing.usable]

@@ -1,4 +1,4 @@
-"""Typed settings of the tables and figures that are no experiments of their own, one YAML file each."""
+"""Typed settings of the tables and figures that are no experiments, one YAML file each."""
 
 from pathlib import Path
 from typing import Annotated, Self, TypeVar
@@ -46,8 +46,8 @@ class Figure4Settings(TrajectorySettings):
 class Table4Settings(Settings):
     """The simulated experiment on the best trajectory of an algorithm.
 
-    encoder_counts: a turn of the joint. torque_noise: standard deviation, N m. cutoff_hz: of the zero-phase low-pass.
-    decimation: each so-manieth sample is kept after the filter.
+    encoder_counts: counts a turn of the joint. torque_noise: standard deviation, N m. cutoff_hz: of the zero-phase
+    low-pass. decimation: every n-th sample is kept after the filter.
     """
 
     name: str

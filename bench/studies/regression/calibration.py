@@ -1,7 +1,7 @@
-"""Calibration of the regression check: its false-alarm rate and its power against shifts and defects, and the report.
+"""Calibration of the regression check: its false-alarm rate, and its power against shifts and defects.
 
-A run is a draw of repetitions without replacement from a bank of trials, the same ones for all algorithms of a
-problem, since those share their first populations.
+A run is a draw of repetitions without replacement from a bank of trials. All algorithms of a problem use the same
+repetitions, because they share their first populations.
 """
 
 import json
@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
-from bench.files import write_whole
+from armlab.common.files import write_whole
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.statistics import adjust_by_holm
+from armlab.common.streams import named_generator
 from bench.plan import Entry
 from bench.provenance import provenance
-from bench.seeds import named_generator
-from bench.statistics.pairwise import holm
 from bench.studies.regression.check import CheckVerdict, judge_run, p_values
 from bench.studies.regression.defects import DEFECTS, run_ends_with_defect
 from bench.studies.regression.sweep import Baseline, Cell, Ends, Progress, Sample, Sweep, plan_entries, run_entries
@@ -29,7 +30,9 @@ DefectRun = Callable[[str, Sequence[Entry]], Ends]
 
 @dataclass(frozen=True)
 class DefectResult:
-    """verdict: of the fixed run under the defect. power: share of drawn runs that raise an alarm, any and by cell."""
+    """verdict: of the fixed run under the defect. power: share of drawn runs that raise an alarm, in any cell and by
+    cell.
+    """
 
     verdict: CheckVerdict
     power: float
@@ -40,8 +43,9 @@ class DefectResult:
 class Calibration:
     """Shares of runs that raise an alarm.
 
-    false_alarms: runs of unchanged code against the committed baseline; redrawn: against a baseline of the same
-    size, drawn anew for each run. power: by shift of log10 cond in a single cell, that cell's own alarm.
+    false_alarms: runs of unchanged code against the committed baseline; false_alarms_of_drawn_baselines: against a
+    baseline of the same size, drawn anew for each run. power: by shift of log10 cond in a single cell, that cell's own
+    alarm.
     """
 
     runs: int
@@ -111,7 +115,7 @@ def _false_alarms_of_drawn_baselines(sweep: Sweep, bank: Ends) -> float:
 
 
 def _power_of_shift(sweep: Sweep, baseline: Baseline, drawn: Ends, p: Array, shift: float) -> dict[Cell, float]:
-    """Share of runs that find one cell's log10 cond shifted, by cell."""
+    """Share of runs that detect a shift of one cell's log10 cond, by cell."""
     power = {}
     for index, cell in enumerate(drawn):
         shifted = p.copy()
@@ -133,7 +137,7 @@ def _try_defect(name: str, sweep: Sweep, baseline: Baseline, fixed: Ends, drawn:
 
 def _find_alarms(p: Array, sweep: Sweep) -> Array:
     """Which cells raise an alarm (runs, cells), of p-values (runs, cells, 2)."""
-    adjusted = holm(p.reshape(len(p), -1)).reshape(p.shape)
+    adjusted = adjust_by_holm(p.reshape(len(p), -1)).reshape(p.shape)
     return np.asarray(adjusted.min(axis=-1) <= sweep.false_alarm_rate)
 
 
@@ -181,8 +185,8 @@ def _shares_by_name(shares: Mapping[Cell, float]) -> dict[str, float]:
 
 
 def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
-    sections = [
-        "# Calibration of the regression check",
+    return markdown_page(
+        "Calibration of the regression check",
         f"{calibration.runs} runs of {sweep.repetitions} repetitions, drawn from {sweep.calibration.repetitions} "
         "trials of unchanged code a cell with a seed of their own, against a baseline of "
         f"{sweep.baseline.repetitions}. "
@@ -194,7 +198,7 @@ def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
         "is drawn anew for each run.",
         "## Power against a shift",
         "Share of runs in which a cell raises the alarm when log10 cond of that cell alone is shifted.",
-        "\n".join(_power_table(calibration.power)),
+        _power_table(calibration.power),
         "## The fixed run of unchanged code",
         _code_block(calibration.verdict.lines()),
         "## Defects put into the code",
@@ -202,14 +206,13 @@ def _calibration_page(sweep: Sweep, calibration: Calibration) -> str:
         f"from {sweep.calibration.defect_repetitions} defective trials a cell. A defect of the observation matrix is "
         "run with two algorithms only, the others being taken as unchanged: the power is a lower bound.",
         *(_defect_section(name, found) for name, found in calibration.defects.items()),
-    ]
-    return "\n\n".join(sections) + "\n"
+    )
 
 
-def _power_table(power: Mapping[float, Mapping[Cell, float]]) -> list[str]:
-    heads = ["problem", "algorithm", *(f"{shift:+g}" for shift in power)]
+def _power_table(power: Mapping[float, Mapping[Cell, float]]) -> str:
+    headings = ["problem", "algorithm", *(f"{shift:+g}" for shift in power)]
     rows = [[*cell, *(f"{shares[cell]:.2f}" for shares in power.values())] for cell in next(iter(power.values()))]
-    return [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
+    return markdown_table(headings, rows)
 
 
 def _defect_section(name: str, found: DefectResult) -> str:

@@ -11,8 +11,8 @@ from scipy.special import gammaln
 from scipy.stats import mannwhitneyu
 
 from armlab.common.arrays import Array
+from armlab.common.statistics import adjust_by_holm
 from bench.statistics import quantile
-from bench.statistics.pairwise import holm
 from bench.studies.regression.sweep import Baseline, Cell, Ends
 
 
@@ -45,8 +45,10 @@ class CellComparison:
 
 
 def compare_ends(baseline: Ends, now: Ends) -> list[CellComparison]:
-    """All cells of `now`, which the baseline must have too, with p-values after Holm over both statistics of all."""
-    adjusted = holm(np.concatenate([p_values(baseline[cell], now[cell]) for cell in now])).reshape(-1, 2)
+    """All cells of `now`, which the baseline must have too, with p-values after Holm's correction over both statistics
+    of all cells.
+    """
+    adjusted = adjust_by_holm(np.concatenate([p_values(baseline[cell], now[cell]) for cell in now])).reshape(-1, 2)
     return [
         CellComparison(cell, baseline[cell], now[cell], float(p_location), float(p_best))
         for cell, (p_location, p_best) in zip(now, adjusted, strict=True)
@@ -94,7 +96,7 @@ _ACCEPT_HINT = "If the problem or an algorithm was meant to change, `armlab regr
 
 @dataclass(frozen=True)
 class CheckVerdict:
-    """comparisons: of every cell. identical: cells whose ends are those that the baseline's own fixed run had."""
+    """comparisons: of every cell. identical: cells whose ends equal those of the baseline's own fixed run."""
 
     comparisons: Sequence[CellComparison]
     rate: float
@@ -111,14 +113,14 @@ class CheckVerdict:
         return not self.alarms
 
     def lines(self) -> list[str]:
-        """A table of all cells, and below it what is found, a sentence for each cell that differs."""
+        """A table of all cells, and below it the findings, a sentence for each cell that differs."""
         return [
             *_text_table([_COLUMN_HEADS, *(self._row(comparison) for comparison in self.comparisons)]),
             *self.sentences(),
         ]
 
     def sentences(self) -> list[str]:
-        """What is found, in words."""
+        """The findings in words."""
         count = f"{len(self.comparisons)} cells, 2 statistics each, family-wise false-alarm rate {self.rate:g}"
         same = f"{self.identical} of {len(self.comparisons)} cells are identical to the baseline's own fixed run"
         if self.passed:

@@ -1,6 +1,6 @@
-"""Defects to try the check on.
+"""Defects that the regression check is tried on.
 
-Each is put into the running code, and taken out again, by a context; searches run under one.
+A context puts a defect into the running code and takes it out again; searches run within it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -46,7 +46,7 @@ def _tell_without_selection(state: DEState, X: Array, fitness: Array) -> DEState
 
 
 def _fly_straight_on(swarm: Swarm, w: float, c1: float, c2: float, rng: np.random.Generator) -> None:
-    """Like `fly`, but the first velocity is kept, until a wall takes it."""
+    """Like `fly`, but a particle keeps its first velocity until it meets a bound."""
     if swarm.velocity.any():
         swarm.position += swarm.velocity
     else:
@@ -62,7 +62,7 @@ def _gram_without_velocities(arm: Arm, motion: Motion, columns: NDArray[np.intp]
 
 
 def _without_velocities(motion: Motion) -> Motion:
-    """Without velocities the products of velocities are gone: Coriolis and centrifugal terms."""
+    """The motion without velocities, so that Coriolis and centrifugal terms vanish."""
     return Motion(motion.position, np.zeros_like(motion.velocity), motion.acceleration)
 
 
@@ -93,7 +93,7 @@ def _gram_about_own_z(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Ar
 
 
 def _column_signs(columns: NDArray[np.intp]) -> Array:
-    """The sign of the last column of all, Iyz of the last link, is wrong."""
+    """Signs of the columns, wrong for the last one, Iyz of the last link."""
     return np.where(columns == columns.max(), -1.0, 1.0)
 
 
@@ -161,7 +161,7 @@ DEFECTS: Mapping[str, Defect] = MappingProxyType(
 
 
 def run_ends_with_defect(name: str, entries: Sequence[Entry], workers: int, progress: Progress) -> Ends:
-    """Ends of those of the trials that the defect concerns, by cell."""
+    """Ends, by cell, of the trials that the defect affects."""
     concerned = [entry for entry in entries if entry.trial.algorithm in DEFECTS[name].algorithms]
     shares = [concerned[worker::workers] for worker in range(workers)]
     with parallel_config(backend="loky", inner_max_num_threads=1):

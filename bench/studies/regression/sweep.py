@@ -1,4 +1,4 @@
-"""What the regression check runs, the ends that it compares, and the committed baseline."""
+"""The sweep of the regression check, the ends that it compares, and the committed baseline."""
 
 import json
 from collections.abc import Callable, Iterable, Sequence
@@ -12,13 +12,13 @@ from pydantic import Field, model_validator
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings, read_yaml, validate
 from bench.config import Experiment, PositiveInt
-from bench.dispatch import run_missing
 from bench.execute import Outcome
-from bench.files import write_whole
 from bench.plan import Entry, plan_trials
 from bench.provenance import provenance
+from bench.run import run_missing
 from bench.statistics import is_feasible
 from bench.store import open_store
 
@@ -29,7 +29,7 @@ Progress = Callable[[int], object]
 
 
 class Cell(NamedTuple):
-    """What is compared: one algorithm on one problem, by their labels."""
+    """One algorithm on one problem, by their labels."""
 
     problem: str
     algorithm: str
@@ -103,9 +103,9 @@ def plan_entries(sweep: Sweep, sample: Sample | None = None) -> Sequence[Entry]:
 
 
 def run_entries(entries: Sequence[Entry], workers: int, progress: Progress) -> Ends:
-    """Run all trials anew, in a store of their own that nothing was kept in before."""
+    """Run all trials anew, in an empty store of their own."""
     with TemporaryDirectory() as folder, open_store(Path(folder) / "runs.sqlite") as store:
-        run_missing(entries, store, workers, progress)
+        run_missing(entries, store, workers, progress=progress)
         return group_ends((entry, store.get(entry.key)) for entry in entries)
 
 
@@ -164,9 +164,9 @@ def read_baseline(path: Path, sweep: Sweep) -> Baseline:
 
 
 def _sweep_configuration(sweep: Sweep) -> dict[str, Any]:
-    """What the file of the sweep says, but for the calibration; defaults of problems and algorithms stay out.
+    """The content of the sweep's file without the calibration; defaults of problems and algorithms are left out.
 
-    A default that changes is a change of the code, which the check must see by what it does.
+    A changed default is a change of the code, which the check must detect by its effect.
     """
     text = sweep.model_dump_json(exclude={"calibration"}, exclude_none=True)
     configuration: dict[str, Any] = json.loads(text)

@@ -1,1 +1,1 @@
-"""What a large sweep costs, and what is left of it when it is killed: measured on the real command."""
+"""The cost of a large sweep, and what is lost when it is killed, measured on the real command."""

@@ -1,4 +1,4 @@
-"""Kill the command, or one of its workers, at random times; count what is lost, and what is computed again."""
+"""Kill the command, or one of its workers, at random times; count the trials that are lost and computed again."""
 
 import os
 import signal
@@ -25,8 +25,11 @@ _BATCH_SECONDS = 0.1  # about: so that kills do not all come right after a commi
 
 @dataclass(frozen=True)
 class KillResult:
-    """One killing. kept: trials in the store right after it; lost: of those, not there at the end, or other than they
-    were; computed: trials that the restart ran; sound: whether the store kept its integrity and the table its bytes.
+    """The result of one kill.
+
+    kept: trials in the store right after it. lost: those of them that are missing or changed at the end. missing:
+    trials that the restart had to run. computed: trials that it ran. store_and_table_intact: whether the store kept its
+    integrity and the table its bytes.
     """
 
     kept: int
@@ -37,7 +40,7 @@ class KillResult:
 
     @property
     def exact(self) -> bool:
-        """Nothing lost, nothing computed that was there, nothing left undone."""
+        """Whether no trial is lost, none is computed twice, and none is left undone."""
         return self.store_and_table_intact and not self.lost and self.computed == self.missing
 
 
@@ -60,9 +63,9 @@ class _CountingBar:
 def kill_repeatedly(
     config: Path, repetitions: int, victim: Victim, tell: ReportProgress, seed: int = 0
 ) -> list[KillResult]:
-    """Kill as often as that, each time a run of its own, when a share of the trials is kept that is uniform in 0 to 1.
+    """Kill that many times, each time in a run of its own, at a uniformly drawn share of stored trials.
 
-    A killed driver is started again; a killed worker is left to the driver.
+    A killed driver is started again; a killed worker is replaced by the driver.
     """
     rng = np.random.default_rng(seed)
     import_module("bench.results")  # what is imported here need not be imported in every fork
@@ -77,7 +80,7 @@ def kill_repeatedly(
 
 
 def _undisturbed_table(path: Path) -> bytes:
-    """The table of a run that nobody kills."""
+    """The table of a run without a kill."""
     with TemporaryDirectory() as place:
         run = _start_run(path, Path(place))
         run.join()
@@ -148,7 +151,7 @@ def _kept_trials(folder: Path) -> dict[str, float]:
 
 
 def _find_worker(pid: int | None) -> int | None:
-    """A process of loky that belongs to a driver."""
+    """The process of one of the driver's workers."""
     for entry in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
             parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])

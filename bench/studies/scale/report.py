@@ -5,8 +5,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
-from bench.files import write_whole
 from bench.provenance import provenance
 from bench.result_sets.formats import make_folder
 from bench.studies.scale.kills import KillResult, Victim, kill_repeatedly
@@ -25,7 +25,7 @@ bytes of a run that nobody kills; SQLite finds no fault in the store."""
 
 
 def scale_page(scale: ScaleCost) -> str:
-    """Markdown text about sweeps."""
+    """The measured sweeps as a Markdown page."""
     return markdown_page(
         "Large sweeps",
         _machine_text(),
@@ -36,7 +36,7 @@ def scale_page(scale: ScaleCost) -> str:
 
 
 def kills_page(kills: Mapping[str, Sequence[KillResult]]) -> str:
-    """Markdown text about kills, by victim."""
+    """The kills, by victim, as a Markdown page."""
     return markdown_page("Kills", _machine_text(), _KILLS_READING, _kill_table(kills))
 
 
@@ -93,7 +93,7 @@ _VICTIMS: tuple[Victim, ...] = ("driver", "worker")
 
 
 def write_scale(configs: Path, trials: int, results: Path, tell: ReportProgress) -> Path:
-    """Measure sweeps of so many trials, and a tenth of them, as `scale.yaml` in `configs` says; write `scale.md`.
+    """Measure a sweep of that many trials, and one of a tenth, as `scale.yaml` in `configs` says; write `scale.md`.
 
     Raises InputError for a number of trials that does not fit the configuration.
     """
@@ -105,7 +105,7 @@ def write_scale(configs: Path, trials: int, results: Path, tell: ReportProgress)
 def write_kills(configs: Path, count: int, results: Path, tell: ReportProgress) -> tuple[Path, bool]:
     """Kill the command, and its workers, that often while they run `scale_kills.yaml`; write `kills.md`.
 
-    Returns the page, and whether every kill was without a loss.
+    Returns the page, and whether no kill lost a trial.
     """
     make_folder(results)
     kills: dict[str, list[KillResult]] = {

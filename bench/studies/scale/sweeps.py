@@ -25,7 +25,7 @@ _BYTES_PER_PAGE = os.sysconf("SC_PAGE_SIZE")
 
 @dataclass(frozen=True)
 class WatchedCommand:
-    """A finished command: seconds by a clock that nobody sets, and its resident memory, MB, evenly spaced in time.
+    """A finished command: seconds by a monotonic clock, and its resident memory, MB, evenly spaced in time.
 
     memory: of the command itself, without its workers.
     """
@@ -35,11 +35,11 @@ class WatchedCommand:
 
     @property
     def peak(self) -> float:
-        """The most memory that was seen, MB."""
+        """The largest memory, MB."""
         return max(self.memory)
 
     def after(self, share: float) -> float:
-        """Memory, MB, when that share of the time was over."""
+        """Memory, MB, after that share of the time."""
         return self.memory[min(int(share * len(self.memory)), len(self.memory) - 1)]
 
 
@@ -64,7 +64,7 @@ def start_command(arguments: Sequence[object], folder: Path) -> "subprocess.Pope
 
 
 def _resident_mb(pid: int) -> float:
-    """Resident memory of a process, MB; 0 if it is gone. Linux tells it in /proc."""
+    """Resident memory of a process, MB; 0 if it is gone. On Linux /proc has it."""
     try:
         pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     except (OSError, IndexError):
@@ -78,8 +78,10 @@ TURNS_OF_WORKERS = 3  # in which one and two workers take turns
 
 @dataclass(frozen=True)
 class SweepCost:
-    """One sweep. search_seconds: processor time of all searches alone. again: the same command on the finished store,
-    which runs no trial: start, look-ups, table. report: the page about it.
+    """The cost of one sweep.
+
+    search_seconds: processor time of all searches alone. repeated: the same command on the finished store, which runs
+    no trial: start, look-ups, table. report: the page about it.
     """
 
     trials: int
@@ -115,12 +117,12 @@ class ScaleCost:
 
     @property
     def efficiency(self) -> float:
-        """Of two workers: 1 if they take half the time of one."""
+        """Efficiency of two workers: 1 if they take half the time of one."""
         return self.alone / (2 * self.together)
 
 
 def measure_scale(config: Path, trials: int, tell: ReportProgress) -> ScaleCost:
-    """Run everything, in a folder that is removed afterwards; tell: hears what is done."""
+    """Run all sweeps in a folder that is removed afterwards; tell: is called with a line about each step."""
     with TemporaryDirectory() as place:
         folder = Path(place)
         tell("one worker and two in turns")
@@ -137,7 +139,7 @@ def measure_scale(config: Path, trials: int, tell: ReportProgress) -> ScaleCost:
 
 
 def write_sized_config(config: Path, trials: int, folder: Path) -> Path:
-    """The configuration with as many repetitions as make so many trials, in a folder."""
+    """Write the configuration with the repetitions that give that many trials into a folder; returns the file."""
     content = read_yaml(config)
     series = len(load_experiment(config).entries.series)
     if trials % series:

@@ -1,1 +1,1 @@
-"""How fast armlab is, beside other packages in the same run."""
+"""The speed of armlab beside other packages, measured in the same run."""

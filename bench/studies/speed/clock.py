@@ -1,4 +1,4 @@
-"""Fair timing on a noisy machine: the rivals take turns, and medians are compared."""
+"""Fair timing on a noisy machine: the competitors take turns, and medians are compared."""
 
 import time
 from collections.abc import Callable, Mapping

@@ -1,7 +1,7 @@
-"""Time an algorithm takes for itself: the sphere in 15 dimensions, 50 points, 30 iterations.
+"""Overhead of the algorithms on the sphere in 15 dimensions, 50 points, 30 iterations.
 
-`one`: the objective takes one point and costs about a microsecond; `all`: it takes the population at once.
-The figures are microseconds an evaluation, the objective's own time included, as a user would see them.
+`one`: the objective takes one point and costs about a microsecond; `all`: it takes the population at once. The figures
+are microseconds an evaluation, the objective's own time included, as a user would see them.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ OVERHEAD_ROUNDS = 5
 
 
 def measure_overheads() -> dict[str, dict[str, float]]:
-    """Microseconds an evaluation: `{algorithm: {package, way: figure}}`, every rival in turn in each round."""
+    """Microseconds an evaluation: `{algorithm: {package, way: figure}}`; all competitors take turns in each round."""
     tasks: dict[tuple[str, str], tuple[Task, int]] = {}
     for name in ALGORITHMS:
         tasks[name, "armlab, one"] = armlab_task(name, one_at_a_time=True)

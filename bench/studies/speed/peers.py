@@ -18,7 +18,7 @@ Tasks = dict[tuple[str, str], tuple[Task, int]]
 
 @dataclass(frozen=True)
 class SphereBox:
-    """The common job: dimension, half width of the box, swarm size, iterations after the first population."""
+    """The common task: dimension, half width of the box, swarm size, iterations after the first population."""
 
     dimension: int
     half_width: float

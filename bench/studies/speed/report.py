@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_table
-from bench.files import write_whole
 from bench.provenance import provenance
 from bench.studies.speed.evaluations import (
     compare_with_pinocchio,

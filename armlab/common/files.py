@@ -1,0 +1,60 @@
+"""Files that are whole or not at all: a crash leaves the old content or the new one, never a part of it."""
+
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from armlab.common.errors import InputError
+
+
+def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
+    """Replace a file in one step.
+
+    content: the whole, or pieces that are written as they come.
+    Raises InputError if the file cannot be written.
+    """
+    data = content.encode() if isinstance(content, str) else content
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with draft.open("wb") as file:
+            file.writelines([data] if isinstance(data, bytes) else data)
+        draft.replace(path)
+    except OSError as error:
+        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def write_texts(texts: Mapping[str, str], folder: Path) -> tuple[Path, ...]:
+    """Write all texts under their names into a folder, or none of them; returns their paths.
+
+    They are written into a draft folder first and then moved by renames. Other files of the folder stay.
+    Raises InputError if a file cannot be written.
+    """
+    folder = folder.absolute()
+    exists = folder.is_dir()
+    draft = (folder if exists else folder.parent) / f".armlab.{os.getpid()}"
+    try:
+        for name, text in texts.items():
+            (draft / name).parent.mkdir(parents=True, exist_ok=True)
+            (draft / name).write_text(text, encoding="utf-8")
+        if not exists:
+            draft.replace(folder)
+        else:
+            _move_files(draft, texts, folder)
+    except OSError as error:
+        raise InputError(f"cannot write into {folder}: {error.strerror}") from None
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+    return tuple(folder / name for name in texts)
+
+
+def _move_files(draft: Path, names: Iterable[str], folder: Path) -> None:
+    places = {name: folder / name for name in names}
+    for place in places.values():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        if place.is_dir():
+            raise InputError(f"{place} is a folder, where a file should be written")
+    for name, place in places.items():
+        (draft / name).replace(place)
