@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -21,9 +21,9 @@ from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
-from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.cases import FAILURE_FILE, TIME_FILE
 from armlab.concealed.score.scoring import format_lines, score_set
-from armlab.concealed.sets import MANIFEST_FILE, SetKind, SetSettings, conceal_set, file_digest
+from armlab.concealed.sets import SetKind, SetSettings, conceal_cases, seal_set
 
 QUICK_NAME, QUICK_SEED, QUICK_CASES = "quick", 1900, 24
 TIMEOUT_S = 900.0
@@ -80,37 +80,48 @@ def judged_seed(commit: str) -> int:
 
 
 def prove(proof: Proof, work: Path, results: Path, jobs: int) -> Iterator[str]:
-    """Does what is missing of a proof and tells how far it is; scores go to `results`, a folder a set.
+    """Conceals, seals, diagnoses, scores and logs each set of a proof; yields the lines that report it.
 
-    work: sets and verdicts, kept so that a proof that was interrupted goes on; one that is not judged and was finished
-    starts anew, a judged one is only scored again. A judged proof is added to `results`/log.jsonl, once. Raises
-    InputError for a working folder of another proof.
+    work: folder of the sets and verdicts. An interrupted proof continues there. results: folder of the scores, one
+    folder a set, and of the log. A judged set is added to the log once, with any score.
+    Raises InputError if `work` holds another proof.
     """
-    if proof.commit is None and (work / FINISHED_MARK).is_file():
-        shutil.rmtree(work)
+    _remove_finished_development(proof, work)
     for name, settings in proof.sets.items():
-        folder, verdicts = work / name / "set", work / name / "verdicts"
+        folder, verdicts, finished = work / name / "set", work / name / "verdicts", work / name / FINISHED_MARK
         yield f"{name}: {settings.cases} cases, seed {settings.seed}"
-        yield from _report_progress("concealed", conceal_set(settings, folder, jobs), settings.cases)
-        sealed = file_digest(folder / MANIFEST_FILE)
+
+        yield from report_progress("concealed", conceal_cases(settings, folder, jobs), settings.cases)
+
+        cases, sealed = seal_set(settings, folder)
         yield f"{name}: manifest SHA-256 {sealed}"
-        cases = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))["cases"]
-        yield from _report_progress("diagnosed", diagnose_all(folder, verdicts, cases, jobs), len(cases))
-        found = score_set(folder, verdicts, sealed, results / name)
-        yield from format_lines(found)
-        if proof.commit is not None and not (work / name / FINISHED_MARK).is_file():
-            _append_to_log(results / LOG_FILE, proof.commit, name, found)
-        (work / name / FINISHED_MARK).touch()
+
+        yield from report_progress("diagnosed", diagnose_all(folder, verdicts, cases, jobs), len(cases))
+
+        score = score_set(folder, verdicts, sealed, results / name)
+        yield from format_lines(score)
+
+        if proof.commit is not None and not finished.is_file():
+            append_to_log(results / LOG_FILE, proof.commit, name, score)
+        finished.touch()
     (work / FINISHED_MARK).touch()
 
 
-def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int) -> Iterator[str]:
-    """Diagnoses the cases that have no verdict yet, each in its own process; tells their names as they are done."""
-    missing = [
-        case for case in cases if not any((verdicts / case / name).is_file() for name in ("time.json", FAILURE_FILE))
-    ]
+def _remove_finished_development(proof: Proof, work: Path) -> None:
+    """A finished proof that is not judged starts again from nothing; a judged one keeps its verdicts."""
+    if proof.commit is None and (work / FINISHED_MARK).is_file():
+        shutil.rmtree(work)
+
+
+def diagnose_all(folder: Path, verdicts: Path, cases: Sequence[str], jobs: int) -> Iterator[str]:
+    """Diagnoses the cases of a set that have no verdict yet, each in its own process; yields the name of each."""
+    missing = [case for case in cases if not _is_diagnosed(verdicts / case)]
     work = (delayed(_diagnose_case)(folder / "observations" / case, verdicts / case) for case in missing)
     yield from Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(work)
+
+
+def _is_diagnosed(out: Path) -> bool:
+    return (out / TIME_FILE).is_file() or (out / FAILURE_FILE).is_file()
 
 
 def _diagnose_case(observation: Path, out: Path) -> str:
@@ -125,7 +136,7 @@ def _diagnose_case(observation: Path, out: Path) -> str:
     if complaint is not None:
         (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
     else:
-        (out / "time.json").write_text(json.dumps({"seconds": round(seconds, 2)}) + "\n", encoding="utf-8")
+        (out / TIME_FILE).write_text(json.dumps({"seconds": round(seconds, 2)}) + "\n", encoding="utf-8")
     return observation.name
 
 
@@ -147,32 +158,30 @@ def _source_root() -> Path:
     return Path(__file__).resolve().parents[2]
 
 
-def _report_progress(what: str, done: Iterator[str], total: int) -> Iterator[str]:
-    """A line every tenth of the way."""
-    every = max(total // 10, 1)
-    for number, _ in enumerate(done, 1):
-        if number % every == 0:
-            yield f"  {what} {number} of {total}"
-
-
-def _append_to_log(path: Path, commit: str, name: str, found: dict[str, Any]) -> None:
-    """Adds a judged run, good or bad, once."""
+def append_to_log(path: Path, commit: str, name: str, score: dict[str, Any]) -> None:
+    """Adds a line to the log of judged runs: commit, seed, seal, and each measure by its id."""
     entry = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": commit,
-        "changed_files": bool(
-            _run_git("status", "--porcelain", "--untracked-files=no", ".", ":!results")
-        ),  # of the code
+        "changed_files": bool(_run_git("status", "--porcelain", "--untracked-files=no", ".", ":!results")),
         "set": name,
-        **{key: found[key] for key in ("seed", "cases", "manifest")},
+        **{key: score[key] for key in ("seed", "cases", "manifest")},
         "score": {
             tier: {each["name"]: [each["value"], each["low"], each["high"], each["number"]] for each in measures}
-            for tier, measures in found["tiers"].items()
+            for tier, measures in score["tiers"].items()
         },
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(entry) + "\n")
+
+
+def report_progress(what: str, done: Iterator[str], total: int) -> Iterator[str]:
+    """Runs an iterator and yields a line after each tenth of the total."""
+    every = max(total // 10, 1)
+    for number, _ in enumerate(done, 1):
+        if number % every == 0:
+            yield f"  {what} {number} of {total}"
 
 
 def _run_git(*arguments: str) -> str:

@@ -81,18 +81,34 @@ def make_set_settings(cases: int, seed: int, tier: Any, kind: Any, development: 
 
 
 def conceal_set(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
-    """Makes what is missing of a set, tells each case's name as it is done, last the manifest's SHA-256.
+    """Makes the missing cases of a set, yields the name of each, and seals the set.
+
+    Raises InputError for a folder that holds another set.
+    """
+    yield from conceal_cases(settings, out, jobs)
+    seal_set(settings, out)
+
+
+def conceal_cases(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
+    """Makes the missing cases of a set and yields the name of each; an incomplete set loses its seal.
 
     Raises InputError for a folder that holds another set.
     """
     _claim_folder(settings, out)
-    names = [settings.plan(number).name for number in range(settings.cases)]
-    missing = [number for number, name in enumerate(names) if not _is_done(out, name)]
+    missing = [number for number in range(settings.cases) if not _is_done(out, settings.plan(number).name)]
+    if missing:
+        (out / MANIFEST_FILE).unlink(missing_ok=True)
     work = (delayed(_make_case)(settings, number, out) for number in missing)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
-    if missing or not (out / MANIFEST_FILE).is_file():
+
+
+def seal_set(settings: SetSettings, out: Path) -> tuple[list[str], str]:
+    """The names of a complete set's cases and the SHA-256 of its manifest, which is written unless it is there."""
+    names = sorted(settings.plan(number).name for number in range(settings.cases))
+    if not (out / MANIFEST_FILE).is_file():
         facts = {key: value for key, value in asdict(settings).items() if key != "cases"}
-        write_manifest(out, {**facts, "cases": sorted(names)})
+        write_manifest(out, {**facts, "cases": names})
+    return names, file_digest(out / MANIFEST_FILE)
 
 
 def _claim_folder(settings: SetSettings, out: Path) -> None:

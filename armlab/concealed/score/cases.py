@@ -14,6 +14,7 @@ from typing import Any, Literal
 from armlab.common.errors import InputError
 
 FAILURE_FILE = "failed.txt"  # beside where a verdict should be: what a diagnosis that gave none complained of
+TIME_FILE = "time.json"  # beside a verdict: how long the diagnosis took; written last, when the verdict is complete
 VALID_STATUSES = ("mismatch", "none", "inconclusive")
 MISSING_VERDICT: dict[str, Any] = {"status": "invalid", "findings": [], "unexplained": [], "fit": []}
 
@@ -91,7 +92,7 @@ def _is_valid_verdict(verdict: Any) -> bool:
 
 
 def _read_seconds(folder: Path) -> float | None:
-    path = folder / "time.json"
+    path = folder / TIME_FILE
     return float(json.loads(path.read_text(encoding="utf-8"))["seconds"]) if path.is_file() else None
 
 
