@@ -10,20 +10,19 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from armlab.concealed.prove import FINISHED_MARK, make_development_proof
+from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.score.scoring import compute_score
 from armlab.concealed.sets import MANIFEST_FILE, conceal_set, file_digest
 
-DONE_FOLDER, GUARD_ORDER_FILE = (
-    "done",
-    "guards.txt",
-)  # beside the verdicts: marks of finished cases, and the guards in their order
-REPORT_INTERVAL = 10  # cases: how often it is said how far it is
+DONE_FOLDER = "done"  # beside the verdicts: an empty file for each finished case
+GUARD_ORDER_FILE = "guards.txt"  # beside the verdicts: the guards in their order
+REPORT_INTERVAL = 10  # cases between two lines of progress
 SHOWN_MEASURES = (
-    "false claims on nulls",
-    "false claims on decoys",
-    "wrong names among claims",
-    "right name or class of four, above 3 limits",
-    "unknown on effects outside, above 3 limits",
+    "false_claims_on_nulls",
+    "false_claims_on_decoys",
+    "wrong_names",
+    "right_name_or_class",
+    "unknown_outside",
 )
 DiagnoseWithGuards = Callable[[Path], dict[str, dict[str, Any]]]
 
@@ -87,19 +86,20 @@ def render_page(settings: AblationSettings, found: dict[str, dict[str, Any]]) ->
     parts = ["# What each guard is worth", f"{about} Share, and how often it was counted."]
     for tier in tiers:
         rows = [_table_row(guard, found[guard], tier) for guard in found]
-        head = f"| guard off | {' | '.join(SHOWN_MEASURES)} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
+        titles = " | ".join(MEASURE_TEXTS[id].title for id in SHOWN_MEASURES)
+        head = f"| guard off | {titles} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
         parts += [f"## {tier} tier", "\n".join([head, *rows])]
     return "\n\n".join(parts) + "\n"
 
 
 def _table_row(guard: str, sets: dict[str, Any], tier: str) -> str:
-    return f"| {guard.replace('_', ' ')} | {' | '.join(_table_cell(what, sets, tier) for what in SHOWN_MEASURES)} |"
+    return f"| {guard.replace('_', ' ')} | {' | '.join(_table_cell(id, sets, tier) for id in SHOWN_MEASURES)} |"
 
 
-def _table_cell(what: str, sets: dict[str, Any], tier: str) -> str:
+def _table_cell(id: str, sets: dict[str, Any], tier: str) -> str:
     """The measure in the set that counted it most often: nulls in the set of nulls, names in the mixed one."""
     counted: Sequence[dict[str, Any]] = [
-        each for found in sets.values() for each in found.get(tier, []) if each["name"] == what
+        each for found in sets.values() for each in found.get(tier, []) if each["id"] == id
     ]
     best = max(counted, key=lambda each: int(each["number"]), default=None)
     return "-" if best is None or best["value"] is None else f"{best['value']:.3g} of {best['number']}"

@@ -167,7 +167,7 @@ def append_to_log(path: Path, commit: str, name: str, score: dict[str, Any]) -> 
         "set": name,
         **{key: score[key] for key in ("seed", "cases", "manifest")},
         "score": {
-            tier: {each["name"]: [each["value"], each["low"], each["high"], each["number"]] for each in measures}
+            tier: {each["id"]: [each["value"], each["low"], each["high"], each["number"]] for each in measures}
             for tier, measures in score["tiers"].items()
         },
     }

@@ -136,8 +136,8 @@ def test_the_page_puts_what_is_wanted_beside_what_was_found_and_names_the_misses
 
 def test_the_longest_diagnosis_is_on_the_page_beside_the_median() -> None:
     cases = [replace(judged(NULL, verdict(), f"c{seconds}"), seconds=float(seconds)) for seconds in (1, 2, 9)]
-    found = {each.name: each.value for each in compute_measures(make_rows(cases), "clean")}
-    assert (found["seconds a case (median)"], found["seconds a case (longest)"]) == (2.0, 9.0)
+    found = {each.id: each.value for each in compute_measures(make_rows(cases), "clean")}
+    assert (found["seconds_median"], found["seconds_longest"]) == (2.0, 9.0)
     assert arm_table(make_rows(cases))[["cases", "seconds, median", "seconds, longest"]].to_numpy().tolist() == [
         [3, 2.0, 9.0]
     ]

@@ -165,7 +165,7 @@ def test_missing_and_broken_verdicts_count_against_and_stop_nothing(made: Path, 
     write(tmp_path / "v", cases[1], "{ no json")
     found = score_set(made, tmp_path / "v", None, tmp_path / "out")
     counted = {
-        tier: next(each for each in measures if each["name"] == "missing or invalid verdicts")
+        tier: next(each for each in measures if each["id"] == "missing_verdicts")
         for tier, measures in found["tiers"].items()
     }
     assert sum(each["value"] * each["number"] for each in counted.values()) == 2

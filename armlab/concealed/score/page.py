@@ -5,12 +5,12 @@ from typing import Any
 import pandas as pd
 
 from armlab.concealed.score.gallery import CASES_PER_GROUP, GALLERY_PAGE, tally_outcomes
-from armlab.concealed.score.measures import MIN_NAMED_MULTIPLE, Measure, arm_table, effect_table
+from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure, arm_table, effect_table
 from armlab.concealed.score.rows import ScoreRows
 
 STRICTER_MEASURES = {  # shown below the measure that is wanted: the same, counted more strictly
-    "wrong names among claims": "wrong names among claims beyond background",
-    "gap closed on held-out runs (median)": "gap closed beyond plain friction (median)",
+    "wrong_names": "wrong_names_beyond_background",
+    "gap_closed": "gap_closed_beyond_friction",
 }
 MAX_SHOWN_MISSES = 30
 SHOWN_MISS_COLUMNS = ["miss", "case", "tier", "arm", "effect", "law", "joint", "limits", "hidden", "said"]
@@ -74,8 +74,10 @@ def format_measure(each: Measure) -> str:
     if each.value is None:
         return "-"
     scale, unit = (100, " %") if each.unit == "share" else (1, f" {each.unit}".rstrip())
-    value, *ends = (None if x is None else f"{scale * x:.3g}" for x in (each.value, each.low, each.high))
-    return f"{value}{unit} ({ends[0]} to {ends[1]})" if None not in ends else f"{value}{unit}"
+    text = f"{scale * each.value:.3g}{unit}"
+    if each.low is None or each.high is None:
+        return text
+    return f"{text} ({scale * each.low:.3g} to {scale * each.high:.3g})"
 
 
 def judge_measure(each: Measure) -> str:
@@ -102,33 +104,36 @@ def _format_cell(value: Any) -> str:
 
 def _wanted_table(tiers: dict[str, list[Measure]]) -> str:
     """The measures that have to reach something, and their stricter companions, the tiers side by side."""
-    names = [each.name for each in next(iter(tiers.values())) if each.wanted]
     head = [
         f"| measure | wanted |{''.join(f' {tier} | of | |' for tier in tiers)}",
         "|---|---|" + "---|---:|---|" * len(tiers),
     ]
     rows = []
-    for name in names:
-        rows.append(_wanted_row(name, name, tiers))
-        if name in STRICTER_MEASURES:
-            rows.append(_wanted_row(STRICTER_MEASURES[name], f"&nbsp;&nbsp;{STRICTER_MEASURES[name]}", tiers))
+    for id, text in MEASURE_TEXTS.items():
+        if text.wanted:
+            rows.append(_wanted_row(id, "", tiers))
+            if id in STRICTER_MEASURES:
+                rows.append(_wanted_row(STRICTER_MEASURES[id], "&nbsp;&nbsp;", tiers))
     return "\n".join([*head, *rows])
 
 
-def _wanted_row(name: str, title: str, tiers: dict[str, list[Measure]]) -> str:
-    found = [next(each for each in measures if each.name == name) for measures in tiers.values()]
+def _wanted_row(id: str, indent: str, tiers: dict[str, list[Measure]]) -> str:
+    found = [_find_measure(measures, id) for measures in tiers.values()]
     cells = "".join(f" {format_measure(each)} | {each.number} | {judge_measure(each)} |" for each in found)
-    return f"| {title} | {found[0].wanted} |{cells}"
+    return f"| {indent}{MEASURE_TEXTS[id].title} | {MEASURE_TEXTS[id].wanted} |{cells}"
 
 
 def _all_measures_table(tiers: dict[str, list[Measure]]) -> str:
-    names = [each.name for each in next(iter(tiers.values()))]
     head = [f"| measure |{''.join(f' {tier} | of |' for tier in tiers)}", "|---|" + "---|---:|" * len(tiers)]
     rows = []
-    for name in names:
-        found = [next(each for each in measures if each.name == name) for measures in tiers.values()]
-        rows.append(f"| {name} |" + "".join(f" {format_measure(each)} | {each.number} |" for each in found))
+    for id, text in MEASURE_TEXTS.items():
+        found = [_find_measure(measures, id) for measures in tiers.values()]
+        rows.append(f"| {text.title} |" + "".join(f" {format_measure(each)} | {each.number} |" for each in found))
     return "\n".join([*head, *rows])
+
+
+def _find_measure(measures: list[Measure], id: str) -> Measure:
+    return next(each for each in measures if each.id == id)
 
 
 def _count_kinds(table: ScoreRows) -> pd.DataFrame:

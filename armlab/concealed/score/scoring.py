@@ -67,10 +67,8 @@ def format_lines(result: dict[str, Any]) -> list[str]:
     """The measures, a line each, for the terminal."""
     out = []
     for tier, found in result["tiers"].items():
-        out += [
-            f"{tier}:",
-            *(f"  {each['name']}: {format_measure(Measure(**each))}  {each['wanted']}" for each in found),
-        ]
+        measures = [Measure(**each) for each in found]
+        out += [f"{tier}:", *(f"  {each.title}: {format_measure(each)}  {each.wanted}" for each in measures)]
     return out
 
 
