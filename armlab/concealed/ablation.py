@@ -12,7 +12,7 @@ from joblib import Parallel, delayed
 from armlab.concealed.prove import FINISHED_MARK, make_development_proof
 from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.score.scoring import compute_score
-from armlab.concealed.sets import MANIFEST_FILE, conceal_set, file_digest
+from armlab.concealed.sets import conceal_cases, seal_set
 
 DONE_FOLDER = "done"  # beside the verdicts: an empty file for each finished case
 GUARD_ORDER_FILE = "guards.txt"  # beside the verdicts: the guards in their order
@@ -50,15 +50,15 @@ def ablate(
     found: dict[str, dict[str, Any]] = {}
     for name, each in proof.sets.items():
         folder, verdicts = work / name, work / "verdicts" / name
-        list(conceal_set(each, folder, jobs))
-        cases = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))["cases"]
+        list(conceal_cases(each, folder, jobs))
+        cases, sealed = seal_set(each, folder)
         missing = [case for case in cases if not (verdicts / DONE_FOLDER / case).is_file()]
         todo = (delayed(_write_verdicts)(diagnose, folder / "observations" / case, verdicts) for case in missing)
         for number, _ in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(todo), 1):
             if number % REPORT_INTERVAL == 0:
                 yield f"{name}: diagnosed {number} of {len(missing)}"
         for guard in (verdicts / GUARD_ORDER_FILE).read_text(encoding="utf-8").splitlines():
-            score = compute_score(folder, verdicts / guard, file_digest(folder / MANIFEST_FILE))[2]
+            score = compute_score(folder, verdicts / guard, sealed)[2]
             found.setdefault(guard, {})[name] = score["tiers"]
     results.mkdir(parents=True, exist_ok=True)
     (results / "guards.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

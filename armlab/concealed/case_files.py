@@ -1,6 +1,5 @@
 """The files of a case: runs as a drive logs them, the recording that a diagnosis may see, and the answer."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,15 @@ import yaml
 
 from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.formats import (
+    InjectedEffect,
+    LinkDeviation,
+    TrueEffect,
+    TrueNoise,
+    TrueParameter,
+    Truth,
+    write_model,
+)
 from armlab.concealed.outside import OutsideEffect
 from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
 from armlab.concealed.sizing import SimulatedCase
@@ -83,60 +91,66 @@ def write_case(case: SimulatedCase, observations: Path, truth: Path) -> None:
     _write_parquet(
         truth.with_suffix(".parquet"), {f"tau{joint + 1}": held_out[0].clean[:, joint] for joint in range(joints)}
     )
-    truth.write_text(json.dumps(make_answer(case, runs), indent=1) + "\n", encoding="utf-8")
+    write_model(make_truth(case, runs), truth)
 
 
-def make_answer(case: SimulatedCase, runs: list[LoggedRun]) -> dict[str, Any]:
-    """The truth about a case; `multiple` counts detection limits."""
+def make_truth(case: SimulatedCase, runs: list[LoggedRun]) -> Truth:
+    """The answer to a case."""
     plan = case.plan
     sizes = zip(case.hidden, case.sized.targets, case.multiples, strict=True)
     floor = np.sqrt(np.mean(np.concatenate([run.torque - run.clean for run in runs]) ** 2, axis=0))
-    return {
-        "schema": "truth/1",
-        "case": plan.name,
-        "tier": plan.tier,
-        "kind": plan.kind,
-        "arm": plan.machine.name,
-        "joints": plan.machine.joints,
-        "rate_hz": plan.rate_hz,
-        "motions": [run.family for run in plan.runs],
-        "injected": [
-            {**describe_effect(effect, plan.realistic), "target": target, "multiple": multiple}
+    return Truth(
+        schema="truth/1",
+        case=plan.name,
+        tier=plan.tier,
+        kind=plan.kind,
+        arm=plan.machine.name,
+        joints=plan.machine.joints,
+        rate_hz=plan.rate_hz,
+        motions=tuple(run.family for run in plan.runs),
+        injected=tuple(
+            InjectedEffect(**_effect_facts(effect, plan.realistic), target=target, multiple=multiple)
             for effect, target, multiple in sizes
-        ],
-        "passed_over": list(case.sized.passed_over),
-        "background": [
-            describe_effect(effect, _is_mixed_with_friction(effect, case.hidden)) for effect in plan.background
-        ],
-        "cad_errors": [
-            {"effect": "inertial_parameter_error", "joint": link, "relative": error}
+        ),
+        passed_over=case.sized.passed_over,
+        background=tuple(
+            TrueEffect(**_effect_facts(effect, _is_mixed_with_friction(effect, case.hidden)))
+            for effect in plan.background
+        ),
+        cad_errors=tuple(
+            LinkDeviation(effect="inertial_parameter_error", joint=link, relative=error)
             for link, error in enumerate(plan.cad_errors, 1)
-        ],
-        "absorbed_rotors": [joint + 1 for joint in absorbed_rotors(plan.machine.arm)],
-        "noise": plan.noise.facts(),
-        "noise_floor": floor.tolist(),
-    }
+        ),
+        absorbed_rotors=tuple(joint + 1 for joint in absorbed_rotors(plan.machine.arm)),
+        noise=TrueNoise(
+            kind=plan.noise.kind,
+            white=tuple(plan.noise.white.tolist()),
+            coloured=tuple(plan.noise.coloured.tolist()),
+            corner_hz=plan.noise.corner_hz,
+        ),
+        noise_floor=tuple(floor.tolist()),
+    )
 
 
-def describe_effect(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
-    """An effect in the words of the vocabulary, with the law that made it.
-
-    mixed_up: whether it stands beside friction of its joint that adds to its own.
-    """
+def _effect_facts(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
+    """The fields of a `TrueEffect`. mixed_up: whether other friction of its joint adds to its own."""
     units, blurred = effect.units(), effect.blurred if mixed_up else ()
-    parameters = {
-        name: {"value": value, "unit": units[name], "comparable": name in effect.comparable and name not in blurred}
-        for name, value in effect.parameters().items()
-    }
     return {
         "effect": effect.effect,
         "joint": effect.place,
-        "joints": list(effect.joints),
+        "joints": effect.joints,
         "outside": isinstance(effect, OutsideEffect),
         "form": effect.form,
         "obvious_form": effect.form == effect.forms[0],
-        "equivalent": list(effect.equivalent),
-        "parameters": parameters,
+        "equivalent": effect.equivalent,
+        "parameters": {
+            name: TrueParameter(
+                value=tuple(value) if isinstance(value, list) else value,
+                unit=units[name],
+                comparable=name in effect.comparable and name not in blurred,
+            )
+            for name, value in effect.parameters().items()
+        },
         "size": effect.size,
         "shape": effect.shape,
     }

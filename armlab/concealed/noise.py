@@ -1,7 +1,6 @@
 """Noise on the torque channels: white and coloured for development, further kinds for judged nulls only."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
@@ -55,10 +54,6 @@ class Noise:
     def quantise(self, torque: Array) -> Array:
         """Torque channels (samples, joints) at the resolution of the kind of noise."""
         return np.rint(torque / (3 * self.white)) * 3 * self.white if self.kind == "quantised" else torque
-
-    def facts(self) -> dict[str, Any]:
-        """For the answers."""
-        return {**asdict(self), "white": self.white.tolist(), "coloured": self.coloured.tolist()}
 
     def whitened(self, signal: Array, joint: int, rate_hz: float) -> Array:
         """A signal (samples, ...) of one joint, filtered so that the usual noise would be white with unit variance.

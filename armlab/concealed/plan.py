@@ -12,6 +12,7 @@ from armlab.concealed.effects.channels import Offset
 from armlab.concealed.effects.friction import Coulomb, Viscous
 from armlab.concealed.effects.hidden import HiddenEffect, torque_share
 from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.formats import CaseKind, Tier
 from armlab.concealed.motions import FAMILIES
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS, Noise, draw_noise
 from armlab.concealed.outside import OUTSIDE
@@ -24,8 +25,6 @@ def random_stream(*names: str | int) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(int.from_bytes(digest, "big")))
 
 
-Tier = Literal["clean", "realistic"]
-CaseKind = Literal["single", "pair", "triple", "outside", "decoy", "null"]
 ARM_SHARES = {"irb120-arm": 0.5, "irb120": 0.2, "panda": 0.15, "scara": 0.15}
 KIND_SHARES: dict[CaseKind, float] = {
     "single": 0.5,

@@ -20,10 +20,11 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
+from armlab.concealed.formats import SetKind
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
 from armlab.concealed.score.cases import FAILURE_FILE, TIME_FILE
 from armlab.concealed.score.scoring import format_lines, score_set
-from armlab.concealed.sets import SetKind, SetSettings, conceal_cases, seal_set
+from armlab.concealed.sets import SetSettings, conceal_cases, seal_set
 
 QUICK_NAME, QUICK_SEED, QUICK_CASES = "quick", 1900, 24
 TIMEOUT_S = 900.0

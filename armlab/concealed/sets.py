@@ -9,27 +9,29 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
-from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, Tier, draw_plan
+from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, Tier, read_model, write_model
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan
 
 MANIFEST_FILE = "manifest.json"
+ManifestModel = TypeVar("ManifestModel", SetManifest, LoopManifest)
 
 
-def write_manifest(folder: Path, facts: dict[str, Any]) -> str:
-    """Writes the manifest of a concealed set and returns its SHA-256."""
+def seal_files(folder: Path) -> dict[str, str]:
+    """The SHA-256 of every observation and answer below a folder, by path from it."""
     parts = (path for part in ("observations", "truth") for path in (folder / part).rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): file_digest(path) for path in parts}
-    content = json.dumps({"schema": "manifest/1", **facts, "files": dict(sorted(files.items()))}, indent=1) + "\n"
-    (folder / MANIFEST_FILE).write_text(content, encoding="utf-8")
-    return file_digest(folder / MANIFEST_FILE)
+    return dict(sorted(files.items()))
 
 
-def read_checked_manifest(folder: Path, expected: str | None = None) -> tuple[dict[str, Any], str]:
-    """The manifest of a concealed set and its SHA-256, after every file was compared with it.
+def read_checked_manifest(
+    folder: Path, model: type[ManifestModel], expected: str | None = None
+) -> tuple[ManifestModel, str]:
+    """A manifest and its SHA-256, after every file was compared with it.
 
     expected: the SHA-256 that was printed. Raises InputError if anything differs.
     """
@@ -39,8 +41,8 @@ def read_checked_manifest(folder: Path, expected: str | None = None) -> tuple[di
     found = file_digest(path)
     if expected is not None and found != expected:
         raise InputError(f"{path} has the SHA-256 {found}, not {expected}: it is not the manifest that was sealed")
-    manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    for name, value in manifest["files"].items():
+    manifest = read_model(model, path)
+    for name, value in manifest.files.items():
         file = folder / name
         if not file.is_file() or file_digest(file) != value:
             what = "was changed" if file.is_file() else "is missing"
@@ -53,7 +55,6 @@ def file_digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-SetKind = Literal["mixed", "nulls"]
 TIERS: tuple[Tier, ...] = ("clean", "realistic")
 SETTINGS_FILE = "settings.json"
 
@@ -106,8 +107,16 @@ def seal_set(settings: SetSettings, out: Path) -> tuple[list[str], str]:
     """The names of a complete set's cases and the SHA-256 of its manifest, which is written unless it is there."""
     names = sorted(settings.plan(number).name for number in range(settings.cases))
     if not (out / MANIFEST_FILE).is_file():
-        facts = {key: value for key, value in asdict(settings).items() if key != "cases"}
-        write_manifest(out, {**facts, "cases": names})
+        manifest = SetManifest(
+            schema="manifest/1",
+            seed=settings.seed,
+            tier=settings.tier,
+            kind=settings.kind,
+            development=settings.development,
+            cases=tuple(names),
+            files=seal_files(out),
+        )
+        write_model(manifest, out / MANIFEST_FILE)
     return names, file_digest(out / MANIFEST_FILE)
 
 

@@ -15,6 +15,7 @@ from made_verdicts import finding, perfect, verdict
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
+from armlab.concealed.formats import Truth
 from armlab.concealed.score import held_out
 from armlab.concealed.score.cases import MISSING_VERDICT, JudgedCase
 from armlab.concealed.score.figures import draw_confusion, draw_figures
@@ -55,7 +56,7 @@ UNEXPLAINED = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depen
     ],
 )
 def test_every_case_is_a_success_or_a_failure_of_one_kind(
-    answer: dict[str, Any], said: dict[str, Any], groups: list[str]
+    answer: Truth, said: dict[str, Any], groups: list[str]
 ) -> None:
     assert list_outcomes(scored((answer, said)))["group"].tolist() == groups
 
@@ -189,7 +190,8 @@ def friction(tmp_path_factory: pytest.TempPathFactory) -> JudgedCase:
     (own / "predicted").mkdir(parents=True)
     predicted = pd.DataFrame({"t": time, "tau1": torque[:, 0], "tau2": torque[:, 1]})
     predicted.to_csv(own / "predicted" / "run-2.csv", index=False)
-    answer = {**truth(effect("coulomb_friction", 1, level=LEVEL)), "case": "friction", "arm": "scara", "joints": 2}
+    hidden = truth(effect("coulomb_friction", 1, level=LEVEL))
+    answer = hidden.model_copy(update={"case": "friction", "arm": "scara", "joints": 2})
     return JudgedCase(answer, perfect(answer), recording, clean, own, 1.0)
 
 
@@ -230,7 +232,9 @@ def test_the_gap_beyond_plain_friction_is_counted_where_friction_is_in_the_backg
     monkeypatch.setattr(
         held_out, "filter_held_out_run", lambda case: HeldOut(np.arange(5.0), np.zeros((5, 1)), **constant)
     )
-    realistic = replace(friction, truth={**friction.truth, "background": [effect("viscous_friction", 1)]})
+    realistic = replace(
+        friction, truth=friction.truth.model_copy(update={"background": (effect("viscous_friction", 1),)})
+    )
     assert measure_gap_closed(realistic) == Gap(pytest.approx(2.5 / 3), pytest.approx(0.5), "counted")
     assert measure_gap_closed(friction).beyond is None
 

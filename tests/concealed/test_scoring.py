@@ -8,6 +8,7 @@ import pytest
 from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
+from armlab.concealed.formats import Truth
 from armlab.concealed.score.cases import categorize_finding
 from armlab.concealed.score.measures import (
     MEASURE_TEXTS,
@@ -107,12 +108,12 @@ NOT_IDENTICAL = [
 
 
 @pytest.mark.parametrize(("answer", "said"), IDENTICAL)
-def test_what_no_motion_separates_is_no_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
+def test_what_no_motion_separates_is_no_wrong_name(answer: Truth, said: dict[str, Any]) -> None:
     assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "identical"
 
 
 @pytest.mark.parametrize(("answer", "said"), NOT_IDENTICAL)
-def test_what_motion_can_separate_is_a_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
+def test_what_motion_can_separate_is_a_wrong_name(answer: Truth, said: dict[str, Any]) -> None:
     assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "wrong"
 
 
@@ -170,7 +171,7 @@ def test_rows_of_no_case_keep_their_columns() -> None:
 
 
 def test_levels_by_direction_are_named_by_a_level_and_an_offset_together() -> None:
-    hidden = {**effect("asymmetric_friction", 2), "equivalent": ["coulomb_friction", "torque_offset"]}
+    hidden = effect("asymmetric_friction", 2).model_copy(update={"equivalent": ("coulomb_friction", "torque_offset")})
     parts = (finding("coulomb_friction", 2), finding("torque_offset", 2))
     both, one = (scored((truth(hidden), verdict("mismatch", found))) for found in (parts, parts[:1]))
     assert measured(both, "right_name").value == 1

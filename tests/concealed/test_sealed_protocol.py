@@ -13,6 +13,7 @@ from made_verdicts import perfect, verdict, write
 from armlab.cli.proof import conceal as conceal_command
 from armlab.cli.proof import score as score_command
 from armlab.common.errors import InputError
+from armlab.concealed.formats import SetManifest, Truth, read_model
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, MIN_MULTIPLE, draw_plan, target_multiple
 from armlab.concealed.prove import diagnose_all, judged_seed
@@ -45,7 +46,7 @@ def copy(made: Path, tmp_path: Path) -> Path:
 
 def _verdicts(folder: Path, out: Path) -> Path:
     for path in (folder / "truth").glob("*.json"):
-        write(out, path.stem, perfect(json.loads(path.read_text())))
+        write(out, path.stem, perfect(read_model(Truth, path)))
     return out
 
 
@@ -79,7 +80,7 @@ def test_a_manifest_made_anew_is_refused_by_its_printed_hash(copy: Path) -> None
     sealed = file_digest(copy / MANIFEST_FILE)
     (copy / MANIFEST_FILE).write_text((copy / MANIFEST_FILE).read_text().replace('"seed": 1005', '"seed": 1006'))
     with pytest.raises(InputError, match="is not the manifest that was sealed"):
-        read_checked_manifest(copy, sealed)
+        read_checked_manifest(copy, SetManifest, sealed)
 
 
 def test_conceal_prints_the_hash_and_score_takes_it(made: Path, tmp_path: Path) -> None:

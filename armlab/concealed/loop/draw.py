@@ -9,8 +9,9 @@ from armlab.concealed.arms import Machine
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.engine import Track
+from armlab.concealed.formats import Tier
 from armlab.concealed.motions import USED_RANGE
-from armlab.concealed.plan import BACKGROUND_EFFECTS, DEVELOPMENT_SEEDS, Plan, RunPlan, Tier, draw_plan, random_stream
+from armlab.concealed.plan import BACKGROUND_EFFECTS, DEVELOPMENT_SEEDS, Plan, RunPlan, draw_plan, random_stream
 
 POOR_LENGTH_S = 8.0
 POOR_RUNS = (RunPlan("poor", POOR_LENGTH_S, "identify"), RunPlan("poor", POOR_LENGTH_S, "validate"))

@@ -138,13 +138,13 @@ def _draw_item(case: JudgedCase, item: dict[str, Any], folder: Path) -> str:
     joint = choose_joint(run, None if pd.isna(item["joint"]) else int(item["joint"]))
     file = f"{case.name}-joint-{joint + 1}.png"
     if not (folder / file).is_file():
-        draw_residuals(run, joint, _picture_title(case, joint), bool(case.truth["background"]), folder / file)
+        draw_residuals(run, joint, _picture_title(case, joint), bool(case.truth.background), folder / file)
     return file
 
 
 def _picture_title(case: JudgedCase, joint: int) -> str:
     """Which case, what was hidden, what was said beyond the background: a line each."""
-    about = f"joint {joint + 1} of {case.truth['arm']}, {case.truth['tier']} tier, case {case.name}"
+    about = f"joint {joint + 1} of {case.truth.arm}, {case.truth.tier} tier, case {case.name}"
     lines = (about, f"hidden: {name_hidden(case)}", f"said: {name_said(case)}")
     return "\n".join(shorten(line, 125, placeholder=" ...") for line in lines)
 
@@ -175,7 +175,7 @@ def _render_entry(case: JudgedCase, item: dict[str, Any]) -> str:
     if item["group"] in ("wrong claim", "false claim"):
         place = describe_place(None if pd.isna(item["joint"]) else item["joint"])
         of = f" - {item['effect']} claimed, {place}, counted as {item['answered']}"
-    head = f"**{case.name}**, {case.truth['arm']}, {item['tier']} tier{of}"
+    head = f"**{case.name}**, {case.truth.arm}, {item['tier']} tier{of}"
     return (
         f"{head}<br>\n*hidden:* {hidden}<br>\n*said:* "
         f"{describe_said(case)}\n\n![{case.name}]({GALLERY_FOLDER}/{item['file']})"

@@ -146,7 +146,7 @@ class Gap:
 
 def measure_gap_closed(case: JudgedCase) -> Gap:
     """What the diagnosis of one case has closed."""
-    if not case.truth["injected"] or case.verdict["status"] == "invalid":
+    if not case.truth.injected or case.verdict["status"] == "invalid":
         return Gap(None, None, "none")
     if not (case.folder / "predicted").is_dir():
         return _reported_gap(case)
@@ -154,7 +154,7 @@ def measure_gap_closed(case: JudgedCase) -> Gap:
     if found.after is None:
         return _reported_gap(case)
     after, floor = rms(found.after), rms(found.floor)
-    beyond = _share_closed(rms(found.friction), after, floor) if case.truth["background"] else None
+    beyond = _share_closed(rms(found.friction), after, floor) if case.truth.background else None
     return Gap(_share_closed(rms(found.refit), after, floor), beyond, "counted")
 
 

@@ -143,7 +143,7 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
     found = found.sort_values("miss", kind="stable").astype({"miss": str})
     known = {case.name: case for case in cases}
     own = [known[name] for name in found["case"]]
-    found["rate_hz"] = [case.truth.get("rate_hz") for case in own]
+    found["rate_hz"] = [case.truth.rate_hz for case in own]
     for column, words in WORD_COLUMNS.items():
         found[column] = [words(case) for case in own]
     found["law"] = [_hidden_law(case, effect) for case, effect in zip(own, found["effect"], strict=True)]
@@ -153,4 +153,4 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
 
 def _hidden_law(case: JudgedCase, effect: str) -> str:
     """The law behind a hidden effect; empty for a claim of something that is not there."""
-    return next((str(each["form"]) for each in case.truth["injected"] if each["effect"] == effect), "")
+    return next((each.form for each in case.truth.injected if each.effect == effect), "")
