@@ -134,7 +134,7 @@ def make_truth(case: SimulatedCase, runs: list[LoggedRun]) -> Truth:
 
 def _effect_facts(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
     """The fields of a `TrueEffect`. mixed_up: whether other friction of its joint adds to its own."""
-    units, blurred = effect.units(), effect.blurred if mixed_up else ()
+    blurred = effect.blurred if mixed_up else ()
     return {
         "effect": effect.effect,
         "joint": effect.place,
@@ -146,7 +146,7 @@ def _effect_facts(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
         "parameters": {
             name: TrueParameter(
                 value=tuple(value) if isinstance(value, list) else value,
-                unit=units[name],
+                unit=effect.units[name],
                 comparable=name in effect.comparable and name not in blurred,
             )
             for name, value in effect.parameters().items()

@@ -31,13 +31,9 @@ from armlab.concealed.engine import Mount, Parts, Pendulum, Track
 
 
 class OutsideEffect(HiddenEffect):
-    """An effect without a name in the vocabulary: it has no parameters that could be compared."""
+    """An effect without a name in the library of the diagnosis: no parameter of it can be compared."""
 
     forms = ("frozen",)
-
-    def units(self) -> dict[str, str]:
-        """None."""
-        return {}
 
 
 def draw_other_joint(rng: np.random.Generator, machine: Machine, joint: int) -> float:

@@ -20,6 +20,7 @@ from scipy.stats import chi2, ncx2
 
 from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.engine import Track
 from armlab.concealed.noise import Noise
 from armlab.concealed.plan import Plan, draw_effects, target_multiple
@@ -34,7 +35,6 @@ from armlab.concealed.simulate import (
     reference_track,
     simulate_runs,
 )
-from armlab.recordings.vocabulary import EFFECTS
 
 ORACLE_HZ = 250.0  # rows a second: means over 4 ms
 FAMILY_WISE_LEVEL, ORACLE_POWER = 0.01, 0.9
@@ -42,9 +42,9 @@ MIN_COLUMN_POWER = 1e-10  # share of a column's power that counts as rounding
 
 
 def candidate_count(joints: int) -> int:
-    """Effects times places in the vocabulary: what a test has to be corrected for."""
+    """Number of tests that a diagnosis makes, effects times places: the level of a test is corrected for it."""
     places = {"joint": joints, "coupling": joints * (joints - 1), "link": joints, "robot": 1}
-    return sum(places[effect.where] for effect in EFFECTS if effect.id != "unknown")
+    return sum(places[effect.where] for effect in LIBRARY)
 
 
 @lru_cache(maxsize=32)

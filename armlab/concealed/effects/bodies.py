@@ -1,7 +1,7 @@
 """Effects of bodies: links, lengths and gravity that differ from the simulation."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -15,6 +15,8 @@ class Payload(HiddenEffect):
     """A body on a link, mostly the last; other form: a long one. size: mass, kg."""
 
     effect, forms = "payload", ("compact", "long")
+    where = "link"
+    units: ClassVar = {"mass": "kg", "centre": "m"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
@@ -55,6 +57,7 @@ class LinkError(HiddenEffect):
     """A link that is heavier than drawn, its centre elsewhere. size: relative error of the mass."""
 
     effect, forms = "inertial_parameter_error", ("mass and centre",)
+    where = "link"
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -83,6 +86,8 @@ class Tilt(HiddenEffect):
     """A base that does not stand level. size: rad."""
 
     effect, forms = "base_tilt", ("tilt",)
+    where = "robot"
+    units: ClassVar = {"gravity": "m/s2"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -123,6 +128,7 @@ class Geometry(HiddenEffect):
     """A link that is longer along x, or a joint further out along its axis. size: m."""
 
     effect, forms = "geometry_error", ("a", "d")
+    units: ClassVar = {"offset": "m"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:

@@ -1,7 +1,7 @@
 """Faults of the measurement: gains, offsets, delays, clipping; and a push from outside."""
 
 from dataclasses import replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ class Gain(HiddenEffect):
     """A torque channel that reads too much or too little; other form: more beyond a knee. size: share."""
 
     effect, forms = "torque_gain_error", ("factor", "bent")
+    units: ClassVar = {"gain": "1"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -45,6 +46,7 @@ class Offset(HiddenEffect):
     """A torque channel whose zero is elsewhere, N m; other form: it creeps by a tenth during a run."""
 
     effect, forms = "torque_offset", ("constant", "creeping")
+    units: ClassVar = {"offset": "N.m"}
     blurred = ("offset",)
 
     @classmethod
@@ -69,6 +71,8 @@ class Delay(HiddenEffect):
     """All torque channels stamped later than the motion, s; other form: not quite the same for each."""
 
     effect, forms = "time_delay", ("shift", "uneven shift")
+    where = "robot"
+    units: ClassVar = {"seconds": "s"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -99,6 +103,7 @@ class Skew(HiddenEffect):
     """One torque channel stamped later, or earlier, than the others, s."""
 
     effect, forms = "channel_skew", ("shift",)
+    units: ClassVar = {"seconds": "s"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -120,6 +125,7 @@ class EncoderOffset(HiddenEffect):
     """A joint whose zero is elsewhere: the recorded position is the true one plus the offset, rad."""
 
     effect, forms = "encoder_offset", ("constant",)
+    units: ClassVar = {"offset": "rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -144,6 +150,7 @@ class Saturation(HiddenEffect):
     """
 
     effect, forms = "torque_saturation", ("clip", "bend")
+    units: ClassVar = {"limit": "N.m"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -183,6 +190,7 @@ class Contact(HiddenEffect):
     """A push during one run: half a sine; other forms: a plateau with ramps, a Gauss curve. size: peak, N m."""
 
     effect, forms = "external_contact", ("half sine", "plateau", "gauss")
+    units: ClassVar = {"start": "s", "end": "s", "peak": "N.m"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:

@@ -1,7 +1,7 @@
 """Effects between motor and link, and effects that couple joints."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -16,6 +16,7 @@ class Rotor(HiddenEffect):
     """Inertia behind the gear that the simulation does not know, kg m2."""
 
     effect, forms = "rotor_inertia", ("armature",)
+    units: ClassVar = {"inertia": "kg.m2"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -36,6 +37,7 @@ class Elasticity(HiddenEffect):
     """A spring in the drive train, encoder at the motor; other form: it hardens. size: compliance, rad/(N m)."""
 
     effect, forms = "joint_elasticity", ("linear", "hardening")
+    units: ClassVar = {"stiffness": "N.m/rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -58,6 +60,7 @@ class Backlash(HiddenEffect):
     """Play between motor and link; other form: a soft play, a spring whose stiffness grows. size: gap, rad."""
 
     effect, forms = "backlash", ("gap", "soft")
+    units: ClassVar = {"gap": "rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -84,6 +87,8 @@ class Coupling(HiddenEffect):
     """
 
     effect, forms = "joint_coupling", ("friction", "friction and inertia")
+    where = "coupling"
+    units: ClassVar = {"coefficient": "N.m.s/rad", "level": "N.m", "inertia": "kg.m2"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:

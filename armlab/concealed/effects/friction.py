@@ -1,6 +1,6 @@
 """Friction: functions of velocity, position and load, presliding hysteresis, and drift with temperature."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -14,6 +14,7 @@ class Coulomb(HiddenEffect):
     """Level times the sign of velocity; other form: a soft turn-over (arc tangent)."""
 
     effect, forms = "coulomb_friction", ("sign", "soft")
+    units: ClassVar = {"level": "N.m"}
     blurred = ("level",)
 
     @classmethod
@@ -39,6 +40,7 @@ class Viscous(HiddenEffect):
     """Proportional to velocity; other form: uneven over the turn by a tenth."""
 
     effect, forms = "viscous_friction", ("linear", "uneven")
+    units: ClassVar = {"coefficient": "N.m.s/rad"}
     blurred = ("coefficient",)
 
     @classmethod
@@ -62,6 +64,7 @@ class NonlinearViscous(HiddenEffect):
     """A power of velocity; other form: Eyring's inverse hyperbolic sine of thin oil films."""
 
     effect, forms = "nonlinear_viscous_friction", ("power", "eyring")
+    units: ClassVar = {"coefficient": "N.m/(rad/s)^exponent", "exponent": "1"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -91,6 +94,7 @@ class Stribeck(HiddenEffect):
     """
 
     effect, forms = "stribeck_friction", ("gauss", "exponent", "rational")
+    units: ClassVar = {"level": "N.m", "static_level": "N.m", "velocity": "rad/s", "exponent": "1"}
     companions, blurred = ("coulomb", "viscous"), ("level", "static_level")
 
     @classmethod
@@ -126,6 +130,7 @@ class Asymmetric(HiddenEffect):
     """Levels that differ by direction; other form: slopes differ too. size: half the difference, N m."""
 
     effect, forms = "asymmetric_friction", ("levels", "levels and slopes")
+    units: ClassVar = {"positive": "N.m", "negative": "N.m"}
     companions, blurred = ("coulomb", "viscous"), ("positive", "negative")
 
     @classmethod
@@ -159,6 +164,7 @@ class LoadDependent(HiddenEffect):
     """A share of the transmitted torque; other form: a share that fades in with the load."""
 
     effect, forms = "load_dependent_friction", ("share", "fading in")
+    units: ClassVar = {"coefficient": "1"}
     companions = ("coulomb", "viscous")
 
     @classmethod
@@ -182,6 +188,7 @@ class Presliding(HiddenEffect):
     """Dahl's hysteresis; other forms: LuGre with a Stribeck curve, Maxwell slip elements. size: level, N m."""
 
     effect, forms = "presliding_hysteresis", ("dahl", "lugre", "maxwell slip")
+    units: ClassVar = {"level": "N.m", "stiffness": "N.m/rad"}
     companions, blurred = ("coulomb", "viscous"), ("level", "stiffness")
 
     @classmethod
@@ -214,6 +221,7 @@ class Drift(HiddenEffect):
     """
 
     effect, forms = "friction_drift", ("time", "heat")
+    units: ClassVar = {"initial": "N.m.s/rad", "final": "N.m.s/rad", "time_constant": "s"}
     companions, blurred = ("viscous", "coulomb"), ("initial", "final")
 
     @classmethod

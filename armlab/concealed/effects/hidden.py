@@ -1,34 +1,39 @@
 """The base class of hidden effects: what an effect may change between the mechanism and the recording."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.engine import Parts, Track
-from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 
 OTHER_FORM_SHARE = 0.4  # share of the effects whose law is not the one that anyone would fit first
 SIGN_WIDTH = 5e-4  # rad/s: a Coulomb friction turns over within this
 ParameterValues = dict[str, float | list[float]]
+Where = Literal["joint", "coupling", "link", "robot"]
 
 
 @dataclass(frozen=True)
 class HiddenEffect:
     """An effect at a joint or link (from 0) with one size and a shape.
 
-    size: what grows until the effect is as visible as wanted; in the unit of its main parameter. most: the
-    size beyond which the effect would be absurd. form: which law. shape: its other numbers. companions: plain
-    friction of the same joint that is free beside it. blurred: parameters that cannot be told from the plain friction
-    of a background.
+    Of the class. effect: its id. forms: its laws, the obvious one first. where: at one joint; at two joints, where the
+    torque of one follows the motion of the other; at a link; or in the whole robot. units: unit of each parameter at
+    a joint that turns. companions: plain friction of the same joint that is free beside it. blurred: parameters that
+    cannot be separated from the plain friction of a background.
+
+    size: what grows until the effect is as visible as wanted; in the unit of its main parameter. max_size: the size
+    beyond which the effect would be absurd. form: which law. shape: the other numbers of the law.
     """
 
     effect: ClassVar[str]
     forms: ClassVar[tuple[str, ...]]
+    where: ClassVar[Where] = "joint"
+    units: ClassVar[Mapping[str, str]] = {}
     companions: ClassVar[tuple[str, ...]] = ()
     blurred: ClassVar[tuple[str, ...]] = ()
     joint: int
@@ -78,13 +83,8 @@ class HiddenEffect:
         return ()
 
     def parameters(self) -> ParameterValues:
-        """Parameters by their names in the vocabulary, SI units."""
+        """Parameters by name, in the units of `units`."""
         return {}
-
-    def units(self) -> dict[str, str]:
-        """Unit of each parameter."""
-        known = effect_named(self.effect)
-        return {name: known.parameter(name).unit_for() for name in self.parameters()}
 
     def with_peak_torque(self, peak: Array) -> Self:
         """The effect when the largest torque (joints,) of each joint without it is known, N m."""

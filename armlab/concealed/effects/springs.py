@@ -1,7 +1,7 @@
 """Effects that depend on position: springs, hoses, ripple."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -33,6 +33,7 @@ class Compensator(HiddenEffect):
     """
 
     effect, forms = "gravity_compensator", ("sine", "linkage", "gas")
+    units: ClassVar = {"amplitude": "N.m", "phase": "rad"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
@@ -73,6 +74,7 @@ class Cable(HiddenEffect):
     """Linear pull to a rest position; other form: a hose that stiffens. size: stiffness, N m/rad."""
 
     effect, forms = "cable_stiffness", ("linear", "stiffening")
+    units: ClassVar = {"stiffness": "N.m/rad", "rest": "rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
@@ -98,6 +100,7 @@ class Ripple(HiddenEffect):
     """A sine over the turn; other form: narrow teeth (five harmonics), no work over a turn. size: amplitude, N m."""
 
     effect, forms = "torque_ripple", ("sine", "teeth")
+    units: ClassVar = {"order": "1/rev", "amplitude": "N.m", "phase": "rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:

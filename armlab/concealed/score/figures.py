@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.outside import OUTSIDE
 from armlab.concealed.score.measures import (
     MIN_NAMED_MULTIPLE,
@@ -16,7 +17,6 @@ from armlab.concealed.score.measures import (
     effect_table,
 )
 from armlab.concealed.score.rows import ScoreRows
-from armlab.recordings.vocabulary import EFFECTS
 
 # Okabe and Ito 2008
 BLACK, BLUE, ORANGE, SKY, GREEN = "#000000", "#0072B2", "#D55E00", "#56B4E9", "#009E73"
@@ -144,7 +144,7 @@ ANSWERS_WITHOUT_NAME = {
     "inconclusive": "inconclusive",
     "invalid": "no verdict",
 }
-LIBRARY_NAMES = tuple(each.id for each in EFFECTS if each.id != "unknown")
+LIBRARY_NAMES = tuple(each.effect for each in LIBRARY)
 OUTSIDE_NAMES = tuple(each.effect for each in OUTSIDE)
 CELL_SIZE_IN = 0.35  # inches a cell
 
