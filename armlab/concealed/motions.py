@@ -96,7 +96,8 @@ def make_reference(family: str, rng: np.random.Generator, time: Array, machine: 
 
 
 def _random_waves(rng: np.random.Generator, time: Array, joints: int, frequency_hz: Array, weight: Array) -> Array:
-    sine, cosine = (rng.normal(0, 1, (len(frequency_hz), joints)) * weight[:, None] for _ in range(2))
+    sine = rng.normal(0, 1, (len(frequency_hz), joints)) * weight[:, None]
+    cosine = rng.normal(0, 1, (len(frequency_hz), joints)) * weight[:, None]
     angle = 2 * np.pi * np.outer(time, frequency_hz)
     return np.asarray(np.sin(angle) @ sine + np.cos(angle) @ cosine)
 

@@ -159,7 +159,9 @@ def _draw_arm(rng: np.random.Generator, made: Machine, off: bool, kind: CaseKind
     """The arm with links that are 3-10 % off (a decoy of the clean tier: up to 20 %), and how much each is."""
     arm, errors = made.arm, list[float]()
     most = 0.2 if kind == "decoy" else 0.1
-    for number, link in enumerate(arm.links or ()) if off else ():
+    if not off:
+        return arm, ()
+    for number, link in enumerate(arm.links or ()):
         error = float(rng.uniform(0.03, most))
         mass, spread = 1 + error * rng.choice([-1, 1]), 1 + error * rng.uniform(-1, 1)
         reach = float(np.linalg.norm(np.array(link.first_moment))) / link.mass
@@ -172,15 +174,14 @@ def _draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEff
     """Coulomb and viscous friction on every joint, offsets on half of them."""
     out: list[HiddenEffect] = []
     for joint in range(made.joints):
-        level, slope, offset = (
-            torque_share(float(share), made, joint) for share in rng.uniform((0.02, 0.02, 0.002), (0.07, 0.07, 0.01))
-        )
+        level, slope, offset = rng.uniform((0.02, 0.02, 0.002), (0.07, 0.07, 0.01)).tolist()
         out += [
-            Coulomb(joint, level, np.inf, "sign", {"width": 0.0}),
-            Viscous(joint, slope, np.inf, "linear", {"phase": 0.0}),
+            Coulomb(joint, torque_share(level, made, joint), np.inf, "sign", {"width": 0.0}),
+            Viscous(joint, torque_share(slope, made, joint), np.inf, "linear", {"phase": 0.0}),
         ]
         if rng.random() < 0.5:
-            out.append(Offset(joint, offset, np.inf, "constant", {"direction": float(rng.choice([-1, 1]))}))
+            size, direction = torque_share(offset, made, joint), float(rng.choice([-1, 1]))
+            out.append(Offset(joint, size, np.inf, "constant", {"direction": direction}))
     return tuple(out)
 
 

@@ -14,8 +14,10 @@ from typing import Any, Literal, TypeVar
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
+from armlab.concealed.case_files import write_case
 from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, Tier, read_model, write_model
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan
+from armlab.concealed.sizing import simulate_case
 
 MANIFEST_FILE = "manifest.json"
 ManifestModel = TypeVar("ManifestModel", SetManifest, LoopManifest)
@@ -139,9 +141,6 @@ def _is_done(out: Path, name: str) -> bool:
 
 def _make_case(settings: SetSettings, number: int, out: Path) -> str:
     """Makes one case in a draft folder; the observation's renaming comes last, so that a cut leaves no half."""
-    from armlab.concealed.case_files import write_case
-    from armlab.concealed.sizing import simulate_case
-
     plan = settings.plan(number)
     draft = out / "drafts" / plan.name
     shutil.rmtree(draft, ignore_errors=True)

@@ -106,7 +106,7 @@ def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Referenc
     """
     step = float(reference.time[1] - reference.time[0])
     made = build_plant(arm, parts, step, (controller.position_gain, controller.velocity_gain))
-    wanted = Motion(reference.position, *_derivatives(reference.position, step))
+    wanted = _differentiate_reference(reference.position, step)
     forward = rigid_torque(controller.model, wanted)
     gains = controller.position_gain * wanted.position + controller.velocity_gain * wanted.velocity
     width = round(INNER_LOOP_S / step)
@@ -115,9 +115,9 @@ def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Referenc
     return _make_track(made, controller, reference.time, states, control)
 
 
-def _derivatives(position: Array, step: float) -> tuple[Array, Array]:
+def _differentiate_reference(position: Array, step: float) -> Motion:
     velocity = np.gradient(position, step, axis=0)
-    return velocity, np.gradient(velocity, step, axis=0)
+    return Motion(position, velocity, np.gradient(velocity, step, axis=0))
 
 
 def _initial_twists(arm: Arm, parts: Parts, wanted: Motion) -> dict[str, float]:
@@ -233,12 +233,14 @@ def law_torque(effects: Sequence[HiddenEffect], track: Track, run: int) -> Array
 
 
 def reference_track(plan: Plan, number: int, run: RunPlan) -> Track:
-    """The reference of a run, as a track of the arm without hidden effects."""
+    """The reference of the run of that number, as a track of the arm without hidden effects."""
     time = run_times(run.length_s, FINE_HZ)
-    position = make_reference(run.family, plan.stream(f"motion {number}"), time, plan.machine)
-    step = float(time[1] - time[0])
-    velocity = np.gradient(position, step, axis=0)
-    motion = Motion(position, velocity, np.gradient(velocity, step, axis=0))
+    return track_reference(plan, time, make_reference(run.family, plan.stream(f"motion {number}"), time, plan.machine))
+
+
+def track_reference(plan: Plan, time: Array, position: Array) -> Track:
+    """Positions (steps, joints) at even instants, as a track of the arm without hidden effects."""
+    motion = _differentiate_reference(position, float(time[1] - time[0]))
     return Track(time, motion, rigid_torque(plan.true_arm, motion))
 
 

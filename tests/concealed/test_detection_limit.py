@@ -26,7 +26,7 @@ def _statistics(size: float, noise: Noise) -> np.ndarray:
     rng, (effect, free) = np.random.default_rng(0), _columns()
     time = np.arange(SAMPLES) / ORACLE_HZ
     white = [[noise.whitened(each[:, joint], joint, ORACLE_HZ) for joint in range(JOINTS)] for each in (effect, free)]
-    column, beside = (np.concatenate(each) for each in white)
+    column, beside = np.concatenate(white[0]), np.concatenate(white[1])
     column = column - beside * (beside @ column) / (beside @ beside)
     found = []
     for _ in range(TRIALS):
@@ -68,8 +68,9 @@ def test_noncentrality_grows_with_the_library() -> None:
 
 
 def test_multiples_grow_in_proportion_to_the_effect() -> None:
-    small, large = (case(Viscous(1, size, 9.0, "linear", {"phase": 0.0})).multiples[0] for size in (0.05, 0.2))
-    assert large == pytest.approx(4 * small, rel=0.03)
+    small = case(Viscous(1, 0.05, 9.0, "linear", {"phase": 0.0}))
+    large = case(Viscous(1, 0.2, 9.0, "linear", {"phase": 0.0}))
+    assert large.multiples[0] == pytest.approx(4 * small.multiples[0], rel=0.03)
 
 
 def test_friction_and_links_off_hide_a_rotor_in_the_realistic_tier() -> None:

@@ -15,8 +15,13 @@ from armlab.concealed.arms import make_machine
 from armlab.concealed.formats import LoopManifest
 from armlab.concealed.loop import case
 from armlab.concealed.loop.case import Forecast, SecondMotion, Tools, play_case
-from armlab.concealed.loop.draw import draw_case, poor_reference
-from armlab.concealed.loop.recordings import simulate_first_recording, simulate_second_recording, write_loop_recording
+from armlab.concealed.loop.recordings import (
+    draw_case,
+    poor_reference,
+    simulate_first_recording,
+    simulate_second_recording,
+    write_loop_recording,
+)
 from armlab.concealed.loop.run import ANSWERS_FILE, LoopSettings, close_loop, play_cases, read_results, seal_loop
 from armlab.concealed.sets import read_checked_manifest
 from armlab.recordings.load import load_recording
@@ -78,8 +83,7 @@ def test_a_second_recording_holds_the_first_runs_and_the_motion_that_was_asked_f
         simulate_second_recording(first, gentle(), "designed"), tmp_path / "both", tmp_path / "both.json"
     )
     for run in ("run-1.parquet", "run-2.parquet"):
-        alone, together = (pd.read_parquet(tmp_path / part / run) for part in ("first", "both"))
-        assert alone.equals(together)
+        assert pd.read_parquet(tmp_path / "first" / run).equals(pd.read_parquet(tmp_path / "both" / run))
     recording = load_recording(tmp_path / "both")
     third, asked = recording.runs[2], gentle()
     wanted = np.column_stack([np.interp(third.time, asked[:, 0], column) for column in asked.T[1:]])

@@ -153,10 +153,9 @@ def test_right_answers_stand_on_the_diagonal_of_the_matrix() -> None:
     hidden = truth(effect("torque_ripple", 2))
     table = confusion_table(scored((COULOMB, perfect(COULOMB)), (hidden, ELSEWHERE), (OUTSIDE, verdict())), "clean")
     axes = draw_confusion(table, "made by hand").axes[0]
-    rows_, columns = (
-        [each.get_text() for each in labels] for labels in (axes.get_yticklabels(), axes.get_xticklabels())
-    )
-    assert rows_ == ["coulomb friction  (1)", "torque ripple  (1)", "viscous map  (1)"]
+    rows = [each.get_text() for each in axes.get_yticklabels()]
+    columns = [each.get_text() for each in axes.get_xticklabels()]
+    assert rows == ["coulomb friction  (1)", "torque ripple  (1)", "viscous map  (1)"]
     assert columns == ["coulomb friction", "torque ripple", "backlash", "nothing said"]
 
 

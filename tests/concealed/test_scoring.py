@@ -173,7 +173,8 @@ def test_rows_of_no_case_keep_their_columns() -> None:
 def test_levels_by_direction_are_named_by_a_level_and_an_offset_together() -> None:
     hidden = effect("asymmetric_friction", 2).model_copy(update={"equivalent": ("coulomb_friction", "torque_offset")})
     parts = (finding("coulomb_friction", 2), finding("torque_offset", 2))
-    both, one = (scored((truth(hidden), verdict("mismatch", found))) for found in (parts, parts[:1]))
+    both = scored((truth(hidden), verdict("mismatch", parts)))
+    one = scored((truth(hidden), verdict("mismatch", parts[:1])))
     assert measured(both, "right_name").value == 1
     assert measured(both, "right_joint").value == 1
     assert measured(one, "right_name").value == 0

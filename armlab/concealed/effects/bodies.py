@@ -1,6 +1,7 @@
 """Effects of bodies: links, lengths and gravity that differ from the simulation."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import ClassVar, Self
 
 import numpy as np
@@ -119,8 +120,6 @@ class Tilt(HiddenEffect):
         return with_tilt(arm, float(about[0]), float(about[1]))
 
     def _tilted(self, gravity: tuple[float, float, float]) -> tuple[float, float, float]:
-        from dataclasses import replace
-
         return self.arm(replace(Arm("", ()), gravity=gravity)).gravity
 
 

@@ -177,12 +177,11 @@ class Saturation(HiddenEffect):
         """One channel below its limit."""
         read, limit = torque.copy(), self.limit
         column = torque[:, self.joint]
-        bent = (
-            column / (1 + (np.abs(column) / limit) ** SATURATION_SHARPNESS) ** (1 / SATURATION_SHARPNESS)
-            if self.form == "bend"
-            else None
-        )
-        read[:, self.joint] = np.clip(column, -limit, limit) if bent is None else bent
+        if self.form == "bend":
+            bent = (1 + (np.abs(column) / limit) ** SATURATION_SHARPNESS) ** (1 / SATURATION_SHARPNESS)
+            read[:, self.joint] = column / bent
+        else:
+            read[:, self.joint] = np.clip(column, -limit, limit)
         return read
 
 

@@ -22,7 +22,7 @@ def gravity_wave(machine: Machine, joint: int) -> tuple[float, float]:
     position[:, joint] = angles
     still = np.zeros_like(position)
     torque = rigid_body_torque(machine.arm, Motion(position, still, still))[:, joint]
-    sine, cosine = (2 * np.mean(torque * wave(angles)) for wave in (np.sin, np.cos))
+    sine, cosine = 2 * np.mean(torque * np.sin(angles)), 2 * np.mean(torque * np.cos(angles))
     return float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
 
 

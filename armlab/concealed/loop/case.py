@@ -10,9 +10,9 @@ from typing import Any, Literal
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.concealed.formats import Truth, read_model
-from armlab.concealed.loop.draw import draw_case
 from armlab.concealed.loop.recordings import (
     FirstRecording,
+    draw_case,
     simulate_first_recording,
     simulate_second_recording,
     write_loop_recording,

@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from armlab.common.errors import InputError
 from armlab.concealed.formats import LoopManifest, write_model
 from armlab.concealed.loop.case import MAX_ATTEMPTS, Tools, play_case
-from armlab.concealed.loop.draw import draw_case
+from armlab.concealed.loop.recordings import draw_case
 from armlab.concealed.sets import MANIFEST_FILE, file_digest, seal_files
 
 ANSWERS_FILE = "answers.json"

@@ -201,10 +201,9 @@ def _cell_color(hidden: str, said: str, share: float) -> tuple[float, float, flo
     """White for none, the full colour of the kind of answer for all."""
     from matplotlib.colors import to_rgb
 
-    full = {"right": to_rgb(BLUE), "wrong": to_rgb(ORANGE), "missed": to_rgb("0.6")}[_answer_kind(hidden, said)]
+    red, green, blue = to_rgb({"right": BLUE, "wrong": ORANGE, "missed": GREY}[_answer_kind(hidden, said)])
     strength = 0.0 if share == 0 or np.isnan(share) else 0.2 + 0.8 * share
-    red, green, blue = (1 - strength * (1 - each) for each in full)
-    return red, green, blue
+    return 1 - strength * (1 - red), 1 - strength * (1 - green), 1 - strength * (1 - blue)
 
 
 def _draw_grid_lines(axes: Any, rows: list[str], columns: list[str]) -> None:

@@ -156,7 +156,7 @@ def _render_gallery(cases: dict[str, JudgedCase], table: ScoreRows, shown: pd.Da
         parts.append(f"## {title}")
         for group, about in OUTCOME_GROUPS.items():
             if about.success == success:
-                own, of = (frame[frame["group"] == group] for frame in (shown, everything))
+                own, of = shown[shown["group"] == group], everything[everything["group"] == group]
                 parts.append(f"### {about.title}: {_count_shown(own, of)}")
                 parts += [_render_entry(cases[item["case"]], item) for item in to_records(own)]
     return "\n\n".join(parts) + "\n"

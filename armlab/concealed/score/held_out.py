@@ -56,15 +56,16 @@ def filter_held_out_run(case: JudgedCase) -> HeldOut:
     predicted = case.folder / "predicted" / f"{Path(run.file).stem}.csv"
     refit, friction = _refit_residuals(recording.arm, identify, signals)
     given = signals.filter(rigid_torque(recording.arm, signals.motion))
+    after = None
+    if predicted.is_file():
+        after = signals.torque - signals.filter(_read_prediction(predicted, signals.run.time))
     return HeldOut(
         time=signals.time,
         torque=signals.torque,
         given=signals.torque - given,
         refit=refit,
         friction=friction,
-        after=signals.torque - signals.filter(_read_prediction(predicted, signals.run.time))
-        if predicted.is_file()
-        else None,
+        after=after,
         floor=signals.torque - signals.filter(clean),
     )
 
@@ -85,11 +86,8 @@ def _refit_residuals(arm: Arm, identify: list[Signals], signals: Signals) -> tup
     learned = np.vstack([_fit_columns(arm, each, base) for each in identify])
     torque = np.concatenate([_torque_without_rotors(arm, each).ravel() for each in identify])
     there, wanted = _fit_columns(arm, signals, base), _torque_without_rotors(arm, signals)
-    left = (
-        _fit_residual(learned[:, :number], torque, there[:, :number], wanted)
-        for number in (len(base), learned.shape[1])
-    )
-    return next(left), next(left)
+    links = _fit_residual(learned[:, : len(base)], torque, there[:, : len(base)], wanted)
+    return links, _fit_residual(learned, torque, there, wanted)
 
 
 def _fit_residual(learned: Array, torque: Array, there: Array, wanted: Array) -> Array:
@@ -163,8 +161,8 @@ def _share_closed(before: Array, after: Array, floor: Array) -> float | None:
     worth = before > MIN_GAP_RATIO * floor
     if not worth.any():
         return None
-    scaled = [each[worth] / floor[worth] for each in (before, after)]
-    return float(np.sum(scaled[0] - scaled[1]) / np.sum(scaled[0] - 1))
+    scaled_before, scaled_after = before[worth] / floor[worth], after[worth] / floor[worth]
+    return float(np.sum(scaled_before - scaled_after) / np.sum(scaled_before - 1))
 
 
 def _reported_gap(case: JudgedCase) -> Gap:

@@ -46,14 +46,15 @@ class ScoreRows:
 
 def make_rows(cases: list[JudgedCase]) -> ScoreRows:
     """The rows of judged cases."""
-    frames = (
-        [_case_row(case) for case in cases],
-        [row for case in cases for row in _effect_rows(case)],
-        [row for case in cases for row in _claim_rows(case)],
-        [row for case in cases for row in _parameter_rows(case)],
+    effects = [row for case in cases for row in _effect_rows(case)]
+    claims = [row for case in cases for row in _claim_rows(case)]
+    parameters = [row for case in cases for row in _parameter_rows(case)]
+    return ScoreRows(
+        cases=pd.DataFrame([_case_row(case) for case in cases], columns=CASE_COLUMNS),
+        effects=pd.DataFrame(effects, columns=EFFECT_COLUMNS),
+        claims=pd.DataFrame(claims, columns=CLAIM_COLUMNS),
+        parameters=pd.DataFrame(parameters, columns=PARAMETER_COLUMNS),
     )
-    columns = (CASE_COLUMNS, EFFECT_COLUMNS, CLAIM_COLUMNS, PARAMETER_COLUMNS)
-    return ScoreRows(*(pd.DataFrame(each, columns=names) for each, names in zip(frames, columns, strict=True)))
 
 
 def to_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
