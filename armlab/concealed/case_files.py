@@ -25,8 +25,24 @@ from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
 from armlab.concealed.sizing import SimulatedCase
 from armlab.recordings.recording import Role
 
-ENCODER_BITS = (20, 24)  # powers of two a joint turn, gear included
-JITTER_S = 2e-5  # of stamps that are late while the samples are even
+
+@dataclass(frozen=True)
+class LoggingSettings:
+    """How a drive logs a run; chosen by eye, in the range of industrial drives.
+
+    encoder_bits: range of the resolution, steps a joint turn as powers of two, gear included; the end is left out.
+    uneven_share: share of the cases whose samples are taken unevenly and stamped well. jitter_s: of stamps that are
+    late while the samples are even. torque_resolution_nm, time_resolution_s: what a file keeps of a number.
+    """
+
+    encoder_bits: tuple[int, int] = (20, 24)
+    uneven_share: float = 0.3
+    jitter_s: float = 2e-5
+    torque_resolution_nm: float = 1e-5
+    time_resolution_s: float = 1e-7
+
+
+LOGGING = LoggingSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +71,7 @@ def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
     position, role = sampled.position + shift, plan.runs[run].role
     if not noisy:
         return LoggedRun(role, stamp, position, torque, torque)
-    step = 2 * np.pi / 2.0 ** rng.integers(*ENCODER_BITS, joints)
+    step = 2 * np.pi / 2.0 ** rng.integers(*LOGGING.encoder_bits, joints)
     noise = plan.noise.sample(plan.stream(f"noise {run}"), sampled.velocity, instant)
     read = plan.noise.quantise(torque + noise)
     return LoggedRun(role, stamp, np.rint(position / step) * step, read, torque)
@@ -67,14 +83,13 @@ def _sample_instants(case: SimulatedCase, run: int, rng: np.random.Generator, no
     even = np.arange(round(plan.runs[run].length_s * plan.rate_hz)) / plan.rate_hz
     if not noisy:
         return even, even
-    if plan.stream("clock").random() < 0.3:
+    if plan.stream("clock").random() < LOGGING.uneven_share:
         uneven = even + rng.integers(-1, 2, len(even)) / FINE_HZ
         return np.maximum(uneven, 0.0), np.maximum(uneven, 0.0)
-    return even + np.abs(rng.normal(0, JITTER_S, len(even))), even
+    return even + np.abs(rng.normal(0, LOGGING.jitter_s, len(even))), even
 
 
 EFFECTS_WITH_CONSTANT = ("asymmetric_friction", "cable_stiffness", "gravity_compensator")
-TORQUE_RESOLUTION, TIME_RESOLUTION = 1e-5, 1e-7  # N m and s: what is kept of a number
 
 
 def write_case(case: SimulatedCase, observations: Path, truth: Path) -> None:
@@ -185,9 +200,9 @@ def _write_yaml(path: Path, content: dict[str, Any]) -> None:
 
 
 def _write_table(path: Path, run: LoggedRun, joints: int) -> None:
-    columns = {"t": np.rint(run.time / TIME_RESOLUTION) * TIME_RESOLUTION}
+    columns = {"t": np.rint(run.time / LOGGING.time_resolution_s) * LOGGING.time_resolution_s}
     columns |= {f"q{joint + 1}": run.position[:, joint] for joint in range(joints)}
-    torque = np.rint(run.torque / TORQUE_RESOLUTION) * TORQUE_RESOLUTION
+    torque = np.rint(run.torque / LOGGING.torque_resolution_nm) * LOGGING.torque_resolution_nm
     _write_parquet(path, columns | {f"tau{joint + 1}": torque[:, joint] for joint in range(joints)})
 
 

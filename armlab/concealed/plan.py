@@ -35,9 +35,32 @@ KIND_SHARES: dict[CaseKind, float] = {
     "null": 0.08,
 }
 EFFECT_COUNTS = {"single": 1, "pair": 2, "triple": 3, "outside": 1, "decoy": 0, "null": 0}
-MIN_MULTIPLE, MAX_MULTIPLE = 0.5, 20.0  # detection limits
 BACKGROUND_EFFECTS = ("coulomb_friction", "viscous_friction", "torque_offset", "inertial_parameter_error", "payload")
 DEVELOPMENT_SEEDS = range(1000, 2000)
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """What a case is drawn from; fixed before any diagnosis was scored.
+
+    multiples: sizes of hidden effects, detection limits. link_error, decoy_link_error: relative errors of links. rates:
+    share of each sample rate, Hz. coulomb, viscous, offset: of the background, share of the rating (viscous: at 1
+    rad/s). offset_share: joints with an offset. identify_s, validate_s: length of a run.
+    """
+
+    multiples: tuple[float, float] = (0.5, 20.0)
+    link_error: tuple[float, float] = (0.03, 0.1)
+    decoy_link_error: tuple[float, float] = (0.03, 0.2)
+    rates: tuple[tuple[int, float], ...] = ((250, 0.3), (500, 0.5), (1000, 0.2))
+    coulomb: tuple[float, float] = (0.02, 0.07)
+    viscous: tuple[float, float] = (0.02, 0.07)
+    offset: tuple[float, float] = (0.002, 0.01)
+    offset_share: float = 0.5
+    identify_s: tuple[float, float] = (10, 15)
+    validate_s: tuple[float, float] = (10, 12)
+
+
+PLAN = PlanSettings()
 
 
 @dataclass(frozen=True)
@@ -89,7 +112,7 @@ def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: 
     noise = draw_noise(rng, _draw_noise_kind(rng, kind, realistic, development), made.rating, realistic)
     arm, errors = _draw_arm(rng, made, realistic or kind == "decoy", kind)
     background = _draw_background(rng, made) if realistic else ()
-    rate = int(rng.choice([250, 500, 1000], p=[0.3, 0.5, 0.2]))
+    rate = int(rng.choice([rate for rate, _ in PLAN.rates], p=[share for _, share in PLAN.rates]))
     return Plan(seed, index, tier, kind, made, _draw_runs(rng), rate, noise, arm, errors, background)
 
 
@@ -120,7 +143,8 @@ def target_multiple(plan: Plan, number: int) -> float:
     golden = (np.sqrt(5) - 1) / 2
     start = random_stream("sizes", plan.seed, plan.tier).random()
     share = (start + golden * plan.index + 0.381966 * number) % 1
-    return float(MIN_MULTIPLE * (MAX_MULTIPLE / MIN_MULTIPLE) ** share)
+    low, high = PLAN.multiples
+    return float(low * (high / low) ** share)
 
 
 def _allowed_effects(plan: Plan) -> tuple[type[HiddenEffect], ...]:
@@ -158,11 +182,11 @@ def _draw_noise_kind(rng: np.random.Generator, kind: CaseKind, realistic: bool, 
 def _draw_arm(rng: np.random.Generator, made: Machine, off: bool, kind: CaseKind) -> tuple[Arm, tuple[float, ...]]:
     """The arm with links that are 3-10 % off (a decoy of the clean tier: up to 20 %), and how much each is."""
     arm, errors = made.arm, list[float]()
-    most = 0.2 if kind == "decoy" else 0.1
+    error_range = PLAN.decoy_link_error if kind == "decoy" else PLAN.link_error
     if not off:
         return arm, ()
     for number, link in enumerate(arm.links or ()):
-        error = float(rng.uniform(0.03, most))
+        error = float(rng.uniform(*error_range))
         mass, spread = 1 + error * rng.choice([-1, 1]), 1 + error * rng.uniform(-1, 1)
         reach = float(np.linalg.norm(np.array(link.first_moment))) / link.mass
         shift = error * max(reach, 0.02) * rng.uniform(-1, 1, 3)
@@ -174,12 +198,12 @@ def _draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEff
     """Coulomb and viscous friction on every joint, offsets on half of them."""
     out: list[HiddenEffect] = []
     for joint in range(made.joints):
-        level, slope, offset = rng.uniform((0.02, 0.02, 0.002), (0.07, 0.07, 0.01)).tolist()
+        level, slope, offset = rng.uniform(*PLAN.coulomb), rng.uniform(*PLAN.viscous), rng.uniform(*PLAN.offset)
         out += [
             Coulomb(joint, torque_share(level, made, joint), np.inf, "sign", {"width": 0.0}),
             Viscous(joint, torque_share(slope, made, joint), np.inf, "linear", {"phase": 0.0}),
         ]
-        if rng.random() < 0.5:
+        if rng.random() < PLAN.offset_share:
             size, direction = torque_share(offset, made, joint), float(rng.choice([-1, 1]))
             out.append(Offset(joint, size, np.inf, "constant", {"direction": direction}))
     return tuple(out)
@@ -189,5 +213,5 @@ def _draw_runs(rng: np.random.Generator) -> tuple[RunPlan, ...]:
     """Two or three runs of one or two families, and one of another family to validate."""
     families = [str(name) for name in rng.permutation(list(FAMILIES))]
     number = int(rng.integers(2, 4))
-    identify = [RunPlan(families[run % 2], float(rng.uniform(10, 15)), "identify") for run in range(number)]
-    return (*identify, RunPlan(families[2], float(rng.uniform(10, 12)), "validate"))
+    identify = [RunPlan(families[run % 2], float(rng.uniform(*PLAN.identify_s)), "identify") for run in range(number)]
+    return (*identify, RunPlan(families[2], float(rng.uniform(*PLAN.validate_s)), "validate"))

@@ -29,8 +29,26 @@ from problem.motion import Motion
 from problem.regressor import observation_matrix, rigid_body_torque
 
 FINE_HZ, COARSE_HZ = 8000, 2000
-INNER_LOOP_S = 0.04  # time within which the inner loops take up a change of friction
 MARGIN_S = 0.25  # simulated before the first and after the last sample: the start dies away, intervals fit
+
+
+@dataclass(frozen=True)
+class ServoSettings:
+    """The servos that a case draws; chosen by eye, in the range of industrial drives.
+
+    bandwidth_hz, damping: ranges of the loop of each joint. model_error: range of the factors on the links that the
+    feed-forward assumes. compensated: range of the share of the usual friction that the feed-forward makes up for.
+    inner_loop_s: time within which the inner loops take up a change of friction.
+    """
+
+    bandwidth_hz: tuple[float, float] = (12, 25)
+    damping: tuple[float, float] = (0.7, 1.1)
+    model_error: tuple[float, float] = (0.9, 1.1)
+    compensated: tuple[float, float] = (0.6, 0.95)
+    inner_loop_s: float = 0.04
+
+
+SERVOS = ServoSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +74,11 @@ class Reference:
 
 def draw_controller(rng: np.random.Generator, nominal: Arm) -> Controller:
     """Servos with 12-25 Hz and a feed-forward whose links are off by up to a tenth."""
-    bandwidth = 2 * np.pi * rng.uniform(12, 25, len(nominal))
-    damping = rng.uniform(0.7, 1.1, len(nominal))
+    bandwidth = 2 * np.pi * rng.uniform(*SERVOS.bandwidth_hz, len(nominal))
+    damping = rng.uniform(*SERVOS.damping, len(nominal))
     inertia = mean_inertia(nominal)
-    model = scale_links(nominal, rng.uniform(0.9, 1.1, len(nominal)))
-    compensated = rng.uniform(0.6, 0.95, len(nominal))
+    model = scale_links(nominal, rng.uniform(*SERVOS.model_error, len(nominal)))
+    compensated = rng.uniform(*SERVOS.compensated, len(nominal))
     return Controller(inertia * bandwidth**2, 2 * damping * inertia * bandwidth, model, compensated)
 
 
@@ -109,7 +127,7 @@ def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Referenc
     wanted = _differentiate_reference(reference.position, step)
     forward = rigid_torque(controller.model, wanted)
     gains = controller.position_gain * wanted.position + controller.velocity_gain * wanted.velocity
-    width = round(INNER_LOOP_S / step)
+    width = round(SERVOS.inner_loop_s / step)
     control = gains + forward - moving_average(moving_average(taken, width), width)
     states = _roll_out(made, wanted, control, _initial_twists(arm, parts, wanted))
     return _make_track(made, controller, reference.time, states, control)

@@ -36,9 +36,47 @@ from armlab.concealed.simulate import (
     simulate_runs,
 )
 
-ORACLE_HZ = 250.0  # rows a second: means over 4 ms
-FAMILY_WISE_LEVEL, ORACLE_POWER = 0.01, 0.9
-MIN_COLUMN_POWER = 1e-10  # share of a column's power that counts as rounding
+
+@dataclass(frozen=True)
+class OracleSettings:
+    """The definition of the detection limit; chosen before any diagnosis was scored.
+
+    rate_hz: rows a second, each a mean over several samples. family_wise_level: chance of a false alarm over all
+    effects and places. power: chance to find an effect of one limit. min_column_power: smallest share of the power of
+    free columns that counts as more than rounding. end_s: time left out at the end of a run, s.
+    """
+
+    rate_hz: float = 250.0
+    family_wise_level: float = 0.01
+    power: float = 0.9
+    min_column_power: float = 1e-10
+    end_s: float = 0.05
+
+
+@dataclass(frozen=True)
+class SizingSettings:
+    """The search for a size; chosen by trial on development sets.
+
+    max_draws: draws of effects on one arm; the last one is kept although it cannot be seen. min_target_share: share
+    of the target multiple that counts as seen. max_steps, tolerance: of the search on reference tracks, the tolerance
+    as logarithm of the multiple. min_multiple, max_factor: smallest multiple that is divided by, and longest step of
+    the size. exponents: range of the power of the size that a multiple may follow. max_coarse_passes,
+    coarse_tolerance: of the search on coarse simulations. max_halvings: shorter steps where a simulation runs away.
+    """
+
+    max_draws: int = 6
+    min_target_share: float = 0.6
+    max_steps: int = 4
+    tolerance: float = 0.03
+    min_multiple: float = 1e-9
+    max_factor: float = 1e3
+    exponents: tuple[float, float] = (0.25, 3.0)
+    max_coarse_passes: int = 6
+    coarse_tolerance: float = 0.1
+    max_halvings: int = 3
+
+
+ORACLE, SIZING = OracleSettings(), SizingSettings()
 
 
 def candidate_count(joints: int) -> int:
@@ -50,8 +88,8 @@ def candidate_count(joints: int) -> int:
 @lru_cache(maxsize=32)
 def limit_noncentrality(joints: int) -> float:
     """Noncentrality of a chi-square of one degree of freedom that is found with 90 % power."""
-    critical = chi2.isf(FAMILY_WISE_LEVEL / candidate_count(joints), 1)
-    return float(brentq(lambda value: ncx2.sf(critical, 1, value) - ORACLE_POWER, 1.0, 200.0))
+    critical = chi2.isf(ORACLE.family_wise_level / candidate_count(joints), 1)
+    return float(brentq(lambda value: ncx2.sf(critical, 1, value) - ORACLE.power, 1.0, 200.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +124,11 @@ class Oracle:
         """Whitened rows (samples * joints, columns)."""
         thinned = Noise(
             self.noise.kind,
-            self.noise.white * np.sqrt(min(ORACLE_HZ / self.rate_hz, 1.0)),  # of a mean over several samples
+            self.noise.white * np.sqrt(min(ORACLE.rate_hz / self.rate_hz, 1.0)),  # of a mean over several samples
             self.noise.coloured,
             self.noise.corner_hz,
         )
-        out = [thinned.whitened(columns[:, joint], joint, ORACLE_HZ) for joint in range(columns.shape[1])]
+        out = [thinned.whitened(columns[:, joint], joint, ORACLE.rate_hz) for joint in range(columns.shape[1])]
         return np.vstack(out)
 
 
@@ -106,14 +144,8 @@ def _orthonormal_basis(columns: Array) -> Array:
     lengths = np.linalg.norm(columns, axis=0)
     scaled = columns[:, lengths > 0] / lengths[lengths > 0]
     power, axes = np.linalg.eigh(scaled.T @ scaled)
-    kept = power > MIN_COLUMN_POWER
+    kept = power > ORACLE.min_column_power
     return np.asarray(scaled @ (axes[:, kept] / np.sqrt(power[kept])))
-
-
-MAX_EFFECT_DRAWS = 6  # draws of effects that cannot be seen on this arm, before one is taken as it is
-MIN_TARGET_SHARE = 0.6  # of the multiple aimed at
-MAX_SIZE_STEPS, MULTIPLE_TOLERANCE = 4, 0.03  # of the search for a size, and when it ends
-SIZE_EXPONENT_RANGE, MAX_SIZE_FACTOR = (0.25, 3.0), 1e3  # of the size that a multiple may follow, and the longest step
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,13 +170,13 @@ def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
     oracle, passed_over = make_oracle(plan, tracks), list[str]()
     motors = [track.load + law_torque(plan.background, track, 0) for track in _identification_tracks(plan, tracks)]
     peak = np.max([np.abs(torque).max(axis=0) for torque in motors], axis=0)
-    for attempt in range(MAX_EFFECT_DRAWS):
+    for attempt in range(SIZING.max_draws):
         hidden = tuple(effect.with_peak_torque(peak) for effect in draw_effects(plan, attempt))
         targets = tuple(target_multiple(plan, number) for number in range(len(hidden)))
         sized, seen = SizedEffects(hidden, targets, tuple(passed_over)), True
         for number, target in enumerate(targets):
             sized, found = _scale_to_multiple(plan, oracle, sized, number, tracks, target)
-            seen = seen and found > MIN_TARGET_SHARE * target
+            seen = seen and found > SIZING.min_target_share * target
         if seen:
             break
         passed_over += [effect.effect for effect in hidden]
@@ -165,8 +197,8 @@ def next_size(tried: Sequence[tuple[float, float]], target: float) -> float:
     power = 1.0
     if len(tried) > 1 and tried[-2][0] != size:
         before, then = tried[-2]
-        power = float(np.clip(np.log(found / then) / np.log(size / before), *SIZE_EXPONENT_RANGE))
-    return float(size * np.clip((target / found) ** (1 / power), 1 / MAX_SIZE_FACTOR, MAX_SIZE_FACTOR))
+        power = float(np.clip(np.log(found / then) / np.log(size / before), *SIZING.exponents))
+    return float(size * np.clip((target / found) ** (1 / power), 1 / SIZING.max_factor, SIZING.max_factor))
 
 
 def effect_multiples(plan: Plan, hidden: Sequence[HiddenEffect], tracks: Sequence[Track]) -> tuple[float, ...]:
@@ -207,9 +239,9 @@ def _scale_to_multiple(
     if sized.hidden[number].has_parts:
         return sized, target
     found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
-    for _ in range(MAX_SIZE_STEPS):
-        factor = float(np.clip(target / max(found, 1e-9), 1e-3, 1e3))
-        if abs(np.log(factor)) < MULTIPLE_TOLERANCE:
+    for _ in range(SIZING.max_steps):
+        factor = float(np.clip(target / max(found, SIZING.min_multiple), 1 / SIZING.max_factor, SIZING.max_factor))
+        if abs(np.log(factor)) < SIZING.tolerance:
             break
         sized = sized.with_size(number, sized.hidden[number].size * factor)
         found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
@@ -222,11 +254,7 @@ def _identification_tracks(plan: Plan, tracks: Sequence[Track]) -> list[Track]:
 
 
 def _grid(track: Track) -> Array:
-    return np.asarray(np.arange(0.0, track.time[-1] - 0.05, 1 / ORACLE_HZ))
-
-
-MAX_COARSE_PASSES, MAX_HALVINGS = 6, 3
-COARSE_MULTIPLE_TOLERANCE = 0.1  # of the logarithm of the multiple aimed at
+    return np.asarray(np.arange(0.0, track.time[-1] - ORACLE.end_s, 1 / ORACLE.rate_hz))
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,12 +313,12 @@ def _search_size(
     """The effect with parts at the size that comes nearest, and the tracks that it leads to."""
     target, tried = sized.targets[number], list[tuple[float, float]]()
     best = (np.inf, sized, coarse)
-    for more in reversed(range(MAX_COARSE_PASSES)):
-        found = max(effect_multiple(plan, make_oracle(plan, coarse), sized.hidden, number, coarse), 1e-9)
+    for more in reversed(range(SIZING.max_coarse_passes)):
+        found = max(effect_multiple(plan, make_oracle(plan, coarse), sized.hidden, number, coarse), SIZING.min_multiple)
         tried.append((sized.hidden[number].size, found))
         best = min(best, (abs(float(np.log(found / target))), sized, coarse), key=lambda each: each[0])
         aimed = sized.with_size(number, next_size(tried, target))
-        if not more or best[0] < COARSE_MULTIPLE_TOLERANCE or aimed.hidden[number].size == tried[-1][0]:
+        if not more or best[0] < SIZING.coarse_tolerance or aimed.hidden[number].size == tried[-1][0]:
             break
         played = _simulate_toward_size(plan, sized, aimed, number, controller, wanted)
         if played is None:
@@ -303,7 +331,7 @@ def _simulate_toward_size(
     plan: Plan, sized: SizedEffects, aimed: SizedEffects, number: int, controller: Controller, wanted: Sequence[Track]
 ) -> tuple[SizedEffects, tuple[Track, ...]] | None:
     """Coarse tracks at the size aimed at, or on the way to it where the engine's step cannot follow that."""
-    for _ in range(MAX_HALVINGS):
+    for _ in range(SIZING.max_halvings):
         try:
             return aimed, simulate_runs(
                 plan, aimed.hidden, controller, wanted, [coarse_track(track) for track in wanted]

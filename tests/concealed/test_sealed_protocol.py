@@ -15,7 +15,7 @@ from armlab.cli.proof import score as score_command
 from armlab.common.errors import InputError
 from armlab.concealed.formats import SetManifest, Truth, read_model
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS
-from armlab.concealed.plan import DEVELOPMENT_SEEDS, MIN_MULTIPLE, draw_plan, target_multiple
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, PLAN, draw_plan, target_multiple
 from armlab.concealed.prove import diagnose_all, judged_seed
 from armlab.concealed.score.cases import FAILURE_FILE
 from armlab.concealed.score.scoring import score_set
@@ -139,7 +139,7 @@ def test_a_judged_seed_follows_from_the_commit_and_is_no_development_seed() -> N
 
 def test_sizes_spread_evenly_from_half_a_limit_to_twenty() -> None:
     sizes = [target_multiple(draw_plan(1000, index, "clean", False, True), 0) for index in range(60)]
-    assert MIN_MULTIPLE <= min(sizes) < 0.6
+    assert PLAN.multiples[0] <= min(sizes) < 0.6
     assert 17 < max(sizes) <= 20
     counts, _ = np.histogram(np.log(sizes), bins=6, range=(np.log(0.5), np.log(20)))
     assert counts.min() >= 8

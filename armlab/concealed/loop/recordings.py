@@ -29,27 +29,44 @@ from armlab.concealed.simulate import (
 )
 from armlab.concealed.sizing import SimulatedCase, SizedEffects, correct_sizes, effect_multiples, resize_effects
 
-POOR_LENGTH_S = 8.0
-POOR_RUNS = (RunPlan("poor", POOR_LENGTH_S, "identify"), RunPlan("poor", POOR_LENGTH_S, "validate"))
-POOR_FREQUENCY_HZ = (0.2, 0.45)
-POOR_SWING = (0.15, 0.4)  # of the range
-POOR_VIGOUR = (0.2, 0.6)  # of the speed and the acceleration that the arm is used with
+
+@dataclass(frozen=True)
+class LoopDraws:
+    """What the cases of a closed loop are drawn from; chosen on development seeds, so that verdicts are in doubt.
+
+    arm: the only arm. length_s, frequency_hz: of a poor first motion. swing: its amplitude, share of the used range.
+    vigour: its speed and acceleration, share of what the arm is used with. realistic_share: share of the draws.
+    multiples: detection limits of the hidden effect in the first recording. cell_share: speeds, accelerations and
+    ranges of all second motions, share of what the arm is used with.
+    """
+
+    arm: str = "irb120-arm"
+    length_s: float = 8.0
+    frequency_hz: tuple[float, float] = (0.2, 0.45)
+    swing: tuple[float, float] = (0.15, 0.4)
+    vigour: tuple[float, float] = (0.2, 0.6)
+    realistic_share: float = 0.3
+    multiples: tuple[float, float] = (1.0, 2.5)
+    cell_share: float = 0.35
+
+
+LOOP = LoopDraws()
+POOR_RUNS = (RunPlan("poor", LOOP.length_s, "identify"), RunPlan("poor", LOOP.length_s, "validate"))
 
 
 def poor_reference(rng: np.random.Generator, time: Array, machine: Machine) -> Array:
     """One sine a joint about a place of its own, nearly at one frequency for all, (steps, joints), rad."""
     low, high = machine.range
     middle, reach = (low + high) / 2, USED_RANGE * np.minimum((high - low) / 2, 2.0)
-    pulse = 2 * np.pi * rng.uniform(*POOR_FREQUENCY_HZ) * rng.uniform(0.9, 1.1, machine.joints)
+    pulse = 2 * np.pi * rng.uniform(*LOOP.frequency_hz) * rng.uniform(0.9, 1.1, machine.joints)
     allowed = np.minimum(machine.speed / pulse, machine.acceleration / pulse**2)
     swing = np.minimum(
-        rng.uniform(*POOR_SWING, machine.joints) * reach, rng.uniform(*POOR_VIGOUR, machine.joints) * allowed
+        rng.uniform(*LOOP.swing, machine.joints) * reach, rng.uniform(*LOOP.vigour, machine.joints) * allowed
     )
     place = middle + rng.uniform(-0.6, 0.6, machine.joints) * (reach - swing)
     return np.asarray(place + swing * np.sin(np.outer(time, pulse) + rng.uniform(0, 2 * np.pi, machine.joints)))
 
 
-LOOP_ARM = "irb120-arm"
 # (hidden, what it is taken for); what no motion can leave alone is not hidden: cables, rotors, loads, gains
 CONFUSABLE_PAIRS = (
     ("time_delay", "viscous_friction"),
@@ -67,9 +84,6 @@ CONFUSABLE_PAIRS = (
     ("torque_offset", "encoder_offset"),
     ("joint_elasticity", "time_delay"),
 )
-TIERS: tuple[Tier, ...] = ("clean", "realistic")
-REALISTIC_SHARE = 0.3  # of the draws
-TARGET_MULTIPLES = (1.0, 2.5)  # detection limits that the hidden effect has in the first recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,13 +100,12 @@ def draw_case(seed: int, case: int, attempt: int) -> CaseDraw:
     """The attempt-th draw of a case: the pairs in turn, with and without usual friction and links that are off."""
     rng = random_stream("loop", seed, case, attempt)
     pair = CONFUSABLE_PAIRS[(case + attempt) % len(CONFUSABLE_PAIRS)]
-    tier = TIERS[
-        int(rng.random() < REALISTIC_SHARE and pair[0] not in BACKGROUND_EFFECTS)
-    ]  # what every joint has cannot be hidden
+    realistic = rng.random() < LOOP.realistic_share and pair[0] not in BACKGROUND_EFFECTS  # these are on every joint
+    tier: Tier = "realistic" if realistic else "clean"
     plan = _draw_plan(seed, case, attempt, tier)
     kind = next(each for each in LIBRARY if each.effect == pair[0])
     joint = int(rng.choice(list(kind.places(plan.machine))))
-    target = float(np.exp(rng.uniform(*np.log(TARGET_MULTIPLES))))
+    target = float(np.exp(rng.uniform(*np.log(LOOP.multiples))))
     return CaseDraw(plan, pair, kind.draw(rng, plan.machine, joint), target)
 
 
@@ -101,12 +114,9 @@ def _draw_plan(seed: int, case: int, attempt: int, tier: Tier) -> Plan:
     for number in range(1000):
         index = (100 * case + attempt) * 1000 + number
         plan = draw_plan(seed, index, tier, only_nulls=False, development=seed in DEVELOPMENT_SEEDS)
-        if plan.machine.name == LOOP_ARM and plan.kind in ("single", "pair", "triple"):
+        if plan.machine.name == LOOP.arm and plan.kind in ("single", "pair", "triple"):
             return replace(plan, kind="single", runs=POOR_RUNS, rate_hz=min(plan.rate_hz, 500))
-    raise ValueError(f"no plan of seed {seed} is about {LOOP_ARM}")
-
-
-CELL_SHARE = 0.35  # of the speeds, accelerations and ranges: a narrow cell, alike for all kinds of second motion
+    raise ValueError(f"no plan of seed {seed} is about {LOOP.arm}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +129,7 @@ class FirstRecording:
 
 def simulate_first_recording(drawn: CaseDraw) -> FirstRecording:
     """Simulates the poor motion with the effect at the size aimed at."""
-    plan, time = drawn.plan, run_times(POOR_LENGTH_S, FINE_HZ)
+    plan, time = drawn.plan, run_times(LOOP.length_s, FINE_HZ)
     wanted = [
         track_reference(plan, time, poor_reference(plan.stream(f"motion {run}"), time, plan.machine))
         for run in range(2)
@@ -158,9 +168,9 @@ def limited_robot_file(machine: Machine) -> dict[str, object]:
     """The robot file for a narrow cell: a share of the speeds, accelerations and ranges that the arm is used with."""
     settings = machine.settings()
     low, high = machine.range
-    middle, reach = (low + high) / 2, CELL_SHARE * USED_RANGE * np.minimum((high - low) / 2, 2.0)
+    middle, reach = (low + high) / 2, LOOP.cell_share * USED_RANGE * np.minimum((high - low) / 2, 2.0)
     for joint, entry in enumerate(settings["joints"]):
         entry["position_limits"] = [float(middle[joint] - reach[joint]), float(middle[joint] + reach[joint])]
-        entry["velocity_limit"] = float(CELL_SHARE * machine.speed[joint])
-        entry["acceleration_limit"] = float(CELL_SHARE * machine.acceleration[joint])
+        entry["velocity_limit"] = float(LOOP.cell_share * machine.speed[joint])
+        entry["acceleration_limit"] = float(LOOP.cell_share * machine.acceleration[joint])
     return settings
