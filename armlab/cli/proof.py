@@ -1,19 +1,21 @@
-"""Commands that put the concealed cases and the diagnosis together: what each guard is worth, and the closed loop."""
+"""Commands on concealed cases: make and score them, the proof, the value of each guard, and the closed loop."""
 
 from pathlib import Path
 
 import click
 
+_FOLDER = click.Path(path_type=Path)
+
 
 @click.command()
-@click.option("--seed", type=int, default=1950, show_default=True, help="One for development, 1000-1999.")
+@click.option("--seed", type=int, default=1950, show_default=True, help="A development seed, 1000-1999.")
 @click.option("--cases", type=click.IntRange(min=1), default=50, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=1), default=50, show_default=True, help="Cases with nothing hidden.")
-@click.option("--work", type=click.Path(path_type=Path), default=Path(".armlab/ablation"), show_default=True)
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results/proof"), show_default=True)
+@click.option("--work", type=_FOLDER, default=Path(".armlab/ablation"), show_default=True)
+@click.option("--results", type=_FOLDER, default=Path("results/proof"), show_default=True)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int) -> None:
-    """Diagnose concealed cases with each guard off in turn: what is it worth? (extra `engines`)"""
+    """Measure the value of each guard of the diagnosis on concealed cases (extra `engines`)."""
     from armlab.concealed.ablation import AblationSettings
     from armlab.concealed.ablation import ablate as run
     from armlab.diagnosis.ablation import verdicts_without_each
@@ -22,19 +24,19 @@ def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: i
         click.echo(line)
 
 
-_LOOP_FOLDER = click.Path(path_type=Path)
-
-
 @click.command("next-loop")
-@click.option("--cases", type=click.IntRange(min=1), default=60, show_default=True, help="Ambiguous ones.")
+@click.option("--cases", type=click.IntRange(min=1), default=60, show_default=True, help="How many ambiguous cases.")
 @click.option("--seed", type=int, required=True, help="1000-1999 are for development.")
 @click.option(
-    "--out", type=_LOOP_FOLDER, required=True, help="Folder for recordings, answers and verdicts; goes on there."
+    "--out",
+    type=_FOLDER,
+    required=True,
+    help="Folder for recordings, answers and verdicts; an interrupted loop continues.",
 )
-@click.option("--results", type=_LOOP_FOLDER, help="Folder for table and picture [default: OUT/score].")
+@click.option("--results", type=_FOLDER, help="Folder for table and picture [default: OUT/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> None:
-    """Ambiguous recording, diagnosis, second motion, both diagnosed: how often is the right name left? (`engines`)"""
+    """Count how often a second motion settles an ambiguous diagnosis (extra `engines`)."""
     from tqdm import tqdm
 
     from armlab.cli.second_motion import plan_second_motion
@@ -59,17 +61,14 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
         click.echo(f"wrote {path}")
 
 
-_PROOF_FOLDER = click.Path(path_type=Path)
-
-
 @click.command()
 @click.option("--cases", type=click.IntRange(min=1), required=True, help="How many recordings.")
 @click.option("--seed", type=int, required=True, help="1000-1999 are for development.")
 @click.option("--tier", type=click.Choice(["clean", "realistic", "both"]), default="both", show_default=True)
 @click.option("--kind", type=click.Choice(["mixed", "nulls"]), default="mixed", show_default=True)
-@click.option("--development", is_flag=True, help="Leave out what is kept for judged sets.")
+@click.option("--development", is_flag=True, help="Leave out the kinds of noise of judged sets.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
-@click.option("--out", type=_PROOF_FOLDER, required=True, help="Folder for observations, truth and manifest.")
+@click.option("--out", type=_FOLDER, required=True, help="Folder for observations, truth and manifest.")
 def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs: int, out: Path) -> None:
     """Make recordings with hidden effects, and seal the answers (extra `engines`)."""
     from tqdm import tqdm
@@ -84,10 +83,10 @@ def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs
 
 
 @click.command()
-@click.argument("folder", type=_PROOF_FOLDER)
-@click.option("--verdicts", type=_PROOF_FOLDER, required=True, help="Folder with a verdict.json a case.")
+@click.argument("folder", type=_FOLDER)
+@click.option("--verdicts", type=_FOLDER, required=True, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
-@click.option("--out", type=_PROOF_FOLDER, help="Folder for the score [default: VERDICTS/score].")
+@click.option("--out", type=_FOLDER, help="Folder for the score [default: VERDICTS/score].")
 def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> None:
     """Compare verdicts with the sealed answers of the concealed set in FOLDER."""
     from armlab.concealed.score.scoring import format_lines
@@ -98,17 +97,17 @@ def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) 
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="24 cases of a fixed development seed, kept out of the log.")
-@click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, kept out of the log.")
+@click.option("--quick", is_flag=True, help="24 cases of a fixed development seed, not logged.")
+@click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, not logged.")
 @click.option("--cases", type=click.IntRange(min=0), default=400, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=0), default=600, show_default=True, help="Cases with nothing hidden.")
-@click.option("--work", type=_PROOF_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
-@click.option("--results", type=_PROOF_FOLDER, help="Folder for scores [default: results/proof].")
+@click.option("--work", type=_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
+@click.option("--results", type=_FOLDER, help="Folder for scores [default: results/proof].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def prove(
     quick: bool, development: int | None, cases: int, nulls: int, work: Path | None, results: Path | None, jobs: int
 ) -> None:
-    """Conceal, diagnose blindly, score, and log; what was interrupted goes on (extra `engines`)."""
+    """Conceal, diagnose blindly, score, and log; an interrupted proof continues (extra `engines`)."""
     from armlab.concealed.prove import choose_proof
     from armlab.concealed.prove import prove as run
 

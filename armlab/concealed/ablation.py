@@ -1,4 +1,4 @@
-"""The value of each guard of the diagnosis: the same concealed cases again with one guard off at a time."""
+"""The value of each guard of the diagnosis: the same concealed cases with one guard off at a time."""
 
 import json
 import shutil
@@ -29,7 +29,7 @@ DiagnoseWithGuards = Callable[[Path], dict[str, dict[str, Any]]]
 
 @dataclass(frozen=True)
 class AblationSettings:
-    """A development set."""
+    """A development seed, and the number of its mixed cases and of its nulls."""
 
     seed: int
     cases: int
@@ -39,10 +39,10 @@ class AblationSettings:
 def ablate(
     settings: AblationSettings, diagnose: DiagnoseWithGuards, work: Path, results: Path, jobs: int
 ) -> Iterator[str]:
-    """Does what is missing, tells how far it is, and writes guards.md and guards.json into `results`.
+    """Diagnoses development sets with each guard off, and writes guards.md and guards.json into `results`.
 
-    diagnose: given a recording folder, verdicts by the name of the guard that is off, the one with all on first.
-    What was interrupted goes on; what was finished is diagnosed anew.
+    Yields lines that report the progress. diagnose: from a recording folder, verdicts by the name of the guard that is
+    off; the verdict with all guards on comes first. An interrupted ablation continues; a finished one starts again.
     """
     if (work / FINISHED_MARK).is_file():
         shutil.rmtree(work)
@@ -68,7 +68,7 @@ def ablate(
 
 
 def _write_verdicts(diagnose: DiagnoseWithGuards, observation: Path, verdicts: Path) -> None:
-    """Writes a case's verdicts, a folder a guard; the mark that it is done comes last."""
+    """Writes the verdicts of a case, one folder a guard. The mark that the case is done comes last."""
     found = diagnose(observation)
     for guard, verdict in found.items():
         own = verdicts / guard / observation.name
@@ -80,7 +80,7 @@ def _write_verdicts(diagnose: DiagnoseWithGuards, observation: Path, verdicts: P
 
 
 def render_page(settings: AblationSettings, found: dict[str, dict[str, Any]]) -> str:
-    """A table a tier: a row for each guard that was off."""
+    """One table a tier, with one row for each guard that was off."""
     tiers = sorted({tier for sets in found.values() for each in sets.values() for tier in each})
     about = f"{settings.cases} cases and {settings.nulls} with nothing hidden, of development seed {settings.seed}."
     parts = ["# What each guard is worth", f"{about} Share, and how often it was counted."]
@@ -97,7 +97,7 @@ def _table_row(guard: str, sets: dict[str, Any], tier: str) -> str:
 
 
 def _table_cell(id: str, sets: dict[str, Any], tier: str) -> str:
-    """The measure in the set that counted it most often: nulls in the set of nulls, names in the mixed one."""
+    """The measure in the set with the largest count: nulls in the set of nulls, names in the mixed set."""
     counted: Sequence[dict[str, Any]] = [
         each for found in sets.values() for each in found.get(tier, []) if each["id"] == id
     ]

@@ -1,4 +1,4 @@
-"""The files of a case: runs as a drive logs them, the recording that a diagnosis may see, and the answer."""
+"""The files of a case: runs as a drive logs them, the recording for the diagnosis, and the answer."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +31,7 @@ class LoggingSettings:
     """How a drive logs a run; chosen by eye, in the range of industrial drives.
 
     encoder_bits: range of the resolution, steps a joint turn as powers of two, gear included; the end is left out.
-    uneven_share: share of the cases whose samples are taken unevenly and stamped well. jitter_s: of stamps that are
+    uneven_share: share of the cases with uneven samples and exact stamps. jitter_s: of stamps that are
     late while the samples are even. torque_resolution_nm, time_resolution_s: what a file keeps of a number.
     """
 
@@ -78,7 +78,7 @@ def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
 
 
 def _sample_instants(case: SimulatedCase, run: int, rng: np.random.Generator, noisy: bool) -> tuple[Array, Array]:
-    """Stamps and true instants: even samples with late stamps, or samples taken unevenly and stamped well."""
+    """Stamps and true instants, s: even samples with late stamps, or uneven samples with exact stamps."""
     plan = case.plan
     even = np.arange(round(plan.runs[run].length_s * plan.rate_hz)) / plan.rate_hz
     if not noisy:

@@ -1,4 +1,4 @@
-"""The arms in MuJoCo: bodies, joints, rotors, hidden parts with own joints, and the track of a simulated run."""
+"""The arms in MuJoCo: bodies, joints, rotors, hidden parts with joints of their own, and tracks of simulated runs."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,7 +55,7 @@ class Track:
         return self.motion.acceleration
 
     def at(self, time: Array) -> "Track":
-        """The track at other instants, by straight lines."""
+        """The track at other instants, interpolated linearly."""
         position = _interpolate(time, self.time, self.position)
         velocity = _interpolate(time, self.time, self.velocity)
         acceleration = _interpolate(time, self.time, self.acceleration)
@@ -64,7 +64,7 @@ class Track:
     def means(self, signal: Array, centre: Array, width_s: float) -> Array:
         """Mean of a signal (steps, joints) over an interval about each instant of `centre` (samples, joints).
 
-        This is how drives log torque; the interval is symmetric, so that nothing is late.
+        Drives log torque in this way. The interval is centred on the instant, so that the mean has no delay.
         """
         integral = np.vstack([np.zeros((1, signal.shape[1])), np.cumsum((signal[1:] + signal[:-1]) / 2, axis=0)])
         late, early = centre + width_s / 2, centre - width_s / 2
@@ -81,7 +81,10 @@ def _interpolate(time: Array, known: Array, signal: Array) -> Array:
 
 
 DISABLED_FEATURES = ("EULERDAMP", "CONTACT", "WARMSTART", "SENSOR", "FRICTIONLOSS", "EQUALITY")  # no arm needs them
-TINY_MASS, TINY_INERTIA = 1e-8, 1e-9  # of a body between two joints of one axis; MuJoCo wants more than nothing
+TINY_MASS, TINY_INERTIA = (
+    1e-8,
+    1e-9,
+)  # kg, kg m2, of a body between two joints of one axis: MuJoCo needs positive values
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,7 @@ class Parts:
     pendulum: Pendulum | None = None
 
     def __add__(self, other: "Parts") -> "Parts":
-        """Both together; of two mounts or pendulums the first."""
+        """The parts of both; the first of two mounts or pendulums."""
         return Parts(self.springs + other.springs, self.mount or other.mount, self.pendulum or other.pendulum)
 
 

@@ -89,7 +89,7 @@ class Noise:
 
 
 def draw_noise(rng: np.random.Generator, kind: str, rating: Array, realistic: bool) -> Noise:
-    """Noise of some tenths of a per cent of the rating; coloured noise is the stronger in the realistic tier."""
+    """Noise of the level of `NOISE`; its coloured part is larger in the realistic tier."""
     low, high = NOISE.level
     level = rating * np.exp(rng.uniform(np.log(low), np.log(high), len(rating)))
     share = NOISE.white_coloured_share

@@ -95,11 +95,11 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """A name that tells nothing."""
+        """A random name, which says nothing about the case."""
         return random_stream("name", self.seed, self.tier, self.index, self.kind == "null").bytes(6).hex()
 
     def stream(self, what: str) -> np.random.Generator:
-        """The case's random numbers for one purpose."""
+        """Random numbers of the case for one purpose."""
         return random_stream(what, self.seed, self.tier, self.index)
 
 
@@ -117,9 +117,10 @@ def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: 
 
 
 def draw_effects(plan: Plan, attempt: int) -> tuple[HiddenEffect, ...]:
-    """The effects of a case with their usual sizes; the next attempt where they cannot be seen.
+    """The effects of a case with their usual sizes.
 
-    No two at one joint of one channel: an effect comes once a case, and only one needs parts of its own.
+    attempt: counts the draws; another one is made if the effects cannot be seen on the arm. An effect comes at most
+    once in a case, and at most one effect needs parts of its own.
     """
     rng = random_stream("effects", plan.seed, plan.tier, plan.index, attempt)
     library = OUTSIDE if plan.kind == "outside" else _allowed_effects(plan)
@@ -148,7 +149,7 @@ def target_multiple(plan: Plan, number: int) -> float:
 
 
 def _allowed_effects(plan: Plan) -> tuple[type[HiddenEffect], ...]:
-    """In the realistic tier without what is in the background anyway."""
+    """The library, in the realistic tier without the effects of the background."""
     return tuple(kind for kind in LIBRARY if not plan.realistic or kind.effect not in BACKGROUND_EFFECTS)
 
 

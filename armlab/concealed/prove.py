@@ -1,7 +1,7 @@
 """The blind proof: conceal, seal, diagnose each case in a process of its own, score, and log the result.
 
-The diagnosis is reached through the command line only. It is given a copy of one recording folder, in a place from
-which no path leads to the answers.
+The diagnosis is run through the command line only. It gets a copy of one recording folder, in a temporary folder that
+holds no answers.
 """
 
 import json
@@ -34,7 +34,7 @@ FINISHED_MARK = "finished"
 
 @dataclass(frozen=True)
 class Proof:
-    """The sets of one proof, and its name. commit: of the source tree, None for one that is not judged."""
+    """The sets of one proof, and its name. commit: of the source tree, None for a proof that is not judged."""
 
     sets: dict[str, SetSettings]
     name: str
@@ -49,12 +49,12 @@ def choose_proof(quick: bool, development: int | None, cases: int, nulls: int) -
 
 
 def make_quick_proof() -> Proof:
-    """A small development set, always the same: to see that everything works together."""
+    """A small development set, always the same, to check the whole chain."""
     return Proof({"quick": SetSettings(QUICK_CASES, QUICK_SEED, development=True)}, QUICK_NAME)
 
 
 def make_development_proof(seed: int, cases: int, nulls: int) -> Proof:
-    """Sets to learn from, kept out of the log; InputError for a seed that is not for development."""
+    """Sets for development, which are not logged; InputError for a seed that is not for development."""
     if seed not in DEVELOPMENT_SEEDS:
         raise InputError(
             f"seed {seed} should be one for development, {DEVELOPMENT_SEEDS[0]} to {DEVELOPMENT_SEEDS[-1]}"
@@ -64,7 +64,7 @@ def make_development_proof(seed: int, cases: int, nulls: int) -> Proof:
 
 
 def make_judged_proof(cases: int, nulls: int) -> Proof:
-    """Sets whose seed follows from the commit: nobody can have tuned on them before it was made."""
+    """Sets whose seed follows from the commit, so that nobody could tune on them before the commit existed."""
     commit = _run_git("rev-parse", "HEAD")
     seed = judged_seed(commit)
     sets = {kind: SetSettings(count, seed, kind=kind) for count, kind in _set_sizes(cases, nulls)}
@@ -76,7 +76,7 @@ def _set_sizes(cases: int, nulls: int) -> tuple[tuple[int, SetKind], ...]:
 
 
 def judged_seed(commit: str) -> int:
-    """A seed from a commit's hash; never one of those for development."""
+    """A seed from the hash of a commit; never a development seed."""
     return DEVELOPMENT_SEEDS.stop + int(commit[:12], 16)
 
 
@@ -126,7 +126,7 @@ def _is_diagnosed(out: Path) -> bool:
 
 
 def _diagnose_case(observation: Path, out: Path) -> str:
-    """One diagnosis; the time is written last and says that the verdict is whole."""
+    """Diagnoses one case. The time is written last and marks the verdict as complete."""
     out.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as desk:
         copy = shutil.copytree(observation, Path(desk) / observation.name)
@@ -142,7 +142,7 @@ def _diagnose_case(observation: Path, out: Path) -> str:
 
 
 def _run_and_get_error(command: list[str]) -> str | None:
-    """Runs a command; what it said if it failed, None if it did not."""
+    """The error output of a command that failed, None for one that succeeded."""
     about: dict[str, Any] = {"env": _one_thread_environment(), "cwd": _source_root(), "timeout": TIMEOUT_S}
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False, **about)

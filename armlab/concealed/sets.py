@@ -39,7 +39,7 @@ def read_checked_manifest(
     """
     path = folder / MANIFEST_FILE
     if not path.is_file():
-        raise InputError(f"no {MANIFEST_FILE} in {folder}: it is no finished concealed set")
+        raise InputError(f"no {MANIFEST_FILE} in {folder}: this is not a finished concealed set")
     found = file_digest(path)
     if expected is not None and found != expected:
         raise InputError(f"{path} has the SHA-256 {found}, not {expected}: it is not the manifest that was sealed")
@@ -79,7 +79,7 @@ class SetSettings:
 
 
 def make_set_settings(cases: int, seed: int, tier: Any, kind: Any, development: bool) -> SetSettings:
-    """The settings of a set; seeds 1000-1999 make development sets, whatever was asked."""
+    """The settings of a set; seeds 1000-1999 always make development sets."""
     return SetSettings(cases, seed, tier, kind, development or seed in DEVELOPMENT_SEEDS)
 
 
@@ -123,13 +123,13 @@ def seal_set(settings: SetSettings, out: Path) -> tuple[list[str], str]:
 
 
 def _claim_folder(settings: SetSettings, out: Path) -> None:
-    """Notes what the folder is for, before hours of work."""
+    """Writes the settings into the folder before the cases are made, so that another set is refused there."""
     content = json.dumps(asdict(settings), indent=1) + "\n"
     note = out / SETTINGS_FILE
     if note.is_file() and note.read_text(encoding="utf-8") != content:
         raise InputError(f"{out} holds another concealed set (see {note}): choose another folder")
     if out.exists() and not note.is_file() and any(out.iterdir()):
-        raise InputError(f"{out} is there already and holds no concealed set: choose another folder")
+        raise InputError(f"{out} exists and holds no concealed set: choose another folder")
     for part in ("observations", "truth"):
         (out / part).mkdir(parents=True, exist_ok=True)
     note.write_text(content, encoding="utf-8")
@@ -140,7 +140,7 @@ def _is_done(out: Path, name: str) -> bool:
 
 
 def _make_case(settings: SetSettings, number: int, out: Path) -> str:
-    """Makes one case in a draft folder; the observation's renaming comes last, so that a cut leaves no half."""
+    """Makes one case in a draft folder. Its observation is moved last and marks the case as complete."""
     plan = settings.plan(number)
     draft = out / "drafts" / plan.name
     shutil.rmtree(draft, ignore_errors=True)

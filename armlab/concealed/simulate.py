@@ -5,9 +5,9 @@ the second difference of positions is exactly the acceleration of the torque at 
 centred afterwards; without that, every viscous torque would seem late.
 
 Effects without a place in the engine are torques that the motors give on top of what moves the mechanism. The inner
-loops of the servos take up their fast part at once; the slow part disturbs the motion, as computed on a coarser pass.
-The recorded torque is the sum of what moves the mechanism and of the laws on the very motion that was simulated.
-Motion and torque therefore fit exactly, however the servos shared the work.
+loops of the servos compensate their fast part at once; the slow part disturbs the motion, as computed on a coarser
+pass. The recorded torque is the sum of what moves the mechanism and of the laws on the motion that was simulated.
+Motion and torque therefore agree exactly.
 """
 
 from collections.abc import Sequence
@@ -118,9 +118,8 @@ def run_times(length_s: float, rate_hz: int) -> Array:
 def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Reference, taken: Array) -> Track:
     """The run of an arm with hidden parts.
 
-    taken: (steps, joints), N m, torque that effects without a place in the engine take from the motors: as it
-    was on an earlier, coarser pass.
-    Raises FloatingPointError if the simulation runs away.
+    taken: (steps, joints), N m, torque of the effects without a place in the engine, from an earlier, coarser pass.
+    Raises FloatingPointError if the simulation diverges.
     """
     step = float(reference.time[1] - reference.time[0])
     made = build_plant(arm, parts, step, (controller.position_gain, controller.velocity_gain))
@@ -139,7 +138,7 @@ def _differentiate_reference(position: Array, step: float) -> Motion:
 
 
 def _initial_twists(arm: Arm, parts: Parts, wanted: Motion) -> dict[str, float]:
-    """Springs by name with the twist that carries the first load: a start without it would ring for seconds."""
+    """Twist of each spring that carries the first load, rad, by name; without it the start would ring for seconds."""
     first = Motion(wanted.position[:1], wanted.velocity[:1], wanted.acceleration[:1])
     load = rigid_body_torque(arm, first)[0]
     return {f"spring{spring.joint}": spring.at_rest(float(load[spring.joint])) for spring in parts.springs}
@@ -226,7 +225,7 @@ def free_columns(arm: Arm, track: Track, grid: Array, friction_only: bool = Fals
 
 
 def absorbed_rotors(arm: Arm) -> list[int]:
-    """Joints (from 0) whose rotor no motion tells from the links."""
+    """Joints (from 0) whose rotor no motion separates from the links."""
     states = np.random.default_rng(0).uniform(-2, 2, (3, 200, len(arm)))
     motion = Motion(*states)
     rigid = observation_matrix(arm, motion)[:, base_parameters(arm).columns]
@@ -273,7 +272,7 @@ def arm_with_effects(plan: Plan, hidden: Sequence[HiddenEffect]) -> Arm:
 def simulate_runs(
     plan: Plan, hidden: Sequence[HiddenEffect], controller: Controller, before: Sequence[Track], wanted: Sequence[Track]
 ) -> tuple[Track, ...]:
-    """Simulates all runs, at the step of the wanted tracks, with what the effects took on the tracks before."""
+    """Simulates all runs at the step of the wanted tracks, with the torque of the laws on the tracks before."""
     arm, usual = arm_with_effects(plan, hidden), 1 - controller.compensated
     parts = sum((effect.parts() for effect in hidden), Parts())
     out = []

@@ -1,13 +1,14 @@
 """Sizes of hidden effects: the detection limit, and the search for the size that has a given multiple of it.
 
-The limit is what an oracle with the true form and the true noise finds with 90 % power. The oracle tests one number,
-the size of the effect, after everything free has been projected out of its torque, in whitened rows. The level of the
-test is one per cent over all effects and places that a diagnosis may look at. The *multiple* of an effect is the
-square root of its noncentrality over that of the limit.
+The limit is the size that an oracle finds with 90 % power. The oracle knows the true law and the true noise. It tests
+one number, the size of the effect, in whitened rows from which all free columns are projected out. The level of its
+test is 1 % over all effects and places that a diagnosis may look at. The *multiple* of an effect is
 
-Effects are sized on the reference, simulated coarsely, corrected, and then simulated finely. The size of an effect
-with parts of its own (a spring, a play, a base that gives way) shows in simulations only, and not in proportion: it
-is simulated coarsely as often as needed.
+    multiple = sqrt(noncentrality of the effect / noncentrality of the limit).
+
+Effects get their sizes on the reference; a coarse simulation corrects them; a fine simulation makes the recording. An
+effect with parts of its own (a spring, a gap, a base that gives way) does not grow in proportion to its size, so it
+needs several coarse simulations.
 """
 
 from collections.abc import Sequence
@@ -150,7 +151,7 @@ def _orthonormal_basis(columns: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class SizedEffects:
-    """Effects with their sizes. targets: multiples aimed at. passed_over: names of draws that could not be seen."""
+    """Effects with their sizes. targets: wanted multiples. passed_over: effects that were drawn and not seen."""
 
     hidden: tuple[HiddenEffect, ...]
     targets: tuple[float, ...]
@@ -163,9 +164,9 @@ class SizedEffects:
 
 
 def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
-    """Effects of the sizes aimed at, found on the reference tracks; drawn anew where they could not be seen.
+    """Effects of the wanted sizes on the reference tracks; effects that cannot be seen there are drawn again.
 
-    The last draw is kept whatever it is.
+    The last draw is always kept.
     """
     oracle, passed_over = make_oracle(plan, tracks), list[str]()
     motors = [track.load + law_torque(plan.background, track, 0) for track in _identification_tracks(plan, tracks)]
@@ -184,7 +185,7 @@ def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
 
 
 def resize_effects(plan: Plan, sized: SizedEffects, tracks: Sequence[Track]) -> SizedEffects:
-    """Corrected on simulated tracks: slow motions may do otherwise than thought. What has parts stays as it is."""
+    """Sizes corrected on simulated tracks. An effect with parts of its own keeps its size."""
     oracle = make_oracle(plan, tracks)
     for number, target in enumerate(sized.targets):
         sized, _ = _scale_to_multiple(plan, oracle, sized, number, tracks, target)
@@ -192,7 +193,7 @@ def resize_effects(plan: Plan, sized: SizedEffects, tracks: Sequence[Track]) -> 
 
 
 def next_size(tried: Sequence[tuple[float, float]], target: float) -> float:
-    """Where a power law through the last two tries (size, multiple) has the multiple aimed at; a line after one."""
+    """The size where a power law through the last two tries (size, multiple) has the target; a line after one try."""
     size, found = tried[-1]
     power = 1.0
     if len(tried) > 1 and tried[-2][0] != size:
@@ -235,7 +236,7 @@ def effect_multiple(
 def _scale_to_multiple(
     plan: Plan, oracle: Oracle, sized: SizedEffects, number: int, tracks: Sequence[Track], target: float
 ) -> tuple[SizedEffects, float]:
-    """One effect brought to a multiple; those with parts of their own need a simulation and stay as they are."""
+    """One effect scaled to a multiple, and the multiple reached. An effect with parts of its own keeps its size."""
     if sized.hidden[number].has_parts:
         return sized, target
     found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
@@ -259,7 +260,7 @@ def _grid(track: Track) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCase:
-    """A case's runs as they happened, before any channel recorded them. multiples: of each effect's limit."""
+    """The runs of a case before any channel recorded them. multiples: size of each effect in detection limits."""
 
     plan: Plan
     sized: SizedEffects
@@ -292,9 +293,9 @@ def simulate_case(plan: Plan, given: tuple[HiddenEffect, ...] | None = None) -> 
 def correct_sizes(
     plan: Plan, sized: SizedEffects, controller: Controller, wanted: Sequence[Track], coarse: tuple[Track, ...]
 ) -> tuple[SizedEffects, tuple[Track, ...]]:
-    """Sizes as near to the multiples aimed at as coarse tracks show, and the last of these.
+    """Sizes with the wanted multiples on coarse tracks, and the last of these tracks.
 
-    coarse: as played with the sizes so far.
+    coarse: tracks simulated with the sizes so far.
     """
     number = next((number for number, effect in enumerate(sized.hidden) if effect.has_parts), None)
     if number is not None:
@@ -310,7 +311,7 @@ def _search_size(
     wanted: Sequence[Track],
     coarse: tuple[Track, ...],
 ) -> tuple[SizedEffects, tuple[Track, ...]]:
-    """The effect with parts at the size that comes nearest, and the tracks that it leads to."""
+    """The effect with parts at the size whose multiple comes nearest to the target, and its tracks."""
     target, tried = sized.targets[number], list[tuple[float, float]]()
     best = (np.inf, sized, coarse)
     for more in reversed(range(SIZING.max_coarse_passes)):
@@ -330,7 +331,7 @@ def _search_size(
 def _simulate_toward_size(
     plan: Plan, sized: SizedEffects, aimed: SizedEffects, number: int, controller: Controller, wanted: Sequence[Track]
 ) -> tuple[SizedEffects, tuple[Track, ...]] | None:
-    """Coarse tracks at the size aimed at, or on the way to it where the engine's step cannot follow that."""
+    """Coarse tracks at the wanted size, or at a size between where the simulation runs away; None if all run away."""
     for _ in range(SIZING.max_halvings):
         try:
             return aimed, simulate_runs(

@@ -1,4 +1,9 @@
-"""The base class of hidden effects: what an effect may change between the mechanism and the recording."""
+"""The base class of hidden effects: what an effect may change between the mechanism and the recording.
+
+Symbols in the docstrings of the effects: q, v, a are position, velocity and acceleration of the effect's joint (rad,
+s); q_j, v_j, a_j are those of another joint; tau is the torque that the motor gives on top of what moves the mechanism
+(N m); sgn changes its sign within 0.5 mrad/s.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,8 +16,8 @@ from armlab.concealed.arms import Machine
 from armlab.concealed.engine import Parts, Track
 from problem.arm import Arm
 
-OTHER_FORM_SHARE = 0.4  # share of the effects whose law is not the one that anyone would fit first
-SIGN_WIDTH = 5e-4  # rad/s: a Coulomb friction turns over within this
+OTHER_FORM_SHARE = 0.4  # share of the draws whose law is not the obvious one
+SIGN_WIDTH = 5e-4  # rad/s: Coulomb friction changes its sign within this
 ParameterValues = dict[str, float | list[float]]
 Where = Literal["joint", "coupling", "link", "robot"]
 
@@ -59,7 +64,7 @@ class HiddenEffect:
         return str(rng.choice(cls.forms[1:])) if other else cls.forms[0]
 
     def sized(self, size: float) -> Self:
-        """The same effect, larger or smaller, but not absurd."""
+        """The same effect with another size, at most its largest."""
         return replace(self, size=float(min(size, self.max_size)))
 
     @property
@@ -79,7 +84,7 @@ class HiddenEffect:
 
     @property
     def equivalent(self) -> tuple[str, ...]:
-        """Names at the same joint that together say the same, and come first."""
+        """Effects that, found together at the same joint, describe this one as well."""
         return ()
 
     def parameters(self) -> ParameterValues:
@@ -87,11 +92,11 @@ class HiddenEffect:
         return {}
 
     def with_peak_torque(self, peak: Array) -> Self:
-        """The effect when the largest torque (joints,) of each joint without it is known, N m."""
+        """The effect adapted to the largest torque of each joint without it, (joints,), N m."""
         return self
 
     def arm(self, arm: Arm) -> Arm:
-        """The arm as it really is."""
+        """The nominal arm with the changes of the effect."""
         return arm
 
     def parts(self) -> Parts:
@@ -99,7 +104,7 @@ class HiddenEffect:
         return Parts()
 
     def torque(self, track: Track, run: int) -> Array | None:
-        """Torque that the motor of the effect's joint gives on top, (steps,), N m; None for other effects.
+        """Torque that the motor of the effect's joint gives on top, (steps,), N m; None for an effect without a law.
 
         run: from 0, the identification runs first.
         """
@@ -124,7 +129,7 @@ class HiddenEffect:
 
 
 def smooth_sign(velocity: Array, width: float = SIGN_WIDTH) -> Array:
-    """Sign of a velocity, turned over within a width, rad/s."""
+    """Sign of a velocity that changes within a width, rad/s."""
     return np.asarray(np.tanh(velocity / width))
 
 

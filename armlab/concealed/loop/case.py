@@ -102,9 +102,8 @@ class SecondMotion:
 class Tools:
     """What is judged, reached through functions that see the folder of a recording and never the truth.
 
-    diagnose: (recording, out) writes out/verdict.json. suspect: (verdict, robot, recording) tells groups of names that
-    may be taken for each other. move: (kind, verdict, robot, recording, seed) gives a second motion, None where none
-    can help.
+    diagnose: (recording, out) writes out/verdict.json. suspect: (verdict, robot, recording) gives groups of names that
+    are easily confused. move: (kind, verdict, robot, recording, seed) gives a second motion, None if none can help.
     """
 
     diagnose: Callable[[Path, Path], None]
@@ -114,7 +113,7 @@ class Tools:
 
 @dataclass(frozen=True)
 class MotionOutcome:
-    """How a second motion ended; why: what went wrong, if anything; forecast: what was expected, where anything was."""
+    """How a second motion ended. why: the error, if any. forecast: what was expected, if anything."""
 
     end: str
     why: str = ""
@@ -141,7 +140,7 @@ class Folders:
         return self.out / "truth" / f"{self.name}-{what}.json"
 
     def clear(self) -> None:
-        """Removes what an earlier draw left."""
+        """Removes the files of an earlier draw."""
         for part in ("observations", "verdicts"):
             shutil.rmtree(self.out / part / self.name, ignore_errors=True)
         for path in (self.out / "truth").glob(f"{self.name}-*"):
@@ -149,7 +148,7 @@ class Folders:
 
 
 def play_case(seed: int, number: int, out: Path, tools: Tools) -> dict[str, Any]:
-    """The result of a case as plain data; ends is empty where no draw was ambiguous."""
+    """The result of a case as plain data; `ends` is empty if no draw was ambiguous."""
     folders = Folders(out, random_stream("loop case", seed, number).bytes(6).hex())
     passed: list[dict[str, Any]] = []
     for attempt in range(MAX_ATTEMPTS):
@@ -208,10 +207,10 @@ def _diagnose_first(recorded: FirstRecording, folders: Folders, tools: Tools) ->
 def _find_ambiguity(
     verdict: dict[str, Any], answer: TrueNames, folders: Folders, tools: Tools
 ) -> tuple[str, frozenset[Place]]:
-    """How a case begins, and the names that are suspected beside the hidden one; none where there is no doubt.
+    """How a case begins, and the suspected names, the hidden one among them; none if nothing is in doubt.
 
-    told: the verdict lists the hidden effect among rivals. mistaken: it names another one alone, which the first
-    recording does not tell from the hidden effect.
+    told: the verdict lists the hidden effect among rivals. mistaken: it names another effect alone, which the first
+    recording does not separate from the hidden one.
     """
     start = judge_start(verdict, answer)
     if start == "ambiguous":
@@ -235,7 +234,7 @@ def _play_second(
     suspected: frozenset[Place],
     seed: int,
 ) -> MotionOutcome:
-    """How it ended: where the diagnosis or the design fails, the question stays open."""
+    """How a second motion ended; if the diagnosis or the design fails, the question stays open."""
     first = folders.observation(FIRST_RECORDING)
     try:
         moved = tools.move(kind, folders.verdict(FIRST_RECORDING) / "verdict.json", first / "limits.yaml", first, seed)

@@ -67,7 +67,7 @@ def poor_reference(rng: np.random.Generator, time: Array, machine: Machine) -> A
     return np.asarray(place + swing * np.sin(np.outer(time, pulse) + rng.uniform(0, 2 * np.pi, machine.joints)))
 
 
-# (hidden, what it is taken for); what no motion can leave alone is not hidden: cables, rotors, loads, gains
+# (hidden, what it is confused with); effects that no motion separates are left out: cables, rotors, loads, gains
 CONFUSABLE_PAIRS = (
     ("time_delay", "viscous_friction"),
     ("load_dependent_friction", "coulomb_friction"),

@@ -1,4 +1,4 @@
-"""The closed loop over many cases: sealed answers, cases in parallel, resumable."""
+"""The closed loop over many cases: answers are sealed first, cases run in parallel, an interrupted loop continues."""
 
 import json
 from collections.abc import Iterator
@@ -60,7 +60,7 @@ SETTINGS_FILE = "settings.json"
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """What a set of cases is made of."""
+    """Number of cases and seed of a closed loop."""
 
     cases: int
     seed: int
@@ -73,14 +73,14 @@ def seal_loop(settings: LoopSettings, out: Path) -> str:
 
 
 def play_cases(settings: LoopSettings, out: Path, tools: Tools, jobs: int) -> Iterator[dict[str, Any]]:
-    """Plays what is missing in a folder whose answers are sealed, and tells each result as it is done."""
+    """Plays the missing cases in a folder whose answers are sealed, and yields each result."""
     missing = [number for number in range(settings.cases) if not _result_path(out, number).is_file()]
     work = (delayed(_play_and_write)(settings.seed, number, out, tools) for number in missing)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
 
 
 def read_results(settings: LoopSettings, out: Path) -> list[dict[str, Any]]:
-    """All results that are there, by number."""
+    """All results in the folder, by number."""
     paths = [_result_path(out, number) for number in range(settings.cases)]
     return [json.loads(path.read_text(encoding="utf-8")) for path in paths if path.is_file()]
 
@@ -99,7 +99,7 @@ def _play_and_write(seed: int, number: int, out: Path, tools: Tools) -> dict[str
     path = _result_path(out, number)
     draft = path.with_suffix(".draft")
     draft.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    draft.replace(path)  # says that the case is whole
+    draft.replace(path)  # marks the case as complete
     return result
 
 
@@ -113,7 +113,7 @@ def _claim_folder(settings: LoopSettings, out: Path) -> None:
     if note.is_file() and note.read_text(encoding="utf-8") != content:
         raise InputError(f"{out} holds a closed loop of other settings (see {note}): choose another folder")
     if not note.is_file() and out.exists() and any(out.iterdir()):
-        raise InputError(f"{out} is there already and holds no closed loop: choose another folder")
+        raise InputError(f"{out} exists and holds no closed loop: choose another folder")
     for part in ("cases", "observations", "truth", "verdicts"):
         (out / part).mkdir(parents=True, exist_ok=True)
     note.write_text(content, encoding="utf-8")

@@ -1,9 +1,9 @@
 """The held-out run of a case in the filter of the scorer, and the share of the gap that a diagnosis has closed.
 
-The scorer shares no code with what it judges: the torque after a diagnosis is the prediction of the verdict's model
+The scorer shares no code with the diagnosis. The torque after a diagnosis is the prediction of its model
 (`predicted/<run>.csv` beside the verdict, columns t, tau1, ...); everything else is computed here. The gap lies
-between the refitted rigid model and the true floor. Where there is no prediction, the figures of the verdict are
-taken, and the row says so.
+between the refitted rigid model and the true floor. Without a prediction, the figures of the verdict are used, and the
+row says `reported`.
 """
 
 from dataclasses import dataclass
@@ -126,7 +126,7 @@ def _resample_evenly(run: Run, even: Run, torque: Array) -> Array:
     return np.column_stack([np.interp(even.time, time, column) for column in torque.T])
 
 
-MIN_GAP_RATIO = 1.15  # times the floor: where the rigid model is nearly there, no gap is left to close
+MIN_GAP_RATIO = 1.15  # times the floor: below, the rigid model leaves no gap to close
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Gap:
 
 
 def measure_gap_closed(case: JudgedCase) -> Gap:
-    """What the diagnosis of one case has closed."""
+    """The share of the gap that the diagnosis of one case has closed."""
     if not case.truth.injected or case.verdict["status"] == "invalid":
         return Gap(None, None, "none")
     if not (case.folder / "predicted").is_dir():
