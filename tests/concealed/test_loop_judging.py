@@ -142,7 +142,7 @@ def test_the_page_tells_shares_comparisons_forecasts_and_draws_that_were_passed_
     seal = Seals("abc", "def")
     page = render_page(LoopSettings(4, 1001), FOUND, seal)
     assert "Seed 1001, 2 ambiguous cases of 4" in page
-    assert "told before the first diagnosis: abc" in page
+    assert "printed before the first diagnosis: abc" in page
     assert "| designed motion | 100 % (34-100) |" in page
     assert "| random motion | decided rightly | 1 | 0 | 1 |" in page
     assert "| time_delay | viscous_friction | 2 | 2, 0, 0 | 1, 0, 1 | 0, 1, 1 |" in page

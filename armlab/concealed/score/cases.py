@@ -15,7 +15,7 @@ from typing import Any, Literal
 from armlab.common.errors import InputError
 from armlab.concealed.formats import LinkDeviation, TrueEffect, Truth, read_model
 
-FAILURE_FILE = "failed.txt"  # beside where a verdict should be: what a diagnosis that gave none complained of
+FAILURE_FILE = "failed.txt"  # in the place of a verdict: the error message of a diagnosis that failed
 TIME_FILE = "time.json"  # beside a verdict: how long the diagnosis took; written last, when the verdict is complete
 VALID_STATUSES = ("mismatch", "none", "inconclusive")
 MISSING_VERDICT: dict[str, Any] = {"status": "invalid", "findings": [], "unexplained": [], "fit": []}
@@ -116,7 +116,7 @@ DELAY_LIKE_EFFECTS = ("viscous_friction",)
 
 
 def categorize_finding(case: JudgedCase, finding: dict[str, Any]) -> Category:
-    """Of one finding of a case."""
+    """The category of one finding of a case; see the module."""
     truth, name = case.truth, finding["effect"]
     if name == "unknown":
         return "injected" if any(effect.outside for effect in truth.injected) else "unknown"
@@ -137,7 +137,7 @@ def is_same_effect(finding: dict[str, Any], effect: TrueEffect | LinkDeviation) 
 
 
 def _is_indistinguishable(finding: dict[str, Any], effect: TrueEffect | LinkDeviation, truth: Truth) -> bool:
-    """One finding that no motion tells from an effect, or that is part of its law."""
+    """True for a finding that no motion separates from an effect, or that is a part of its law."""
     found, place, name = finding["effect"], finding["joint"], effect.effect
     if name == "time_delay":
         return found in DELAY_LIKE_EFFECTS

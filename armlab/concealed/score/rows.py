@@ -106,7 +106,7 @@ def _effect_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
 
 
 def _equivalent_findings(case: JudgedCase, effect: InjectedEffect) -> list[dict[str, Any]]:
-    """The findings at the effect's joint that together say the same, if all of them are there."""
+    """The findings at the effect's joint that together describe it, if all of them are there."""
     here = [finding for finding in case.findings if finding["joint"] == effect.joint]
     parts = [finding for finding in here if finding["effect"] in effect.equivalent]
     return parts if {each["effect"] for each in parts} == set(effect.equivalent) else []

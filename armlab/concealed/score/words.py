@@ -6,7 +6,7 @@ from typing import Any
 from armlab.concealed.formats import InjectedEffect
 from armlab.concealed.score.cases import FAILURE_FILE, JudgedCase, categorize_finding
 
-MAX_COMPLAINT_LENGTH = 240  # letters kept of a text that is not ours
+MAX_COMPLAINT_LENGTH = 240  # characters kept of the error message of a diagnosis
 
 
 def describe_hidden(case: JudgedCase) -> str:
@@ -108,7 +108,7 @@ def _read_complaint(case: JudgedCase) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    """True for a number; a link's ten parameters would fill the page."""
+    """True for a number; lists, as the ten parameters of a link, are left out of the words."""
     return isinstance(value, int | float)
 
 
