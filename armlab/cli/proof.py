@@ -1,6 +1,7 @@
 """Commands on concealed cases: make and score them, the proof, the value of each guard, and the closed loop."""
 
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -17,10 +18,10 @@ _FOLDER = click.Path(path_type=Path)
 def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int) -> None:
     """Measure the value of each guard of the diagnosis on concealed cases (extra `engines`)."""
     from armlab.concealed.ablation import AblationSettings
-    from armlab.concealed.ablation import ablate as run
+    from armlab.concealed.ablation import ablate as run_ablation
     from armlab.diagnosis.ablation import verdicts_without_each
 
-    for line in run(AblationSettings(seed, cases, nulls), verdicts_without_each, work, results, jobs):
+    for line in run_ablation(AblationSettings(seed, cases, nulls), verdicts_without_each, work, results, jobs):
         click.echo(line)
 
 
@@ -40,24 +41,19 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
     from tqdm import tqdm
 
     from armlab.cli.second_motion import plan_second_motion
-    from armlab.concealed.loop import page
     from armlab.concealed.loop.case import Tools
-    from armlab.concealed.loop.run import LoopSettings, close_loop, play_cases, seal_loop
-    from armlab.concealed.loop.run import read_results as finished
+    from armlab.concealed.loop.page import Seals, write_page
+    from armlab.concealed.loop.run import LoopSettings, close_loop, play_cases, read_results, seal_loop
     from armlab.diagnosis.next.second_motion import suspect_rivals, write_diagnosis
 
     settings = LoopSettings(cases, seed)
     answers = seal_loop(settings, out)
     click.echo(f"sealed {out / 'truth'}, SHA-256 of the answers {answers}")
-    for _ in tqdm(
-        play_cases(settings, out, Tools(write_diagnosis, suspect_rivals, plan_second_motion), jobs),
-        total=cases,
-        unit="case",
-    ):
+    tools = Tools(write_diagnosis, suspect_rivals, plan_second_motion)
+    for _ in tqdm(play_cases(settings, out, tools, jobs), total=cases, unit="case"):
         pass
-    found = finished(settings, out)
     manifest = close_loop(settings, out, answers)
-    for path in page.write_page(settings, found, page.Seals(answers, manifest), results or out / "score"):
+    for path in write_page(settings, read_results(settings, out), Seals(answers, manifest), results or out / "score"):
         click.echo(f"wrote {path}")
 
 
@@ -69,17 +65,25 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
 @click.option("--development", is_flag=True, help="Leave out the kinds of noise of judged sets.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--out", type=_FOLDER, required=True, help="Folder for observations, truth and manifest.")
-def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs: int, out: Path) -> None:
+def conceal(
+    cases: int,
+    seed: int,
+    tier: Literal["clean", "realistic", "both"],
+    kind: Literal["mixed", "nulls"],
+    development: bool,
+    jobs: int,
+    out: Path,
+) -> None:
     """Make recordings with hidden effects, and seal the answers (extra `engines`)."""
     from tqdm import tqdm
 
-    from armlab.concealed.sets import MANIFEST_FILE, file_digest, make_set_settings
-    from armlab.concealed.sets import conceal_set as make
+    from armlab.concealed.sets import MANIFEST_FILE, conceal_cases, make_set_settings, seal_set
 
     settings = make_set_settings(cases, seed, tier, kind, development)
-    for _ in tqdm(make(settings, out, jobs), total=cases, unit="case", desc="concealed"):
+    for _ in tqdm(conceal_cases(settings, out, jobs), total=cases, unit="case", desc="concealed"):
         pass
-    click.echo(f"{out / MANIFEST_FILE} SHA-256 {file_digest(out / MANIFEST_FILE)}")
+    _, sealed = seal_set(settings, out)
+    click.echo(f"{out / MANIFEST_FILE} SHA-256 {sealed}")
 
 
 @click.command()
@@ -89,10 +93,9 @@ def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs
 @click.option("--out", type=_FOLDER, help="Folder for the score [default: VERDICTS/score].")
 def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> None:
     """Compare verdicts with the sealed answers of the concealed set in FOLDER."""
-    from armlab.concealed.score.scoring import format_lines
-    from armlab.concealed.score.scoring import score_set as count
+    from armlab.concealed.score.scoring import format_lines, score_set
 
-    for line in format_lines(count(folder, verdicts, manifest, out or verdicts / "score")):
+    for line in format_lines(score_set(folder, verdicts, manifest, out or verdicts / "score")):
         click.echo(line)
 
 
@@ -109,10 +112,10 @@ def prove(
 ) -> None:
     """Conceal, diagnose blindly, score, and log; an interrupted proof continues (extra `engines`)."""
     from armlab.concealed.prove import choose_proof
-    from armlab.concealed.prove import prove as run
+    from armlab.concealed.prove import prove as run_proof
 
     proof = choose_proof(quick, development, cases, nulls)
     folder = work or Path(".armlab/proof") / proof.name
     scores = results or (Path("results/proof") if proof.commit else folder / "score")
-    for line in run(proof, folder, scores, jobs):
+    for line in run_proof(proof, folder, scores, jobs):
         click.echo(line)

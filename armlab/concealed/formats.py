@@ -16,6 +16,7 @@ TRUTH_SCHEMA_FILE = Path(__file__).parent / "schemas" / "truth.schema.json"
 Tier = Literal["clean", "realistic"]
 CaseKind = Literal["single", "pair", "triple", "outside", "decoy", "null"]
 SetKind = Literal["mixed", "nulls"]
+SetTier = Literal["clean", "realistic", "both"]
 
 
 class TrueParameter(Settings):
@@ -112,7 +113,7 @@ class SetManifest(Settings):
 
     schema_: Literal["manifest/1"] = Field(alias="schema")
     seed: int
-    tier: Literal["clean", "realistic", "both"]
+    tier: SetTier
     kind: SetKind
     development: bool
     cases: tuple[str, ...]

@@ -9,13 +9,13 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import TypeVar
 
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
 from armlab.concealed.case_files import write_case
-from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, Tier, read_model, write_model
+from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, SetTier, Tier, read_model, write_model
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan
 from armlab.concealed.sizing import simulate_case
 
@@ -67,7 +67,7 @@ class SetSettings:
 
     cases: int
     seed: int
-    tier: Literal["clean", "realistic", "both"] = "both"
+    tier: SetTier = "both"
     kind: SetKind = "mixed"
     development: bool = False
 
@@ -78,18 +78,9 @@ class SetSettings:
         return draw_plan(self.seed, index, tiers[tier], self.kind == "nulls", self.development)
 
 
-def make_set_settings(cases: int, seed: int, tier: Any, kind: Any, development: bool) -> SetSettings:
+def make_set_settings(cases: int, seed: int, tier: SetTier, kind: SetKind, development: bool) -> SetSettings:
     """The settings of a set; seeds 1000-1999 always make development sets."""
     return SetSettings(cases, seed, tier, kind, development or seed in DEVELOPMENT_SEEDS)
-
-
-def conceal_set(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
-    """Makes the missing cases of a set, yields the name of each, and seals the set.
-
-    Raises InputError for a folder that holds another set.
-    """
-    yield from conceal_cases(settings, out, jobs)
-    seal_set(settings, out)
 
 
 def conceal_cases(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:

@@ -22,20 +22,28 @@ from armlab.concealed.score.scoring import score_set
 from armlab.concealed.sets import (
     MANIFEST_FILE,
     SetSettings,
-    conceal_set,
+    conceal_cases,
     file_digest,
     make_set_settings,
     read_checked_manifest,
+    seal_set,
 )
 from armlab.recordings.load import load_recording
 
 SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
 
 
+def make_set(settings: SetSettings, folder: Path, jobs: int) -> list[str]:
+    """Conceals the missing cases and seals the set; the names of the cases that were made."""
+    made = list(conceal_cases(settings, folder, jobs))
+    seal_set(settings, folder)
+    return made
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("concealed") / "set"
-    list(conceal_set(SETTINGS, folder, 1))
+    make_set(SETTINGS, folder, 1)
     return folder
 
 
@@ -51,7 +59,7 @@ def _verdicts(folder: Path, out: Path) -> Path:
 
 
 def test_a_set_is_the_same_to_the_byte_for_one_and_two_jobs(made: Path, tmp_path: Path) -> None:
-    list(conceal_set(SETTINGS, tmp_path / "again", 2))
+    make_set(SETTINGS, tmp_path / "again", 2)
     assert file_digest(tmp_path / "again" / MANIFEST_FILE) == file_digest(made / MANIFEST_FILE)
 
 
@@ -59,13 +67,19 @@ def test_an_interrupted_set_goes_on_where_it_stopped(copy: Path) -> None:
     sealed = file_digest(copy / MANIFEST_FILE)
     lost = sorted((copy / "observations").iterdir())[0]
     shutil.rmtree(lost)
-    assert list(conceal_set(SETTINGS, copy, 1)) == [lost.name]
+    assert make_set(SETTINGS, copy, 1) == [lost.name]
     assert file_digest(copy / MANIFEST_FILE) == sealed
+
+
+def test_an_incomplete_set_has_no_seal(copy: Path) -> None:
+    shutil.rmtree(sorted((copy / "observations").iterdir())[0])
+    next(conceal_cases(SETTINGS, copy, 1))
+    assert not (copy / MANIFEST_FILE).exists()
 
 
 def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
     with pytest.raises(InputError, match="holds another concealed set"):
-        list(conceal_set(SetSettings(3, 1006), copy, 1))
+        make_set(SetSettings(3, 1006), copy, 1)
 
 
 @pytest.mark.parametrize("part", ["truth", "observations"])
