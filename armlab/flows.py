@@ -13,7 +13,7 @@ from joblib import cpu_count
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.identification.components import Component
+from armlab.effects.contract import Candidate
 from armlab.identification.identifier import METHODS, Identifier
 from armlab.identification.model import Model
 from armlab.identification.validation import RunError, run_error
@@ -105,7 +105,7 @@ def identify(
     recording: Recording,
     method: str = "weighted",
     *,
-    components: tuple[Component, ...] | None = None,
+    components: tuple[Candidate, ...] | None = None,
     cutoff_hz: float | None = None,
 ) -> Model:
     """The model of the arm that fits the runs with the role `identify`, with 95 % intervals.

@@ -1,16 +1,19 @@
-"""Commands that put the concealed cases and the diagnosis together: what each guard is worth, and the closed loop."""
+"""Commands on concealed cases: make and score them, the proof, the value of each guard, and the closed loop."""
 
 from pathlib import Path
+from typing import Literal
 
 import click
 
+_FOLDER = click.Path(path_type=Path)
+
 
 @click.command()
-@click.option("--seed", type=int, default=1950, show_default=True, help="One for development, 1000-1999.")
+@click.option("--seed", type=int, default=1950, show_default=True, help="A development seed, 1000-1999.")
 @click.option("--cases", type=click.IntRange(min=1), default=50, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=1), default=50, show_default=True, help="Cases with nothing hidden.")
-@click.option("--work", type=click.Path(path_type=Path), default=Path(".armlab/ablation"), show_default=True)
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results/proof"), show_default=True)
+@click.option("--work", type=_FOLDER, default=Path(".armlab/ablation"), show_default=True)
+@click.option("--results", type=_FOLDER, default=Path("results/proof"), show_default=True)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int) -> None:
     """Measure what each guard of the diagnosis is worth.
@@ -18,23 +21,23 @@ def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: i
     Diagnoses concealed cases with one guard off at a time (extra `engines`).
     """
     from armlab.concealed.ablation import AblationSettings
-    from armlab.concealed.ablation import ablate as run
+    from armlab.concealed.ablation import ablate as run_ablation
     from armlab.diagnosis.ablation import verdicts_without_each
 
-    for line in run(AblationSettings(seed, cases, nulls), verdicts_without_each, work, results, jobs):
+    for line in run_ablation(AblationSettings(seed, cases, nulls), verdicts_without_each, work, results, jobs):
         click.echo(line)
 
 
-_LOOP_FOLDER = click.Path(path_type=Path)
-
-
 @click.command("next-loop")
-@click.option("--cases", type=click.IntRange(min=1), default=60, show_default=True, help="Ambiguous ones.")
+@click.option("--cases", type=click.IntRange(min=1), default=60, show_default=True, help="How many ambiguous cases.")
 @click.option("--seed", type=int, required=True, help="1000-1999 are for development.")
 @click.option(
-    "--out", type=_LOOP_FOLDER, required=True, help="Folder for recordings, answers and verdicts; goes on there."
+    "--out",
+    type=_FOLDER,
+    required=True,
+    help="Folder for recordings, answers and verdicts; an interrupted loop continues.",
 )
-@click.option("--results", type=_LOOP_FOLDER, help="Folder for table and picture [default: OUT/score].")
+@click.option("--results", type=_FOLDER, help="Folder for table and picture [default: OUT/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> None:
     """Measure how well a second motion decides between rivals.
@@ -45,28 +48,20 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
     from tqdm import tqdm
 
     from armlab.cli.second_motion import plan_second_motion
-    from armlab.concealed.loop import page
     from armlab.concealed.loop.case import Tools
-    from armlab.concealed.loop.run import LoopSettings, close_loop, play_cases, seal_loop
-    from armlab.concealed.loop.run import read_results as finished
+    from armlab.concealed.loop.page import Seals, write_page
+    from armlab.concealed.loop.run import LoopSettings, close_loop, play_cases, read_results, seal_loop
     from armlab.diagnosis.next.second_motion import suspect_rivals, write_diagnosis
 
     settings = LoopSettings(cases, seed)
     answers = seal_loop(settings, out)
     click.echo(f"sealed {out / 'truth'}, SHA-256 of the answers {answers}")
-    for _ in tqdm(
-        play_cases(settings, out, Tools(write_diagnosis, suspect_rivals, plan_second_motion), jobs),
-        total=cases,
-        unit="case",
-    ):
+    tools = Tools(write_diagnosis, suspect_rivals, plan_second_motion)
+    for _ in tqdm(play_cases(settings, out, tools, jobs), total=cases, unit="case"):
         pass
-    found = finished(settings, out)
     manifest = close_loop(settings, out, answers)
-    for path in page.write_page(settings, found, page.Seals(answers, manifest), results or out / "score"):
+    for path in write_page(settings, read_results(settings, out), Seals(answers, manifest), results or out / "score"):
         click.echo(f"wrote {path}")
-
-
-_PROOF_FOLDER = click.Path(path_type=Path)
 
 
 @click.command()
@@ -74,49 +69,56 @@ _PROOF_FOLDER = click.Path(path_type=Path)
 @click.option("--seed", type=int, required=True, help="1000-1999 are for development.")
 @click.option("--tier", type=click.Choice(["clean", "realistic", "both"]), default="both", show_default=True)
 @click.option("--kind", type=click.Choice(["mixed", "nulls"]), default="mixed", show_default=True)
-@click.option("--development", is_flag=True, help="Leave out what is kept for judged sets.")
+@click.option("--development", is_flag=True, help="Leave out the kinds of noise of judged sets.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
-@click.option("--out", type=_PROOF_FOLDER, required=True, help="Folder for observations, truth and manifest.")
-def conceal(cases: int, seed: int, tier: str, kind: str, development: bool, jobs: int, out: Path) -> None:
+@click.option("--out", type=_FOLDER, required=True, help="Folder for observations, truth and manifest.")
+def conceal(
+    cases: int,
+    seed: int,
+    tier: Literal["clean", "realistic", "both"],
+    kind: Literal["mixed", "nulls"],
+    development: bool,
+    jobs: int,
+    out: Path,
+) -> None:
     """Make recordings with hidden effects and sealed answers.
 
     Needs the extra `engines`.
     """
     from tqdm import tqdm
 
-    from armlab.concealed.sets import MANIFEST_FILE, file_digest, make_set_settings
-    from armlab.concealed.sets import conceal_set as make
+    from armlab.concealed.sets import MANIFEST_FILE, conceal_cases, make_set_settings, seal_set
 
     settings = make_set_settings(cases, seed, tier, kind, development)
-    for _ in tqdm(make(settings, out, jobs), total=cases, unit="case", desc="concealed"):
+    for _ in tqdm(conceal_cases(settings, out, jobs), total=cases, unit="case", desc="concealed"):
         pass
-    click.echo(f"{out / MANIFEST_FILE} SHA-256 {file_digest(out / MANIFEST_FILE)}")
+    _, sealed = seal_set(settings, out)
+    click.echo(f"{out / MANIFEST_FILE} SHA-256 {sealed}")
 
 
 @click.command()
-@click.argument("folder", type=_PROOF_FOLDER)
-@click.option("--verdicts", type=_PROOF_FOLDER, required=True, help="Folder with a verdict.json a case.")
+@click.argument("folder", type=_FOLDER)
+@click.option("--verdicts", type=_FOLDER, required=True, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
-@click.option("--out", type=_PROOF_FOLDER, help="Folder for the score [default: VERDICTS/score].")
+@click.option("--out", type=_FOLDER, help="Folder for the score [default: VERDICTS/score].")
 def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> None:
     """Score verdicts against the sealed answers of FOLDER.
 
     FOLDER: a concealed set.
     """
-    from armlab.concealed.score.scoring import format_lines
-    from armlab.concealed.score.scoring import score_set as count
+    from armlab.concealed.score.scoring import format_lines, score_set
 
-    for line in format_lines(count(folder, verdicts, manifest, out or verdicts / "score")):
+    for line in format_lines(score_set(folder, verdicts, manifest, out or verdicts / "score")):
         click.echo(line)
 
 
 @click.command()
-@click.option("--quick", is_flag=True, help="24 cases of a fixed development seed, kept out of the log.")
-@click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, kept out of the log.")
+@click.option("--quick", is_flag=True, help="24 cases of a fixed development seed, not logged.")
+@click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, not logged.")
 @click.option("--cases", type=click.IntRange(min=0), default=400, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=0), default=600, show_default=True, help="Cases with nothing hidden.")
-@click.option("--work", type=_PROOF_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
-@click.option("--results", type=_PROOF_FOLDER, help="Folder for scores [default: results/proof].")
+@click.option("--work", type=_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
+@click.option("--results", type=_FOLDER, help="Folder for scores [default: results/proof].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def prove(
     quick: bool, development: int | None, cases: int, nulls: int, work: Path | None, results: Path | None, jobs: int
@@ -126,10 +128,10 @@ def prove(
     Logs the score. After an interruption the same command continues (extra `engines`).
     """
     from armlab.concealed.prove import choose_proof
-    from armlab.concealed.prove import prove as run
+    from armlab.concealed.prove import prove as run_proof
 
     proof = choose_proof(quick, development, cases, nulls)
     folder = work or Path(".armlab/proof") / proof.name
     scores = results or (Path("results/proof") if proof.commit else folder / "score")
-    for line in run(proof, folder, scores, jobs):
+    for line in run_proof(proof, folder, scores, jobs):
         click.echo(line)

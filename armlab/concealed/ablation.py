@@ -1,4 +1,4 @@
-"""The value of each guard of the diagnosis: the same concealed cases again with one guard off at a time."""
+"""The value of each guard of the diagnosis: the same concealed cases with one guard off at a time."""
 
 import json
 import shutil
@@ -10,27 +10,26 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from armlab.concealed.prove import FINISHED_MARK, make_development_proof
+from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.score.scoring import compute_score
-from armlab.concealed.sets import MANIFEST_FILE, conceal_set, file_digest
+from armlab.concealed.sets import conceal_cases, seal_set
 
-DONE_FOLDER, GUARD_ORDER_FILE = (
-    "done",
-    "guards.txt",
-)  # beside the verdicts: marks of finished cases, and the guards in their order
-REPORT_INTERVAL = 10  # cases: how often it is said how far it is
+DONE_FOLDER = "done"  # beside the verdicts: an empty file for each finished case
+GUARD_ORDER_FILE = "guards.txt"  # beside the verdicts: the guards in their order
+REPORT_INTERVAL = 10  # cases between two lines of progress
 SHOWN_MEASURES = (
-    "false claims on nulls",
-    "false claims on decoys",
-    "wrong names among claims",
-    "right name or class of four, above 3 limits",
-    "unknown on effects outside, above 3 limits",
+    "false_claims_on_nulls",
+    "false_claims_on_decoys",
+    "wrong_names",
+    "right_name_or_class",
+    "unknown_outside",
 )
 DiagnoseWithGuards = Callable[[Path], dict[str, dict[str, Any]]]
 
 
 @dataclass(frozen=True)
 class AblationSettings:
-    """A development set."""
+    """A development seed, and the number of its mixed cases and of its nulls."""
 
     seed: int
     cases: int
@@ -40,10 +39,10 @@ class AblationSettings:
 def ablate(
     settings: AblationSettings, diagnose: DiagnoseWithGuards, work: Path, results: Path, jobs: int
 ) -> Iterator[str]:
-    """Does what is missing, tells how far it is, and writes guards.md and guards.json into `results`.
+    """Diagnoses development sets with each guard off, and writes guards.md and guards.json into `results`.
 
-    diagnose: given a recording folder, verdicts by the name of the guard that is off, the one with all on first.
-    What was interrupted goes on; what was finished is diagnosed anew.
+    Yields lines that report the progress. diagnose: from a recording folder, verdicts by the name of the guard that is
+    off; the verdict with all guards on comes first. An interrupted ablation continues; a finished one starts again.
     """
     if (work / FINISHED_MARK).is_file():
         shutil.rmtree(work)
@@ -51,15 +50,15 @@ def ablate(
     found: dict[str, dict[str, Any]] = {}
     for name, each in proof.sets.items():
         folder, verdicts = work / name, work / "verdicts" / name
-        list(conceal_set(each, folder, jobs))
-        cases = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))["cases"]
+        list(conceal_cases(each, folder, jobs))
+        cases, sealed = seal_set(each, folder)
         missing = [case for case in cases if not (verdicts / DONE_FOLDER / case).is_file()]
         todo = (delayed(_write_verdicts)(diagnose, folder / "observations" / case, verdicts) for case in missing)
         for number, _ in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(todo), 1):
             if number % REPORT_INTERVAL == 0:
                 yield f"{name}: diagnosed {number} of {len(missing)}"
         for guard in (verdicts / GUARD_ORDER_FILE).read_text(encoding="utf-8").splitlines():
-            score = compute_score(folder, verdicts / guard, file_digest(folder / MANIFEST_FILE))[2]
+            score = compute_score(folder, verdicts / guard, sealed)[2]
             found.setdefault(guard, {})[name] = score["tiers"]
     results.mkdir(parents=True, exist_ok=True)
     (results / "guards.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
@@ -69,7 +68,7 @@ def ablate(
 
 
 def _write_verdicts(diagnose: DiagnoseWithGuards, observation: Path, verdicts: Path) -> None:
-    """Writes a case's verdicts, a folder a guard; the mark that it is done comes last."""
+    """Writes the verdicts of a case, one folder a guard. The mark that the case is done comes last."""
     found = diagnose(observation)
     for guard, verdict in found.items():
         own = verdicts / guard / observation.name
@@ -81,25 +80,26 @@ def _write_verdicts(diagnose: DiagnoseWithGuards, observation: Path, verdicts: P
 
 
 def render_page(settings: AblationSettings, found: dict[str, dict[str, Any]]) -> str:
-    """A table a tier: a row for each guard that was off."""
+    """One table a tier, with one row for each guard that was off."""
     tiers = sorted({tier for sets in found.values() for each in sets.values() for tier in each})
     about = f"{settings.cases} cases and {settings.nulls} with nothing hidden, of development seed {settings.seed}."
     parts = ["# What each guard is worth", f"{about} Share, and how often it was counted."]
     for tier in tiers:
         rows = [_table_row(guard, found[guard], tier) for guard in found]
-        head = f"| guard off | {' | '.join(SHOWN_MEASURES)} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
+        titles = " | ".join(MEASURE_TEXTS[id].title for id in SHOWN_MEASURES)
+        head = f"| guard off | {titles} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
         parts += [f"## {tier} tier", "\n".join([head, *rows])]
     return "\n\n".join(parts) + "\n"
 
 
 def _table_row(guard: str, sets: dict[str, Any], tier: str) -> str:
-    return f"| {guard.replace('_', ' ')} | {' | '.join(_table_cell(what, sets, tier) for what in SHOWN_MEASURES)} |"
+    return f"| {guard.replace('_', ' ')} | {' | '.join(_table_cell(id, sets, tier) for id in SHOWN_MEASURES)} |"
 
 
-def _table_cell(what: str, sets: dict[str, Any], tier: str) -> str:
-    """The measure in the set that counted it most often: nulls in the set of nulls, names in the mixed one."""
+def _table_cell(id: str, sets: dict[str, Any], tier: str) -> str:
+    """The measure in the set with the largest count: nulls in the set of nulls, names in the mixed set."""
     counted: Sequence[dict[str, Any]] = [
-        each for found in sets.values() for each in found.get(tier, []) if each["name"] == what
+        each for found in sets.values() for each in found.get(tier, []) if each["id"] == id
     ]
     best = max(counted, key=lambda each: int(each["number"]), default=None)
     return "-" if best is None or best["value"] is None else f"{best['value']:.3g} of {best['number']}"

@@ -84,13 +84,13 @@ def make_machine(name: str) -> Machine:
 
 def _make_irb120_arm() -> Machine:
     data = {**_read_built_in("irb120-arm"), "rotor_inertia": [0.25, 0.3, 0.08]}
-    return _build_machine("irb120-arm", data, (60, 60, 30), (2.2, 1.8, 2.2), (10, 9, 12))
+    return _build_machine(data, (60, 60, 30), (2.2, 1.8, 2.2), (10, 9, 12))
 
 
 def _make_irb120() -> Machine:
     data = {**_read_built_in("irb120"), "rotor_inertia": [0.3, 0.35, 0.09, 0.03, 0.025, 0.012]}
     speed, acceleration = (2.2, 1.8, 2.2, 3.0, 3.0, 3.5), (10, 9, 12, 15, 15, 20)
-    return _build_machine("irb120", data, (60, 60, 30, 10, 10, 6), speed, acceleration)
+    return _build_machine(data, (60, 60, 30, 10, 10, 6), speed, acceleration)
 
 
 def _make_panda() -> Machine:
@@ -102,12 +102,12 @@ def _make_panda() -> Machine:
         "rotor_inertia": rotors,
     }
     speed, acceleration = (1.6, 1.3, 1.6, 1.5, 2.0, 2.0, 2.0), (7, 5, 7, 8, 10, 10, 10)
-    return _build_machine("panda", data, (80, 80, 80, 60, 12, 12, 10), speed, acceleration)
+    return _build_machine(data, (80, 80, 80, 60, 12, 12, 10), speed, acceleration)
 
 
 def _make_scara() -> Machine:
     data = {**SCARA_FILE, "links": _robot_file_links(SCARA_LINKS), "rotor_inertia": [0.35, 0.12]}
-    return _build_machine("scara", data, (70, 30), (3.5, 4.5), (16, 22))
+    return _build_machine(data, (70, 30), (3.5, 4.5), (16, 22))
 
 
 def _read_built_in(name: str) -> dict[str, Any]:
@@ -115,9 +115,16 @@ def _read_built_in(name: str) -> dict[str, Any]:
     return data
 
 
-def _build_machine(name: str, data: dict[str, Any], rating: tuple[float, ...], *most: tuple[float, ...]) -> Machine:
-    speed, acceleration = (np.array(values, dtype=np.float64) for values in most)
-    return Machine(name, validate(RobotFile, data, name), np.array(rating, dtype=np.float64), speed, acceleration)
+def _build_machine(
+    data: dict[str, Any], rating: tuple[float, ...], speed: tuple[float, ...], acceleration: tuple[float, ...]
+) -> Machine:
+    return Machine(
+        name=data["name"],
+        file=validate(RobotFile, data, data["name"]),
+        rating=np.array(rating, dtype=np.float64),
+        speed=np.array(speed, dtype=np.float64),
+        acceleration=np.array(acceleration, dtype=np.float64),
+    )
 
 
 def _robot_file_links(bodies: tuple[tuple[float, tuple[float, ...], tuple[float, ...]], ...]) -> list[dict[str, Any]]:

@@ -1,6 +1,5 @@
-"""The files of a case: runs as a drive logs them, the recording that a diagnosis may see, and the answer."""
+"""The files of a case: runs as a drive logs them, the recording for the diagnosis, and the answer."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,38 @@ import yaml
 
 from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.formats import (
+    InjectedEffect,
+    LinkDeviation,
+    TrueEffect,
+    TrueNoise,
+    TrueParameter,
+    Truth,
+    write_model,
+)
 from armlab.concealed.outside import OutsideEffect
 from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
 from armlab.concealed.sizing import SimulatedCase
 from armlab.recordings.recording import Role
 
-ENCODER_BITS = (20, 24)  # powers of two a joint turn, gear included
-JITTER_S = 2e-5  # of stamps that are late while the samples are even
+
+@dataclass(frozen=True)
+class LoggingSettings:
+    """How a drive logs a run; chosen by eye, in the range of industrial drives.
+
+    encoder_bits: range of the resolution, steps a joint turn as powers of two, gear included; the end is left out.
+    uneven_share: share of the cases with uneven samples and exact stamps. jitter_s: of stamps that are
+    late while the samples are even. torque_resolution_nm, time_resolution_s: what a file keeps of a number.
+    """
+
+    encoder_bits: tuple[int, int] = (20, 24)
+    uneven_share: float = 0.3
+    jitter_s: float = 2e-5
+    torque_resolution_nm: float = 1e-5
+    time_resolution_s: float = 1e-7
+
+
+LOGGING = LoggingSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +71,25 @@ def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
     position, role = sampled.position + shift, plan.runs[run].role
     if not noisy:
         return LoggedRun(role, stamp, position, torque, torque)
-    step = 2 * np.pi / 2.0 ** rng.integers(*ENCODER_BITS, joints)
+    step = 2 * np.pi / 2.0 ** rng.integers(*LOGGING.encoder_bits, joints)
     noise = plan.noise.sample(plan.stream(f"noise {run}"), sampled.velocity, instant)
     read = plan.noise.quantise(torque + noise)
     return LoggedRun(role, stamp, np.rint(position / step) * step, read, torque)
 
 
 def _sample_instants(case: SimulatedCase, run: int, rng: np.random.Generator, noisy: bool) -> tuple[Array, Array]:
-    """Stamps and true instants: even samples with late stamps, or samples taken unevenly and stamped well."""
+    """Stamps and true instants, s: even samples with late stamps, or uneven samples with exact stamps."""
     plan = case.plan
     even = np.arange(round(plan.runs[run].length_s * plan.rate_hz)) / plan.rate_hz
     if not noisy:
         return even, even
-    if plan.stream("clock").random() < 0.3:
+    if plan.stream("clock").random() < LOGGING.uneven_share:
         uneven = even + rng.integers(-1, 2, len(even)) / FINE_HZ
         return np.maximum(uneven, 0.0), np.maximum(uneven, 0.0)
-    return even + np.abs(rng.normal(0, JITTER_S, len(even))), even
+    return even + np.abs(rng.normal(0, LOGGING.jitter_s, len(even))), even
 
 
 EFFECTS_WITH_CONSTANT = ("asymmetric_friction", "cable_stiffness", "gravity_compensator")
-TORQUE_RESOLUTION, TIME_RESOLUTION = 1e-5, 1e-7  # N m and s: what is kept of a number
 
 
 def write_case(case: SimulatedCase, observations: Path, truth: Path) -> None:
@@ -83,60 +106,66 @@ def write_case(case: SimulatedCase, observations: Path, truth: Path) -> None:
     _write_parquet(
         truth.with_suffix(".parquet"), {f"tau{joint + 1}": held_out[0].clean[:, joint] for joint in range(joints)}
     )
-    truth.write_text(json.dumps(make_answer(case, runs), indent=1) + "\n", encoding="utf-8")
+    write_model(make_truth(case, runs), truth)
 
 
-def make_answer(case: SimulatedCase, runs: list[LoggedRun]) -> dict[str, Any]:
-    """The truth about a case; `multiple` counts detection limits."""
+def make_truth(case: SimulatedCase, runs: list[LoggedRun]) -> Truth:
+    """The answer to a case."""
     plan = case.plan
     sizes = zip(case.hidden, case.sized.targets, case.multiples, strict=True)
     floor = np.sqrt(np.mean(np.concatenate([run.torque - run.clean for run in runs]) ** 2, axis=0))
-    return {
-        "schema": "truth/1",
-        "case": plan.name,
-        "tier": plan.tier,
-        "kind": plan.kind,
-        "arm": plan.machine.name,
-        "joints": plan.machine.joints,
-        "rate_hz": plan.rate_hz,
-        "motions": [run.family for run in plan.runs],
-        "injected": [
-            {**describe_effect(effect, plan.realistic), "target": target, "multiple": multiple}
+    return Truth(
+        schema="truth/1",
+        case=plan.name,
+        tier=plan.tier,
+        kind=plan.kind,
+        arm=plan.machine.name,
+        joints=plan.machine.joints,
+        rate_hz=plan.rate_hz,
+        motions=tuple(run.family for run in plan.runs),
+        injected=tuple(
+            InjectedEffect(**_effect_facts(effect, plan.realistic), target=target, multiple=multiple)
             for effect, target, multiple in sizes
-        ],
-        "passed_over": list(case.sized.passed_over),
-        "background": [
-            describe_effect(effect, _is_mixed_with_friction(effect, case.hidden)) for effect in plan.background
-        ],
-        "cad_errors": [
-            {"effect": "inertial_parameter_error", "joint": link, "relative": error}
+        ),
+        passed_over=case.sized.passed_over,
+        background=tuple(
+            TrueEffect(**_effect_facts(effect, _is_mixed_with_friction(effect, case.hidden)))
+            for effect in plan.background
+        ),
+        cad_errors=tuple(
+            LinkDeviation(effect="inertial_parameter_error", joint=link, relative=error)
             for link, error in enumerate(plan.cad_errors, 1)
-        ],
-        "absorbed_rotors": [joint + 1 for joint in absorbed_rotors(plan.machine.arm)],
-        "noise": plan.noise.facts(),
-        "noise_floor": floor.tolist(),
-    }
+        ),
+        absorbed_rotors=tuple(joint + 1 for joint in absorbed_rotors(plan.machine.arm)),
+        noise=TrueNoise(
+            kind=plan.noise.kind,
+            white=tuple(plan.noise.white.tolist()),
+            coloured=tuple(plan.noise.coloured.tolist()),
+            corner_hz=plan.noise.corner_hz,
+        ),
+        noise_floor=tuple(floor.tolist()),
+    )
 
 
-def describe_effect(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
-    """An effect in the words of the vocabulary, with the law that made it.
-
-    mixed_up: whether it stands beside friction of its joint that adds to its own.
-    """
-    units, blurred = effect.units(), effect.blurred if mixed_up else ()
-    parameters = {
-        name: {"value": value, "unit": units[name], "comparable": name in effect.comparable and name not in blurred}
-        for name, value in effect.parameters().items()
-    }
+def _effect_facts(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
+    """The fields of a `TrueEffect`. mixed_up: whether other friction of its joint adds to its own."""
+    blurred = effect.blurred if mixed_up else ()
     return {
         "effect": effect.effect,
         "joint": effect.place,
-        "joints": list(effect.joints),
+        "joints": effect.joints,
         "outside": isinstance(effect, OutsideEffect),
         "form": effect.form,
         "obvious_form": effect.form == effect.forms[0],
-        "equivalent": list(effect.equivalent),
-        "parameters": parameters,
+        "equivalent": effect.equivalent,
+        "parameters": {
+            name: TrueParameter(
+                value=tuple(value) if isinstance(value, list) else value,
+                unit=effect.units[name],
+                comparable=name in effect.comparable and name not in blurred,
+            )
+            for name, value in effect.parameters().items()
+        },
         "size": effect.size,
         "shape": effect.shape,
     }
@@ -171,9 +200,9 @@ def _write_yaml(path: Path, content: dict[str, Any]) -> None:
 
 
 def _write_table(path: Path, run: LoggedRun, joints: int) -> None:
-    columns = {"t": np.rint(run.time / TIME_RESOLUTION) * TIME_RESOLUTION}
+    columns = {"t": np.rint(run.time / LOGGING.time_resolution_s) * LOGGING.time_resolution_s}
     columns |= {f"q{joint + 1}": run.position[:, joint] for joint in range(joints)}
-    torque = np.rint(run.torque / TORQUE_RESOLUTION) * TORQUE_RESOLUTION
+    torque = np.rint(run.torque / LOGGING.torque_resolution_nm) * LOGGING.torque_resolution_nm
     _write_parquet(path, columns | {f"tau{joint + 1}": torque[:, joint] for joint in range(joints)})
 
 

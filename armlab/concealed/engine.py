@@ -1,4 +1,4 @@
-"""The arms in MuJoCo: bodies, joints, rotors, hidden parts with own joints, and the track of a simulated run."""
+"""The arms in MuJoCo: bodies, joints, rotors, hidden parts with joints of their own, and tracks of simulated runs."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,23 +55,24 @@ class Track:
         return self.motion.acceleration
 
     def at(self, time: Array) -> "Track":
-        """The track at other instants, by straight lines."""
-        motion = Motion(
-            *(_interpolate(time, self.time, signal) for signal in (self.position, self.velocity, self.acceleration))
-        )
-        return Track(time, motion, _interpolate(time, self.time, self.load))
+        """The track at other instants, interpolated linearly."""
+        position = _interpolate(time, self.time, self.position)
+        velocity = _interpolate(time, self.time, self.velocity)
+        acceleration = _interpolate(time, self.time, self.acceleration)
+        return Track(time, Motion(position, velocity, acceleration), _interpolate(time, self.time, self.load))
 
     def means(self, signal: Array, centre: Array, width_s: float) -> Array:
         """Mean of a signal (steps, joints) over an interval about each instant of `centre` (samples, joints).
 
-        This is how drives log torque; the interval is symmetric, so that nothing is late.
+        Drives log torque in this way. The interval is centred on the instant, so that the mean has no delay.
         """
         integral = np.vstack([np.zeros((1, signal.shape[1])), np.cumsum((signal[1:] + signal[:-1]) / 2, axis=0)])
-        late, early = (centre + width_s / 2, centre - width_s / 2)
+        late, early = centre + width_s / 2, centre - width_s / 2
         out = np.empty(centre.shape)
         for joint in range(signal.shape[1]):
-            up, down = (np.interp(edge[:, joint], self.time, integral[:, joint]) for edge in (late, early))
-            out[:, joint] = (up - down) * self.step_s / width_s
+            until_late = np.interp(late[:, joint], self.time, integral[:, joint])
+            until_early = np.interp(early[:, joint], self.time, integral[:, joint])
+            out[:, joint] = (until_late - until_early) * self.step_s / width_s
         return out
 
 
@@ -79,15 +80,11 @@ def _interpolate(time: Array, known: Array, signal: Array) -> Array:
     return np.column_stack([np.interp(time, known, column) for column in signal.T])
 
 
-DISABLED_FEATURES = (
-    "EULERDAMP",
-    "CONTACT",
-    "WARMSTART",
-    "SENSOR",
-    "FRICTIONLOSS",
-    "EQUALITY",
-)  # what the arms have not
-TINY_MASS, TINY_INERTIA = 1e-8, 1e-9  # of a body between two joints of one axis; MuJoCo wants more than nothing
+DISABLED_FEATURES = ("EULERDAMP", "CONTACT", "WARMSTART", "SENSOR", "FRICTIONLOSS", "EQUALITY")  # no arm needs them
+TINY_MASS, TINY_INERTIA = (
+    1e-8,
+    1e-9,
+)  # kg, kg m2, of a body between two joints of one axis: MuJoCo needs positive values
 
 
 @dataclass(frozen=True)
@@ -142,7 +139,7 @@ class Parts:
     pendulum: Pendulum | None = None
 
     def __add__(self, other: "Parts") -> "Parts":
-        """Both together; of two mounts or pendulums the first."""
+        """The parts of both; the first of two mounts or pendulums."""
         return Parts(self.springs + other.springs, self.mount or other.mount, self.pendulum or other.pendulum)
 
 
@@ -180,12 +177,14 @@ def build_plant(
         if parts.pendulum is not None and parts.pendulum.link == index:
             _add_pendulum(parent, joint, parts.pendulum)
         behind = joint.after
-    for index, pair in enumerate(zip(*gains, strict=True) if gains is not None else ()):
-        _add_servo(spec, index, *pair)
+    if gains is not None:
+        for index, (position_gain, velocity_gain) in enumerate(zip(*gains, strict=True)):
+            _add_servo(spec, index, position_gain, velocity_gain)
     model = spec.compile()
     motors = [model.joint(f"motor{index}") for index in range(len(arm))]
-    places, dofs = ([getattr(motor, kind)[0] for motor in motors] for kind in ("qposadr", "dofadr"))
-    return Plant(model, np.array(places), np.array(dofs))
+    places = np.array([motor.qposadr[0] for motor in motors])
+    dofs = np.array([motor.dofadr[0] for motor in motors])
+    return Plant(model, places, dofs)
 
 
 def inverse_dynamics(arm: Arm, motion: Motion) -> Array:
@@ -194,7 +193,10 @@ def inverse_dynamics(arm: Arm, motion: Motion) -> Array:
     data = mujoco.MjData(made.model)
     torques = np.empty(motion.position.shape)
     states = zip(motion.position, motion.velocity, motion.acceleration, strict=True)
-    for sample, (data.qpos[:], data.qvel[:], data.qacc[:]) in enumerate(states):
+    for sample, (position, velocity, acceleration) in enumerate(states):
+        data.qpos[:] = position
+        data.qvel[:] = velocity
+        data.qacc[:] = acceleration
         mujoco.mj_inverse(made.model, data)
         torques[sample] = data.qfrc_inverse
     return torques

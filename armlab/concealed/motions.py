@@ -96,13 +96,14 @@ def make_reference(family: str, rng: np.random.Generator, time: Array, machine: 
 
 
 def _random_waves(rng: np.random.Generator, time: Array, joints: int, frequency_hz: Array, weight: Array) -> Array:
-    sine, cosine = (rng.normal(0, 1, (len(frequency_hz), joints)) * weight[:, None] for _ in range(2))
+    sine = rng.normal(0, 1, (len(frequency_hz), joints)) * weight[:, None]
+    cosine = rng.normal(0, 1, (len(frequency_hz), joints)) * weight[:, None]
     angle = 2 * np.pi * np.outer(time, frequency_hz)
     return np.asarray(np.sin(angle) @ sine + np.cos(angle) @ cosine)
 
 
 def _trapezoid(share: Array, ramp: float) -> Array:
-    """Way from 0 to 1 with a trapezoid of velocity whose ramps take this share of the time."""
+    """Path from 0 to 1 with a trapezoidal velocity; ramp: share of the time of each ramp."""
     top = 1 / (1 - ramp)
     up = np.minimum(share, ramp) ** 2 * top / (2 * ramp)
     down = np.maximum(share - (1 - ramp), 0) ** 2 * top / (2 * ramp)
@@ -110,7 +111,7 @@ def _trapezoid(share: Array, ramp: float) -> Array:
 
 
 def moving_average(path: Array, width: int) -> Array:
-    """Mean over a window about each sample; the ends stay."""
+    """Mean over a window about each sample; the first and last sample are repeated beyond the ends."""
     padded = np.concatenate([np.repeat(path[:1], width // 2, 0), path, np.repeat(path[-1:], width - width // 2, 0)])
     total = np.cumsum(np.vstack([np.zeros((1, path.shape[1])), padded]), axis=0)
     return np.asarray((total[width:] - total[:-width])[: len(path)] / width)

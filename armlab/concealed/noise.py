@@ -1,7 +1,6 @@
 """Noise on the torque channels: white and coloured for development, further kinds for judged nulls only."""
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
@@ -10,6 +9,25 @@ from armlab.common.arrays import Array
 
 USUAL_KINDS = ("white", "coloured")
 JUDGED_KINDS = ("heavy_tails", "growing_with_speed", "quantised", "mains_hum")  # never in development sets
+
+
+@dataclass(frozen=True)
+class NoiseRanges:
+    """What a case draws its noise from; chosen by eye, in the range of logged motor currents.
+
+    level: standard deviation of a sample, share of the rating. coloured_share, realistic_coloured_share: the coloured
+    part over the whole, by tier. white_coloured_share: the same of noise that is called white. corner_hz: of the
+    coloured part.
+    """
+
+    level: tuple[float, float] = (0.0015, 0.004)
+    coloured_share: tuple[float, float] = (0.3, 0.7)
+    realistic_coloured_share: tuple[float, float] = (0.5, 0.85)
+    white_coloured_share: float = 0.02
+    corner_hz: tuple[float, float] = (1.5, 15)
+
+
+NOISE = NoiseRanges()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +74,6 @@ class Noise:
         """Torque channels (samples, joints) at the resolution of the kind of noise."""
         return np.rint(torque / (3 * self.white)) * 3 * self.white if self.kind == "quantised" else torque
 
-    def facts(self) -> dict[str, Any]:
-        """For the answers."""
-        return {**asdict(self), "white": self.white.tolist(), "coloured": self.coloured.tolist()}
-
     def whitened(self, signal: Array, joint: int, rate_hz: float) -> Array:
         """A signal (samples, ...) of one joint, filtered so that the usual noise would be white with unit variance.
 
@@ -75,7 +89,10 @@ class Noise:
 
 
 def draw_noise(rng: np.random.Generator, kind: str, rating: Array, realistic: bool) -> Noise:
-    """Noise of some tenths of a per cent of the rating; coloured noise is the stronger in the realistic tier."""
-    level = rating * np.exp(rng.uniform(np.log(0.0015), np.log(0.004), len(rating)))
-    share = 0.02 if kind == "white" else rng.uniform(0.5, 0.85) if realistic else rng.uniform(0.3, 0.7)
-    return Noise(kind, level * np.sqrt(1 - share**2), level * share, float(rng.uniform(1.5, 15)))
+    """Noise of the level of `NOISE`; its coloured part is larger in the realistic tier."""
+    low, high = NOISE.level
+    level = rating * np.exp(rng.uniform(np.log(low), np.log(high), len(rating)))
+    share = NOISE.white_coloured_share
+    if kind != "white":
+        share = rng.uniform(*(NOISE.realistic_coloured_share if realistic else NOISE.coloured_share))
+    return Noise(kind, level * np.sqrt(1 - share**2), level * share, float(rng.uniform(*NOISE.corner_hz)))

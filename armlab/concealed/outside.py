@@ -31,13 +31,9 @@ from armlab.concealed.engine import Mount, Parts, Pendulum, Track
 
 
 class OutsideEffect(HiddenEffect):
-    """An effect without a name in the vocabulary: it has no parameters that could be compared."""
+    """An effect without a name in the library of the diagnosis: no parameter of it can be compared."""
 
     forms = ("frozen",)
-
-    def units(self) -> dict[str, str]:
-        """None."""
-        return {}
 
 
 def draw_other_joint(rng: np.random.Generator, machine: Machine, joint: int) -> float:
@@ -52,13 +48,11 @@ class ViscousMap(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Four harmonics of the turn."""
         shape = {f"c{index}": float(value) for index, value in enumerate(rng.normal(0, 0.5, 8))}
         coefficient = torque_share(0.03, machine, joint)
         return cls(joint, coefficient, 8 * coefficient, "frozen", shape)
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion where the map is positive."""
         position = track.position[:, self.joint]
         waves = [wave(order * position) for order in (1, 2, 3, 4) for wave in (np.sin, np.cos)]
         levels = sum(self.shape[f"c{index}"] * wave for index, wave in enumerate(waves))
@@ -72,11 +66,9 @@ class FieldWeakening(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Some per cent at usual speeds."""
         return cls(joint, 0.05, 0.4, "frozen")
 
     def torque(self, track: Track, run: int) -> Array:
-        """The additional current, as torque."""
         return np.asarray(self.size * track.load[:, self.joint] * track.velocity[:, self.joint] ** 2)
 
 
@@ -87,11 +79,9 @@ class QuadraticSensor(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Bent by some per cent of the rating."""
         return cls(joint, 0.1, 2.0, "frozen", {"rating": torque_share(1.0, machine, joint)})
 
     def read(self, torque: Array) -> Array:
-        """One channel bent."""
         read, column = torque.copy(), torque[:, self.joint]
         read[:, self.joint] += self.size * column**2 / self.shape["rating"]
         return read
@@ -104,18 +94,15 @@ class HoseHysteresis(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Driven by another joint."""
         shape = {"from": draw_other_joint(rng, machine, joint), "way": float(rng.uniform(0.1, 0.5))}
         level = torque_share(0.03, machine, joint)
         return cls(joint, level, 8 * level, "frozen", shape)
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Where the torque appears, and where the motion is."""
         return (self.joint + 1, int(self.shape["from"]) + 1)
 
     def torque(self, track: Track, run: int) -> Array:
-        """The state of the hose."""
         steps = np.diff(track.position[:, int(self.shape["from"])], prepend=track.position[0, int(self.shape["from"])])
         return self.size * bouc_wen(steps / self.shape["way"])
 
@@ -127,23 +114,20 @@ class FlexibleBase(OutsideEffect):
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
-        """The first joint's base, where gravity or the arm's own weight can bend it."""
+        """The base below the first joint."""
         return range(1)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Bends about a horizontal axis of any direction."""
         direction = float(rng.uniform(0, np.pi))
         return cls(joint, 2e-5, 4e-4, "frozen", {"direction": direction})
 
     def parts(self) -> Parts:
-        """The mount."""
         axis = (float(np.cos(self.shape["direction"])), float(np.sin(self.shape["direction"])), 0.0)
         return Parts(mount=Mount(axis, 1 / self.size, 3e-3 / self.size))
 
     @property
     def place(self) -> None:
-        """The whole robot."""
         return None
 
 
@@ -154,16 +138,14 @@ class Slosh(OutsideEffect):
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
-        """The last link."""
         return range(machine.joints - 1, machine.joints)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """A cupful to a bucket."""
         return cls(joint, 0.5, 4.0, "frozen", {"length": float(rng.uniform(0.05, 0.15))})
 
     def parts(self) -> Parts:
-        """The pendulum, at a tenth of critical damping."""
+        """The pendulum has a tenth of critical damping."""
         length = self.shape["length"]
         damping = 0.2 * self.size * length**2 * float(np.sqrt(9.81 / length))
         return Parts(pendulum=Pendulum(self.joint, self.size, length, damping))
@@ -176,12 +158,10 @@ class AccelerationFriction(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Some per cent of the rating."""
         level = torque_share(0.02, machine, joint)
         return cls(joint, level, 8 * level, "frozen")
 
     def torque(self, track: Track, run: int) -> Array:
-        """By the signs of velocity and acceleration."""
         velocity, acceleration = track.velocity[:, self.joint], track.acceleration[:, self.joint]
         return np.asarray(self.size * smooth_sign(velocity, 0.01) * np.tanh(acceleration))
 
@@ -193,18 +173,15 @@ class ProductOfPositions(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """With any other joint."""
         shape = {"from": draw_other_joint(rng, machine, joint), "phase": float(rng.uniform(0, 2 * np.pi))}
         level = torque_share(0.03, machine, joint)
         return cls(joint, level, 8 * level, "frozen", shape)
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """Where the torque appears, and where the motion is."""
         return (self.joint + 1, int(self.shape["from"]) + 1)
 
     def torque(self, track: Track, run: int) -> Array:
-        """By both positions."""
         other = np.sin(track.position[:, int(self.shape["from"])] + self.shape["phase"])
         return np.asarray(self.size * np.sin(track.position[:, self.joint]) * other)
 
@@ -216,12 +193,10 @@ class CurrentDeadBand(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Some per cent of the rating."""
         band = torque_share(0.02, machine, joint)
         return cls(joint, band, 8 * band, "frozen")
 
     def read(self, torque: Array) -> Array:
-        """One channel that is blind about zero."""
         read, column = torque.copy(), torque[:, self.joint]
         read[:, self.joint] -= self.size * np.tanh(column / self.size) * np.exp(-((column / (2 * self.size)) ** 2))
         return read
@@ -234,7 +209,6 @@ class StickyPatches(OutsideEffect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Three patches within the range that is used."""
         low, high = machine.range[:, joint]
         reach = 0.5 * min((high - low) / 2, 2.0)
         places = (low + high) / 2 + rng.uniform(-reach, reach, 3)
@@ -243,7 +217,6 @@ class StickyPatches(OutsideEffect):
         return cls(joint, level, 8 * level, "frozen", {**shape, "width": float(rng.uniform(0.03, 0.12))})
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion, where it sticks."""
         position = track.position[:, self.joint]
         patches = [np.exp(-(((position - self.shape[f"p{index}"]) / self.shape["width"]) ** 4)) for index in range(3)]
         return np.asarray(self.size * np.maximum.reduce(patches) * smooth_sign(track.velocity[:, self.joint]))

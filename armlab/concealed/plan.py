@@ -11,6 +11,7 @@ from armlab.concealed.effects.channels import Offset
 from armlab.concealed.effects.friction import Coulomb, Viscous
 from armlab.concealed.effects.hidden import HiddenEffect, torque_share
 from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.formats import CaseKind, Tier
 from armlab.concealed.motions import FAMILIES
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS, Noise, draw_noise
 from armlab.concealed.outside import OUTSIDE
@@ -22,8 +23,6 @@ def random_stream(*names: str | int) -> np.random.Generator:
     return named_generator("concealed", *names)
 
 
-Tier = Literal["clean", "realistic"]
-CaseKind = Literal["single", "pair", "triple", "outside", "decoy", "null"]
 ARM_SHARES = {"irb120-arm": 0.5, "irb120": 0.2, "panda": 0.15, "scara": 0.15}
 KIND_SHARES: dict[CaseKind, float] = {
     "single": 0.5,
@@ -34,9 +33,32 @@ KIND_SHARES: dict[CaseKind, float] = {
     "null": 0.08,
 }
 EFFECT_COUNTS = {"single": 1, "pair": 2, "triple": 3, "outside": 1, "decoy": 0, "null": 0}
-MIN_MULTIPLE, MAX_MULTIPLE = 0.5, 20.0  # detection limits
 BACKGROUND_EFFECTS = ("coulomb_friction", "viscous_friction", "torque_offset", "inertial_parameter_error", "payload")
 DEVELOPMENT_SEEDS = range(1000, 2000)
+
+
+@dataclass(frozen=True)
+class PlanSettings:
+    """What a case is drawn from; fixed before any diagnosis was scored.
+
+    multiples: sizes of hidden effects, detection limits. link_error, decoy_link_error: relative errors of links. rates:
+    share of each sample rate, Hz. coulomb, viscous, offset: of the background, share of the rating (viscous: at 1
+    rad/s). offset_share: joints with an offset. identify_s, validate_s: length of a run.
+    """
+
+    multiples: tuple[float, float] = (0.5, 20.0)
+    link_error: tuple[float, float] = (0.03, 0.1)
+    decoy_link_error: tuple[float, float] = (0.03, 0.2)
+    rates: tuple[tuple[int, float], ...] = ((250, 0.3), (500, 0.5), (1000, 0.2))
+    coulomb: tuple[float, float] = (0.02, 0.07)
+    viscous: tuple[float, float] = (0.02, 0.07)
+    offset: tuple[float, float] = (0.002, 0.01)
+    offset_share: float = 0.5
+    identify_s: tuple[float, float] = (10, 15)
+    validate_s: tuple[float, float] = (10, 12)
+
+
+PLAN = PlanSettings()
 
 
 @dataclass(frozen=True)
@@ -71,11 +93,11 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """A name that tells nothing."""
+        """A random name, which says nothing about the case."""
         return random_stream("name", self.seed, self.tier, self.index, self.kind == "null").bytes(6).hex()
 
     def stream(self, what: str) -> np.random.Generator:
-        """The case's random numbers for one purpose."""
+        """Random numbers of the case for one purpose."""
         return random_stream(what, self.seed, self.tier, self.index)
 
 
@@ -88,14 +110,15 @@ def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: 
     noise = draw_noise(rng, _draw_noise_kind(rng, kind, realistic, development), made.rating, realistic)
     arm, errors = _draw_arm(rng, made, realistic or kind == "decoy", kind)
     background = _draw_background(rng, made) if realistic else ()
-    rate = int(rng.choice([250, 500, 1000], p=[0.3, 0.5, 0.2]))
+    rate = int(rng.choice([rate for rate, _ in PLAN.rates], p=[share for _, share in PLAN.rates]))
     return Plan(seed, index, tier, kind, made, _draw_runs(rng), rate, noise, arm, errors, background)
 
 
 def draw_effects(plan: Plan, attempt: int) -> tuple[HiddenEffect, ...]:
-    """The effects of a case with their usual sizes; the next attempt where they cannot be seen.
+    """The effects of a case with their usual sizes.
 
-    No two at one joint of one channel: an effect comes once a case, and only one needs parts of its own.
+    attempt: counts the draws; another one is made if the effects cannot be seen on the arm. An effect comes at most
+    once in a case, and at most one effect needs parts of its own.
     """
     rng = random_stream("effects", plan.seed, plan.tier, plan.index, attempt)
     library = OUTSIDE if plan.kind == "outside" else _allowed_effects(plan)
@@ -119,11 +142,12 @@ def target_multiple(plan: Plan, number: int) -> float:
     golden = (np.sqrt(5) - 1) / 2
     start = random_stream("sizes", plan.seed, plan.tier).random()
     share = (start + golden * plan.index + 0.381966 * number) % 1
-    return float(MIN_MULTIPLE * (MAX_MULTIPLE / MIN_MULTIPLE) ** share)
+    low, high = PLAN.multiples
+    return float(low * (high / low) ** share)
 
 
 def _allowed_effects(plan: Plan) -> tuple[type[HiddenEffect], ...]:
-    """In the realistic tier without what is in the background anyway."""
+    """The library, in the realistic tier without the effects of the background."""
     return tuple(kind for kind in LIBRARY if not plan.realistic or kind.effect not in BACKGROUND_EFFECTS)
 
 
@@ -157,9 +181,11 @@ def _draw_noise_kind(rng: np.random.Generator, kind: CaseKind, realistic: bool, 
 def _draw_arm(rng: np.random.Generator, made: Machine, off: bool, kind: CaseKind) -> tuple[Arm, tuple[float, ...]]:
     """The arm with links that are 3-10 % off (a decoy of the clean tier: up to 20 %), and how much each is."""
     arm, errors = made.arm, list[float]()
-    most = 0.2 if kind == "decoy" else 0.1
-    for number, link in enumerate(arm.links or ()) if off else ():
-        error = float(rng.uniform(0.03, most))
+    error_range = PLAN.decoy_link_error if kind == "decoy" else PLAN.link_error
+    if not off:
+        return arm, ()
+    for number, link in enumerate(arm.links or ()):
+        error = float(rng.uniform(*error_range))
         mass, spread = 1 + error * rng.choice([-1, 1]), 1 + error * rng.uniform(-1, 1)
         reach = float(np.linalg.norm(np.array(link.first_moment))) / link.mass
         shift = error * max(reach, 0.02) * rng.uniform(-1, 1, 3)
@@ -171,15 +197,14 @@ def _draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEff
     """Coulomb and viscous friction on every joint, offsets on half of them."""
     out: list[HiddenEffect] = []
     for joint in range(made.joints):
-        level, slope, offset = (
-            torque_share(float(share), made, joint) for share in rng.uniform((0.02, 0.02, 0.002), (0.07, 0.07, 0.01))
-        )
+        level, slope, offset = rng.uniform(*PLAN.coulomb), rng.uniform(*PLAN.viscous), rng.uniform(*PLAN.offset)
         out += [
-            Coulomb(joint, level, np.inf, "sign", {"width": 0.0}),
-            Viscous(joint, slope, np.inf, "linear", {"phase": 0.0}),
+            Coulomb(joint, torque_share(level, made, joint), np.inf, "sign", {"width": 0.0}),
+            Viscous(joint, torque_share(slope, made, joint), np.inf, "linear", {"phase": 0.0}),
         ]
-        if rng.random() < 0.5:
-            out.append(Offset(joint, offset, np.inf, "constant", {"direction": float(rng.choice([-1, 1]))}))
+        if rng.random() < PLAN.offset_share:
+            size, direction = torque_share(offset, made, joint), float(rng.choice([-1, 1]))
+            out.append(Offset(joint, size, np.inf, "constant", {"direction": direction}))
     return tuple(out)
 
 
@@ -187,5 +212,5 @@ def _draw_runs(rng: np.random.Generator) -> tuple[RunPlan, ...]:
     """Two or three runs of one or two families, and one of another family to validate."""
     families = [str(name) for name in rng.permutation(list(FAMILIES))]
     number = int(rng.integers(2, 4))
-    identify = [RunPlan(families[run % 2], float(rng.uniform(10, 15)), "identify") for run in range(number)]
-    return (*identify, RunPlan(families[2], float(rng.uniform(10, 12)), "validate"))
+    identify = [RunPlan(families[run % 2], float(rng.uniform(*PLAN.identify_s)), "identify") for run in range(number)]
+    return (*identify, RunPlan(families[2], float(rng.uniform(*PLAN.validate_s)), "validate"))

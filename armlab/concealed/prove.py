@@ -1,7 +1,7 @@
 """The blind proof: conceal, seal, diagnose each case in a process of its own, score, and log the result.
 
-The diagnosis is reached through the command line only. It is given a copy of one recording folder, in a place from
-which no path leads to the answers.
+The diagnosis is run through the command line only. It gets a copy of one recording folder, in a temporary folder that
+holds no answers.
 """
 
 import json
@@ -10,7 +10,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -20,10 +20,11 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
+from armlab.concealed.formats import SetKind
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
-from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.cases import FAILURE_FILE, TIME_FILE
 from armlab.concealed.score.scoring import format_lines, score_set
-from armlab.concealed.sets import MANIFEST_FILE, SetKind, SetSettings, conceal_set, file_digest
+from armlab.concealed.sets import SetSettings, conceal_cases, seal_set
 
 QUICK_NAME, QUICK_SEED, QUICK_CASES = "quick", 1900, 24
 TIMEOUT_S = 900.0
@@ -33,7 +34,7 @@ FINISHED_MARK = "finished"
 
 @dataclass(frozen=True)
 class Proof:
-    """The sets of one proof, and its name. commit: of the source tree, None for one that is not judged."""
+    """The sets of one proof, and its name. commit: of the source tree, None for a proof that is not judged."""
 
     sets: dict[str, SetSettings]
     name: str
@@ -48,12 +49,12 @@ def choose_proof(quick: bool, development: int | None, cases: int, nulls: int) -
 
 
 def make_quick_proof() -> Proof:
-    """A small development set, always the same: to see that everything works together."""
+    """A small development set, always the same, to check the whole chain."""
     return Proof({"quick": SetSettings(QUICK_CASES, QUICK_SEED, development=True)}, QUICK_NAME)
 
 
 def make_development_proof(seed: int, cases: int, nulls: int) -> Proof:
-    """Sets to learn from, kept out of the log; InputError for a seed that is not for development."""
+    """Sets for development, which are not logged; InputError for a seed that is not for development."""
     if seed not in DEVELOPMENT_SEEDS:
         raise InputError(
             f"seed {seed} should be one for development, {DEVELOPMENT_SEEDS[0]} to {DEVELOPMENT_SEEDS[-1]}"
@@ -63,7 +64,7 @@ def make_development_proof(seed: int, cases: int, nulls: int) -> Proof:
 
 
 def make_judged_proof(cases: int, nulls: int) -> Proof:
-    """Sets whose seed follows from the commit: nobody can have tuned on them before it was made."""
+    """Sets whose seed follows from the commit, so that nobody could tune on them before the commit existed."""
     commit = _run_git("rev-parse", "HEAD")
     seed = judged_seed(commit)
     sets = {kind: SetSettings(count, seed, kind=kind) for count, kind in _set_sizes(cases, nulls)}
@@ -75,46 +76,57 @@ def _set_sizes(cases: int, nulls: int) -> tuple[tuple[int, SetKind], ...]:
 
 
 def judged_seed(commit: str) -> int:
-    """A seed from a commit's hash; never one of those for development."""
+    """A seed from the hash of a commit; never a development seed."""
     return DEVELOPMENT_SEEDS.stop + int(commit[:12], 16)
 
 
 def prove(proof: Proof, work: Path, results: Path, jobs: int) -> Iterator[str]:
-    """Does what is missing of a proof and tells how far it is; scores go to `results`, a folder a set.
+    """Conceals, seals, diagnoses, scores and logs each set of a proof; yields the lines that report it.
 
-    work: sets and verdicts, kept so that a proof that was interrupted goes on; one that is not judged and was finished
-    starts anew, a judged one is only scored again. A judged proof is added to `results`/log.jsonl, once. Raises
-    InputError for a working folder of another proof.
+    work: folder of the sets and verdicts. An interrupted proof continues there. results: folder of the scores, one
+    folder a set, and of the log. A judged set is added to the log once, with any score.
+    Raises InputError if `work` holds another proof.
     """
-    if proof.commit is None and (work / FINISHED_MARK).is_file():
-        shutil.rmtree(work)
+    _remove_finished_development(proof, work)
     for name, settings in proof.sets.items():
-        folder, verdicts = work / name / "set", work / name / "verdicts"
+        folder, verdicts, finished = work / name / "set", work / name / "verdicts", work / name / FINISHED_MARK
         yield f"{name}: {settings.cases} cases, seed {settings.seed}"
-        yield from _report_progress("concealed", conceal_set(settings, folder, jobs), settings.cases)
-        sealed = file_digest(folder / MANIFEST_FILE)
+
+        yield from report_progress("concealed", conceal_cases(settings, folder, jobs), settings.cases)
+
+        cases, sealed = seal_set(settings, folder)
         yield f"{name}: manifest SHA-256 {sealed}"
-        cases = json.loads((folder / MANIFEST_FILE).read_text(encoding="utf-8"))["cases"]
-        yield from _report_progress("diagnosed", diagnose_all(folder, verdicts, cases, jobs), len(cases))
-        found = score_set(folder, verdicts, sealed, results / name)
-        yield from format_lines(found)
-        if proof.commit is not None and not (work / name / FINISHED_MARK).is_file():
-            _append_to_log(results / LOG_FILE, proof.commit, name, found)
-        (work / name / FINISHED_MARK).touch()
+
+        yield from report_progress("diagnosed", diagnose_all(folder, verdicts, cases, jobs), len(cases))
+
+        score = score_set(folder, verdicts, sealed, results / name)
+        yield from format_lines(score)
+
+        if proof.commit is not None and not finished.is_file():
+            append_to_log(results / LOG_FILE, proof.commit, name, score)
+        finished.touch()
     (work / FINISHED_MARK).touch()
 
 
-def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int) -> Iterator[str]:
-    """Diagnoses the cases that have no verdict yet, each in its own process; tells their names as they are done."""
-    missing = [
-        case for case in cases if not any((verdicts / case / name).is_file() for name in ("time.json", FAILURE_FILE))
-    ]
+def _remove_finished_development(proof: Proof, work: Path) -> None:
+    """A finished proof that is not judged starts again from nothing; a judged one keeps its verdicts."""
+    if proof.commit is None and (work / FINISHED_MARK).is_file():
+        shutil.rmtree(work)
+
+
+def diagnose_all(folder: Path, verdicts: Path, cases: Sequence[str], jobs: int) -> Iterator[str]:
+    """Diagnoses the cases of a set that have no verdict yet, each in its own process; yields the name of each."""
+    missing = [case for case in cases if not _is_diagnosed(verdicts / case)]
     work = (delayed(_diagnose_case)(folder / "observations" / case, verdicts / case) for case in missing)
     yield from Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(work)
 
 
+def _is_diagnosed(out: Path) -> bool:
+    return (out / TIME_FILE).is_file() or (out / FAILURE_FILE).is_file()
+
+
 def _diagnose_case(observation: Path, out: Path) -> str:
-    """One diagnosis; the time is written last and says that the verdict is whole."""
+    """Diagnoses one case. The time is written last and marks the verdict as complete."""
     out.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as desk:
         copy = shutil.copytree(observation, Path(desk) / observation.name)
@@ -125,12 +137,12 @@ def _diagnose_case(observation: Path, out: Path) -> str:
     if complaint is not None:
         (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
     else:
-        (out / "time.json").write_text(json.dumps({"seconds": round(seconds, 2)}) + "\n", encoding="utf-8")
+        (out / TIME_FILE).write_text(json.dumps({"seconds": round(seconds, 2)}) + "\n", encoding="utf-8")
     return observation.name
 
 
 def _run_and_get_error(command: list[str]) -> str | None:
-    """Runs a command; what it said if it failed, None if it did not."""
+    """The error output of a command that failed, None for one that succeeded."""
     about: dict[str, Any] = {"env": _one_thread_environment(), "cwd": _source_root(), "timeout": TIMEOUT_S}
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False, **about)
@@ -147,32 +159,30 @@ def _source_root() -> Path:
     return Path(__file__).resolve().parents[2]
 
 
-def _report_progress(what: str, done: Iterator[str], total: int) -> Iterator[str]:
-    """A line every tenth of the way."""
-    every = max(total // 10, 1)
-    for number, _ in enumerate(done, 1):
-        if number % every == 0:
-            yield f"  {what} {number} of {total}"
-
-
-def _append_to_log(path: Path, commit: str, name: str, found: dict[str, Any]) -> None:
-    """Adds a judged run, good or bad, once."""
+def append_to_log(path: Path, commit: str, name: str, score: dict[str, Any]) -> None:
+    """Adds a line to the log of judged runs: commit, seed, seal, and each measure by its id."""
     entry = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": commit,
-        "changed_files": bool(
-            _run_git("status", "--porcelain", "--untracked-files=no", ".", ":!results")
-        ),  # of the code
+        "changed_files": bool(_run_git("status", "--porcelain", "--untracked-files=no", ".", ":!results")),
         "set": name,
-        **{key: found[key] for key in ("seed", "cases", "manifest")},
+        **{key: score[key] for key in ("seed", "cases", "manifest")},
         "score": {
-            tier: {each["name"]: [each["value"], each["low"], each["high"], each["number"]] for each in measures}
-            for tier, measures in found["tiers"].items()
+            tier: {each["id"]: [each["value"], each["low"], each["high"], each["number"]] for each in measures}
+            for tier, measures in score["tiers"].items()
         },
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(entry) + "\n")
+
+
+def report_progress(what: str, done: Iterator[str], total: int) -> Iterator[str]:
+    """Runs an iterator and yields a line after each tenth of the total."""
+    every = max(total // 10, 1)
+    for number, _ in enumerate(done, 1):
+        if number % every == 0:
+            yield f"  {what} {number} of {total}"
 
 
 def _run_git(*arguments: str) -> str:

@@ -9,38 +9,42 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TypeVar
 
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
-from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, Tier, draw_plan
+from armlab.concealed.case_files import write_case
+from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, SetTier, Tier, read_model, write_model
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan
+from armlab.concealed.sizing import simulate_case
 
 MANIFEST_FILE = "manifest.json"
+ManifestModel = TypeVar("ManifestModel", SetManifest, LoopManifest)
 
 
-def write_manifest(folder: Path, facts: dict[str, Any]) -> str:
-    """Writes the manifest of a concealed set and returns its SHA-256."""
+def seal_files(folder: Path) -> dict[str, str]:
+    """The SHA-256 of every observation and answer below a folder, by path from it."""
     parts = (path for part in ("observations", "truth") for path in (folder / part).rglob("*") if path.is_file())
     files = {path.relative_to(folder).as_posix(): file_digest(path) for path in parts}
-    content = json.dumps({"schema": "manifest/1", **facts, "files": dict(sorted(files.items()))}, indent=1) + "\n"
-    (folder / MANIFEST_FILE).write_text(content, encoding="utf-8")
-    return file_digest(folder / MANIFEST_FILE)
+    return dict(sorted(files.items()))
 
 
-def read_checked_manifest(folder: Path, expected: str | None = None) -> tuple[dict[str, Any], str]:
-    """The manifest of a concealed set and its SHA-256, after every file was compared with it.
+def read_checked_manifest(
+    folder: Path, model: type[ManifestModel], expected: str | None = None
+) -> tuple[ManifestModel, str]:
+    """A manifest and its SHA-256, after every file was compared with it.
 
     expected: the SHA-256 that was printed. Raises InputError if anything differs.
     """
     path = folder / MANIFEST_FILE
     if not path.is_file():
-        raise InputError(f"no {MANIFEST_FILE} in {folder}: it is no finished concealed set")
+        raise InputError(f"no {MANIFEST_FILE} in {folder}: this is not a finished concealed set")
     found = file_digest(path)
     if expected is not None and found != expected:
         raise InputError(f"{path} has the SHA-256 {found}, not {expected}: it is not the manifest that was sealed")
-    manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    for name, value in manifest["files"].items():
+    manifest = read_model(model, path)
+    for name, value in manifest.files.items():
         file = folder / name
         if not file.is_file() or file_digest(file) != value:
             what = "was changed" if file.is_file() else "is missing"
@@ -53,7 +57,6 @@ def file_digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-SetKind = Literal["mixed", "nulls"]
 TIERS: tuple[Tier, ...] = ("clean", "realistic")
 SETTINGS_FILE = "settings.json"
 
@@ -64,7 +67,7 @@ class SetSettings:
 
     cases: int
     seed: int
-    tier: Literal["clean", "realistic", "both"] = "both"
+    tier: SetTier = "both"
     kind: SetKind = "mixed"
     development: bool = False
 
@@ -75,34 +78,49 @@ class SetSettings:
         return draw_plan(self.seed, index, tiers[tier], self.kind == "nulls", self.development)
 
 
-def make_set_settings(cases: int, seed: int, tier: Any, kind: Any, development: bool) -> SetSettings:
-    """The settings of a set; seeds 1000-1999 make development sets, whatever was asked."""
+def make_set_settings(cases: int, seed: int, tier: SetTier, kind: SetKind, development: bool) -> SetSettings:
+    """The settings of a set; seeds 1000-1999 always make development sets."""
     return SetSettings(cases, seed, tier, kind, development or seed in DEVELOPMENT_SEEDS)
 
 
-def conceal_set(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
-    """Makes what is missing of a set, tells each case's name as it is done, last the manifest's SHA-256.
+def conceal_cases(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
+    """Makes the missing cases of a set and yields the name of each; an incomplete set loses its seal.
 
     Raises InputError for a folder that holds another set.
     """
     _claim_folder(settings, out)
-    names = [settings.plan(number).name for number in range(settings.cases)]
-    missing = [number for number, name in enumerate(names) if not _is_done(out, name)]
+    missing = [number for number in range(settings.cases) if not _is_done(out, settings.plan(number).name)]
+    if missing:
+        (out / MANIFEST_FILE).unlink(missing_ok=True)
     work = (delayed(_make_case)(settings, number, out) for number in missing)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
-    if missing or not (out / MANIFEST_FILE).is_file():
-        facts = {key: value for key, value in asdict(settings).items() if key != "cases"}
-        write_manifest(out, {**facts, "cases": sorted(names)})
+
+
+def seal_set(settings: SetSettings, out: Path) -> tuple[list[str], str]:
+    """The names of a complete set's cases and the SHA-256 of its manifest, which is written unless it is there."""
+    names = sorted(settings.plan(number).name for number in range(settings.cases))
+    if not (out / MANIFEST_FILE).is_file():
+        manifest = SetManifest(
+            schema="manifest/1",
+            seed=settings.seed,
+            tier=settings.tier,
+            kind=settings.kind,
+            development=settings.development,
+            cases=tuple(names),
+            files=seal_files(out),
+        )
+        write_model(manifest, out / MANIFEST_FILE)
+    return names, file_digest(out / MANIFEST_FILE)
 
 
 def _claim_folder(settings: SetSettings, out: Path) -> None:
-    """Notes what the folder is for, before hours of work."""
+    """Writes the settings into the folder before the cases are made, so that another set is refused there."""
     content = json.dumps(asdict(settings), indent=1) + "\n"
     note = out / SETTINGS_FILE
     if note.is_file() and note.read_text(encoding="utf-8") != content:
         raise InputError(f"{out} holds another concealed set (see {note}): choose another folder")
     if out.exists() and not note.is_file() and any(out.iterdir()):
-        raise InputError(f"{out} is there already and holds no concealed set: choose another folder")
+        raise InputError(f"{out} exists and holds no concealed set: choose another folder")
     for part in ("observations", "truth"):
         (out / part).mkdir(parents=True, exist_ok=True)
     note.write_text(content, encoding="utf-8")
@@ -113,10 +131,7 @@ def _is_done(out: Path, name: str) -> bool:
 
 
 def _make_case(settings: SetSettings, number: int, out: Path) -> str:
-    """Makes one case in a draft folder; the observation's renaming comes last, so that a cut leaves no half."""
-    from armlab.concealed.case_files import write_case
-    from armlab.concealed.sizing import simulate_case
-
+    """Makes one case in a draft folder. Its observation is moved last and marks the case as complete."""
     plan = settings.plan(number)
     draft = out / "drafts" / plan.name
     shutil.rmtree(draft, ignore_errors=True)

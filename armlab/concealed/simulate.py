@@ -5,9 +5,9 @@ the second difference of positions is exactly the acceleration of the torque at 
 centred afterwards; without that, every viscous torque would seem late.
 
 Effects without a place in the engine are torques that the motors give on top of what moves the mechanism. The inner
-loops of the servos take up their fast part at once; the slow part disturbs the motion, as computed on a coarser pass.
-The recorded torque is the sum of what moves the mechanism and of the laws on the very motion that was simulated.
-Motion and torque therefore fit exactly, however the servos shared the work.
+loops of the servos compensate their fast part at once; the slow part disturbs the motion, as computed on a coarser
+pass. The recorded torque is the sum of what moves the mechanism and of the laws on the motion that was simulated.
+Motion and torque therefore agree exactly.
 """
 
 from collections.abc import Sequence
@@ -29,8 +29,26 @@ from problem.motion import Motion
 from problem.regressor import observation_matrix, rigid_body_torque
 
 FINE_HZ, COARSE_HZ = 8000, 2000
-INNER_LOOP_S = 0.04  # time within which the inner loops take up a change of friction
 MARGIN_S = 0.25  # simulated before the first and after the last sample: the start dies away, intervals fit
+
+
+@dataclass(frozen=True)
+class ServoSettings:
+    """The servos that a case draws; chosen by eye, in the range of industrial drives.
+
+    bandwidth_hz, damping: ranges of the loop of each joint. model_error: range of the factors on the links that the
+    feed-forward assumes. compensated: range of the share of the usual friction that the feed-forward makes up for.
+    inner_loop_s: time within which the inner loops take up a change of friction.
+    """
+
+    bandwidth_hz: tuple[float, float] = (12, 25)
+    damping: tuple[float, float] = (0.7, 1.1)
+    model_error: tuple[float, float] = (0.9, 1.1)
+    compensated: tuple[float, float] = (0.6, 0.95)
+    inner_loop_s: float = 0.04
+
+
+SERVOS = ServoSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +74,11 @@ class Reference:
 
 def draw_controller(rng: np.random.Generator, nominal: Arm) -> Controller:
     """Servos with 12-25 Hz and a feed-forward whose links are off by up to a tenth."""
-    bandwidth = 2 * np.pi * rng.uniform(12, 25, len(nominal))
-    damping = rng.uniform(0.7, 1.1, len(nominal))
+    bandwidth = 2 * np.pi * rng.uniform(*SERVOS.bandwidth_hz, len(nominal))
+    damping = rng.uniform(*SERVOS.damping, len(nominal))
     inertia = mean_inertia(nominal)
-    model = scale_links(nominal, rng.uniform(0.9, 1.1, len(nominal)))
-    compensated = rng.uniform(0.6, 0.95, len(nominal))
+    model = scale_links(nominal, rng.uniform(*SERVOS.model_error, len(nominal)))
+    compensated = rng.uniform(*SERVOS.compensated, len(nominal))
     return Controller(inertia * bandwidth**2, 2 * damping * inertia * bandwidth, model, compensated)
 
 
@@ -100,28 +118,27 @@ def run_times(length_s: float, rate_hz: int) -> Array:
 def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Reference, taken: Array) -> Track:
     """The run of an arm with hidden parts.
 
-    taken: (steps, joints), N m, torque that effects without a place in the engine take from the motors: as it
-    was on an earlier, coarser pass.
-    Raises FloatingPointError if the simulation runs away.
+    taken: (steps, joints), N m, torque of the effects without a place in the engine, from an earlier, coarser pass.
+    Raises FloatingPointError if the simulation diverges.
     """
     step = float(reference.time[1] - reference.time[0])
     made = build_plant(arm, parts, step, (controller.position_gain, controller.velocity_gain))
-    wanted = Motion(reference.position, *_derivatives(reference.position, step))
+    wanted = _differentiate_reference(reference.position, step)
     forward = rigid_torque(controller.model, wanted)
     gains = controller.position_gain * wanted.position + controller.velocity_gain * wanted.velocity
-    width = round(INNER_LOOP_S / step)
+    width = round(SERVOS.inner_loop_s / step)
     control = gains + forward - moving_average(moving_average(taken, width), width)
     states = _roll_out(made, wanted, control, _initial_twists(arm, parts, wanted))
     return _make_track(made, controller, reference.time, states, control)
 
 
-def _derivatives(position: Array, step: float) -> tuple[Array, Array]:
+def _differentiate_reference(position: Array, step: float) -> Motion:
     velocity = np.gradient(position, step, axis=0)
-    return velocity, np.gradient(velocity, step, axis=0)
+    return Motion(position, velocity, np.gradient(velocity, step, axis=0))
 
 
 def _initial_twists(arm: Arm, parts: Parts, wanted: Motion) -> dict[str, float]:
-    """Springs by name with the twist that carries the first load: a start without it would ring for seconds."""
+    """Twist of each spring that carries the first load, rad, by name; without it the start would ring for seconds."""
     first = Motion(wanted.position[:1], wanted.velocity[:1], wanted.acceleration[:1])
     load = rigid_body_torque(arm, first)[0]
     return {f"spring{spring.joint}": spring.at_rest(float(load[spring.joint])) for spring in parts.springs}
@@ -208,7 +225,7 @@ def free_columns(arm: Arm, track: Track, grid: Array, friction_only: bool = Fals
 
 
 def absorbed_rotors(arm: Arm) -> list[int]:
-    """Joints (from 0) whose rotor no motion tells from the links."""
+    """Joints (from 0) whose rotor no motion separates from the links."""
     states = np.random.default_rng(0).uniform(-2, 2, (3, 200, len(arm)))
     motion = Motion(*states)
     rigid = observation_matrix(arm, motion)[:, base_parameters(arm).columns]
@@ -233,12 +250,14 @@ def law_torque(effects: Sequence[HiddenEffect], track: Track, run: int) -> Array
 
 
 def reference_track(plan: Plan, number: int, run: RunPlan) -> Track:
-    """The reference of a run, as a track of the arm without hidden effects."""
+    """The reference of the run of that number, as a track of the arm without hidden effects."""
     time = run_times(run.length_s, FINE_HZ)
-    position = make_reference(run.family, plan.stream(f"motion {number}"), time, plan.machine)
-    step = float(time[1] - time[0])
-    velocity = np.gradient(position, step, axis=0)
-    motion = Motion(position, velocity, np.gradient(velocity, step, axis=0))
+    return track_reference(plan, time, make_reference(run.family, plan.stream(f"motion {number}"), time, plan.machine))
+
+
+def track_reference(plan: Plan, time: Array, position: Array) -> Track:
+    """Positions (steps, joints) at even instants, as a track of the arm without hidden effects."""
+    motion = _differentiate_reference(position, float(time[1] - time[0]))
     return Track(time, motion, rigid_torque(plan.true_arm, motion))
 
 
@@ -253,7 +272,7 @@ def arm_with_effects(plan: Plan, hidden: Sequence[HiddenEffect]) -> Arm:
 def simulate_runs(
     plan: Plan, hidden: Sequence[HiddenEffect], controller: Controller, before: Sequence[Track], wanted: Sequence[Track]
 ) -> tuple[Track, ...]:
-    """Simulates all runs, at the step of the wanted tracks, with what the effects took on the tracks before."""
+    """Simulates all runs at the step of the wanted tracks, with the torque of the laws on the tracks before."""
     arm, usual = arm_with_effects(plan, hidden), 1 - controller.compensated
     parts = sum((effect.parts() for effect in hidden), Parts())
     out = []

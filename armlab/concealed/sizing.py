@@ -1,13 +1,14 @@
 """Sizes of hidden effects: the detection limit, and the search for the size that has a given multiple of it.
 
-The limit is what an oracle with the true form and the true noise finds with 90 % power. The oracle tests one number,
-the size of the effect, after everything free has been projected out of its torque, in whitened rows. The level of the
-test is one per cent over all effects and places that a diagnosis may look at. The *multiple* of an effect is the
-square root of its noncentrality over that of the limit.
+The limit is the size that an oracle finds with 90 % power. The oracle knows the true law and the true noise. It tests
+one number, the size of the effect, in whitened rows from which all free columns are projected out. The level of its
+test is 1 % over all effects and places that a diagnosis may look at. The *multiple* of an effect is
 
-Effects are sized on the reference, simulated coarsely, corrected, and then simulated finely. The size of an effect
-with parts of its own (a spring, a play, a base that gives way) shows in simulations only, and not in proportion: it
-is simulated coarsely as often as needed.
+    multiple = sqrt(noncentrality of the effect / noncentrality of the limit).
+
+Effects get their sizes on the reference; a coarse simulation corrects them; a fine simulation makes the recording. An
+effect with parts of its own (a spring, a gap, a base that gives way) does not grow in proportion to its size, so it
+needs several coarse simulations.
 """
 
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from scipy.stats import chi2, ncx2
 
 from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.engine import Track
 from armlab.concealed.noise import Noise
 from armlab.concealed.plan import Plan, draw_effects, target_multiple
@@ -34,24 +36,61 @@ from armlab.concealed.simulate import (
     reference_track,
     simulate_runs,
 )
-from armlab.recordings.vocabulary import EFFECTS
 
-ORACLE_HZ = 250.0  # rows a second: means over 4 ms
-FAMILY_WISE_LEVEL, ORACLE_POWER = 0.01, 0.9
-MIN_COLUMN_POWER = 1e-10  # share of a column's power that counts as rounding
+
+@dataclass(frozen=True)
+class OracleSettings:
+    """The definition of the detection limit; chosen before any diagnosis was scored.
+
+    rate_hz: rows a second, each a mean over several samples. family_wise_level: chance of a false alarm over all
+    effects and places. power: chance to find an effect of one limit. min_column_power: smallest share of the power of
+    free columns that counts as more than rounding. end_s: time left out at the end of a run, s.
+    """
+
+    rate_hz: float = 250.0
+    family_wise_level: float = 0.01
+    power: float = 0.9
+    min_column_power: float = 1e-10
+    end_s: float = 0.05
+
+
+@dataclass(frozen=True)
+class SizingSettings:
+    """The search for a size; chosen by trial on development sets.
+
+    max_draws: draws of effects on one arm; the last one is kept although it cannot be seen. min_target_share: share
+    of the target multiple that counts as seen. max_steps, tolerance: of the search on reference tracks, the tolerance
+    as logarithm of the multiple. min_multiple, max_factor: smallest multiple that is divided by, and longest step of
+    the size. exponents: range of the power of the size that a multiple may follow. max_coarse_passes,
+    coarse_tolerance: of the search on coarse simulations. max_halvings: shorter steps where a simulation runs away.
+    """
+
+    max_draws: int = 6
+    min_target_share: float = 0.6
+    max_steps: int = 4
+    tolerance: float = 0.03
+    min_multiple: float = 1e-9
+    max_factor: float = 1e3
+    exponents: tuple[float, float] = (0.25, 3.0)
+    max_coarse_passes: int = 6
+    coarse_tolerance: float = 0.1
+    max_halvings: int = 3
+
+
+ORACLE, SIZING = OracleSettings(), SizingSettings()
 
 
 def candidate_count(joints: int) -> int:
-    """Effects times places in the vocabulary: what a test has to be corrected for."""
+    """Number of tests that a diagnosis makes, effects times places: the level of a test is corrected for it."""
     places = {"joint": joints, "coupling": joints * (joints - 1), "link": joints, "robot": 1}
-    return sum(places[effect.where] for effect in EFFECTS if effect.id != "unknown")
+    return sum(places[effect.where] for effect in LIBRARY)
 
 
 @lru_cache(maxsize=32)
 def limit_noncentrality(joints: int) -> float:
     """Noncentrality of a chi-square of one degree of freedom that is found with 90 % power."""
-    critical = chi2.isf(FAMILY_WISE_LEVEL / candidate_count(joints), 1)
-    return float(brentq(lambda value: ncx2.sf(critical, 1, value) - ORACLE_POWER, 1.0, 200.0))
+    critical = chi2.isf(ORACLE.family_wise_level / candidate_count(joints), 1)
+    return float(brentq(lambda value: ncx2.sf(critical, 1, value) - ORACLE.power, 1.0, 200.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,11 +125,11 @@ class Oracle:
         """Whitened rows (samples * joints, columns)."""
         thinned = Noise(
             self.noise.kind,
-            self.noise.white * np.sqrt(min(ORACLE_HZ / self.rate_hz, 1.0)),  # of a mean over several samples
+            self.noise.white * np.sqrt(min(ORACLE.rate_hz / self.rate_hz, 1.0)),  # of a mean over several samples
             self.noise.coloured,
             self.noise.corner_hz,
         )
-        out = [thinned.whitened(columns[:, joint], joint, ORACLE_HZ) for joint in range(columns.shape[1])]
+        out = [thinned.whitened(columns[:, joint], joint, ORACLE.rate_hz) for joint in range(columns.shape[1])]
         return np.vstack(out)
 
 
@@ -106,19 +145,13 @@ def _orthonormal_basis(columns: Array) -> Array:
     lengths = np.linalg.norm(columns, axis=0)
     scaled = columns[:, lengths > 0] / lengths[lengths > 0]
     power, axes = np.linalg.eigh(scaled.T @ scaled)
-    kept = power > MIN_COLUMN_POWER
+    kept = power > ORACLE.min_column_power
     return np.asarray(scaled @ (axes[:, kept] / np.sqrt(power[kept])))
-
-
-MAX_EFFECT_DRAWS = 6  # draws of effects that cannot be seen on this arm, before one is taken as it is
-MIN_TARGET_SHARE = 0.6  # of the multiple aimed at
-MAX_SIZE_STEPS, MULTIPLE_TOLERANCE = 4, 0.03  # of the search for a size, and when it ends
-SIZE_EXPONENT_RANGE, MAX_SIZE_FACTOR = (0.25, 3.0), 1e3  # of the size that a multiple may follow, and the longest step
 
 
 @dataclass(frozen=True, eq=False)
 class SizedEffects:
-    """Effects with their sizes. targets: multiples aimed at. passed_over: names of draws that could not be seen."""
+    """Effects with their sizes. targets: wanted multiples. passed_over: effects that were drawn and not seen."""
 
     hidden: tuple[HiddenEffect, ...]
     targets: tuple[float, ...]
@@ -131,20 +164,20 @@ class SizedEffects:
 
 
 def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
-    """Effects of the sizes aimed at, found on the reference tracks; drawn anew where they could not be seen.
+    """Effects of the wanted sizes on the reference tracks; effects that cannot be seen there are drawn again.
 
-    The last draw is kept whatever it is.
+    The last draw is always kept.
     """
     oracle, passed_over = make_oracle(plan, tracks), list[str]()
     motors = [track.load + law_torque(plan.background, track, 0) for track in _identification_tracks(plan, tracks)]
     peak = np.max([np.abs(torque).max(axis=0) for torque in motors], axis=0)
-    for attempt in range(MAX_EFFECT_DRAWS):
+    for attempt in range(SIZING.max_draws):
         hidden = tuple(effect.with_peak_torque(peak) for effect in draw_effects(plan, attempt))
         targets = tuple(target_multiple(plan, number) for number in range(len(hidden)))
         sized, seen = SizedEffects(hidden, targets, tuple(passed_over)), True
         for number, target in enumerate(targets):
             sized, found = _scale_to_multiple(plan, oracle, sized, number, tracks, target)
-            seen = seen and found > MIN_TARGET_SHARE * target
+            seen = seen and found > SIZING.min_target_share * target
         if seen:
             break
         passed_over += [effect.effect for effect in hidden]
@@ -152,7 +185,7 @@ def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
 
 
 def resize_effects(plan: Plan, sized: SizedEffects, tracks: Sequence[Track]) -> SizedEffects:
-    """Corrected on simulated tracks: slow motions may do otherwise than thought. What has parts stays as it is."""
+    """Sizes corrected on simulated tracks. An effect with parts of its own keeps its size."""
     oracle = make_oracle(plan, tracks)
     for number, target in enumerate(sized.targets):
         sized, _ = _scale_to_multiple(plan, oracle, sized, number, tracks, target)
@@ -160,13 +193,13 @@ def resize_effects(plan: Plan, sized: SizedEffects, tracks: Sequence[Track]) -> 
 
 
 def next_size(tried: Sequence[tuple[float, float]], target: float) -> float:
-    """Where a power law through the last two tries (size, multiple) has the multiple aimed at; a line after one."""
+    """The size where a power law through the last two tries (size, multiple) has the target; a line after one try."""
     size, found = tried[-1]
     power = 1.0
     if len(tried) > 1 and tried[-2][0] != size:
         before, then = tried[-2]
-        power = float(np.clip(np.log(found / then) / np.log(size / before), *SIZE_EXPONENT_RANGE))
-    return float(size * np.clip((target / found) ** (1 / power), 1 / MAX_SIZE_FACTOR, MAX_SIZE_FACTOR))
+        power = float(np.clip(np.log(found / then) / np.log(size / before), *SIZING.exponents))
+    return float(size * np.clip((target / found) ** (1 / power), 1 / SIZING.max_factor, SIZING.max_factor))
 
 
 def effect_multiples(plan: Plan, hidden: Sequence[HiddenEffect], tracks: Sequence[Track]) -> tuple[float, ...]:
@@ -203,13 +236,13 @@ def effect_multiple(
 def _scale_to_multiple(
     plan: Plan, oracle: Oracle, sized: SizedEffects, number: int, tracks: Sequence[Track], target: float
 ) -> tuple[SizedEffects, float]:
-    """One effect brought to a multiple; those with parts of their own need a simulation and stay as they are."""
+    """One effect scaled to a multiple, and the multiple reached. An effect with parts of its own keeps its size."""
     if sized.hidden[number].has_parts:
         return sized, target
     found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
-    for _ in range(MAX_SIZE_STEPS):
-        factor = float(np.clip(target / max(found, 1e-9), 1e-3, 1e3))
-        if abs(np.log(factor)) < MULTIPLE_TOLERANCE:
+    for _ in range(SIZING.max_steps):
+        factor = float(np.clip(target / max(found, SIZING.min_multiple), 1 / SIZING.max_factor, SIZING.max_factor))
+        if abs(np.log(factor)) < SIZING.tolerance:
             break
         sized = sized.with_size(number, sized.hidden[number].size * factor)
         found = effect_multiple(plan, oracle, sized.hidden, number, tracks)
@@ -222,16 +255,12 @@ def _identification_tracks(plan: Plan, tracks: Sequence[Track]) -> list[Track]:
 
 
 def _grid(track: Track) -> Array:
-    return np.asarray(np.arange(0.0, track.time[-1] - 0.05, 1 / ORACLE_HZ))
-
-
-MAX_COARSE_PASSES, MAX_HALVINGS = 6, 3
-COARSE_MULTIPLE_TOLERANCE = 0.1  # of the logarithm of the multiple aimed at
+    return np.asarray(np.arange(0.0, track.time[-1] - ORACLE.end_s, 1 / ORACLE.rate_hz))
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedCase:
-    """A case's runs as they happened, before any channel recorded them. multiples: of each effect's limit."""
+    """The runs of a case before any channel recorded them. multiples: size of each effect in detection limits."""
 
     plan: Plan
     sized: SizedEffects
@@ -264,9 +293,9 @@ def simulate_case(plan: Plan, given: tuple[HiddenEffect, ...] | None = None) -> 
 def correct_sizes(
     plan: Plan, sized: SizedEffects, controller: Controller, wanted: Sequence[Track], coarse: tuple[Track, ...]
 ) -> tuple[SizedEffects, tuple[Track, ...]]:
-    """Sizes as near to the multiples aimed at as coarse tracks show, and the last of these.
+    """Sizes with the wanted multiples on coarse tracks, and the last of these tracks.
 
-    coarse: as played with the sizes so far.
+    coarse: tracks simulated with the sizes so far.
     """
     number = next((number for number, effect in enumerate(sized.hidden) if effect.has_parts), None)
     if number is not None:
@@ -282,15 +311,15 @@ def _search_size(
     wanted: Sequence[Track],
     coarse: tuple[Track, ...],
 ) -> tuple[SizedEffects, tuple[Track, ...]]:
-    """The effect with parts at the size that comes nearest, and the tracks that it leads to."""
+    """The effect with parts at the size whose multiple comes nearest to the target, and its tracks."""
     target, tried = sized.targets[number], list[tuple[float, float]]()
     best = (np.inf, sized, coarse)
-    for more in reversed(range(MAX_COARSE_PASSES)):
-        found = max(effect_multiple(plan, make_oracle(plan, coarse), sized.hidden, number, coarse), 1e-9)
+    for more in reversed(range(SIZING.max_coarse_passes)):
+        found = max(effect_multiple(plan, make_oracle(plan, coarse), sized.hidden, number, coarse), SIZING.min_multiple)
         tried.append((sized.hidden[number].size, found))
         best = min(best, (abs(float(np.log(found / target))), sized, coarse), key=lambda each: each[0])
         aimed = sized.with_size(number, next_size(tried, target))
-        if not more or best[0] < COARSE_MULTIPLE_TOLERANCE or aimed.hidden[number].size == tried[-1][0]:
+        if not more or best[0] < SIZING.coarse_tolerance or aimed.hidden[number].size == tried[-1][0]:
             break
         played = _simulate_toward_size(plan, sized, aimed, number, controller, wanted)
         if played is None:
@@ -302,8 +331,8 @@ def _search_size(
 def _simulate_toward_size(
     plan: Plan, sized: SizedEffects, aimed: SizedEffects, number: int, controller: Controller, wanted: Sequence[Track]
 ) -> tuple[SizedEffects, tuple[Track, ...]] | None:
-    """Coarse tracks at the size aimed at, or on the way to it where the engine's step cannot follow that."""
-    for _ in range(MAX_HALVINGS):
+    """Coarse tracks at the wanted size, or at a size between where the simulation runs away; None if all run away."""
+    for _ in range(SIZING.max_halvings):
         try:
             return aimed, simulate_runs(
                 plan, aimed.hidden, controller, wanted, [coarse_track(track) for track in wanted]

@@ -126,8 +126,6 @@ class TorqueModel:
             f"{type(self).__name__} of {self.robot}; joints: {len(self.arm)}, base parameters: {len(self.base_values)}",
             "  components: " + (", ".join(f"{count} {effect}" for effect, count in parts.items()) or "none"),
         ]
-        if self.extras:
-            lines.append("  effects: " + ", ".join(each.told["effect"] for each in self.extras))
         links = "physically consistent" if self.inertial is not None else "known by their base parameters"
         intervals = "without intervals" if self.covariance is None else "with 95 % intervals"
         cutoff = "" if self.cutoff_hz is None else f"; cut-off {self.cutoff_hz:.4g} Hz"

@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from armlab.concealed.formats import TrueEffect, Truth
+
 
 def verdict(status: str = "none", findings: tuple[dict[str, Any], ...] = (), **more: Any) -> dict[str, Any]:
     rest = {"located": [], "unexplained": [], "fit": [], "summary": "a verdict that was written by hand"}
@@ -18,13 +20,13 @@ def finding(
     return {"effect": effect, "joint": joint, "parameters": parameters or {}, "rivals": listed, **figures}
 
 
-def perfect(truth: dict[str, Any]) -> dict[str, Any]:
+def perfect(truth: Truth) -> dict[str, Any]:
     """What was hidden and what was in the background, each with its parameters."""
-    if any(effect["outside"] for effect in truth["injected"]):
-        hidden = [finding("unknown", truth["injected"][0]["joint"])]
+    if any(effect.outside for effect in truth.injected):
+        hidden = [finding("unknown", truth.injected[0].joint)]
     else:
-        hidden = [_found(effect) for effect in truth["injected"]]
-    background = [_found(effect) for effect in truth["background"]]
+        hidden = [_found(effect) for effect in truth.injected]
+    background = [_found(effect) for effect in truth.background]
     return verdict("mismatch" if hidden or background else "none", (*hidden, *background))
 
 
@@ -34,12 +36,12 @@ def write(folder: Path, case: str, content: dict[str, Any] | str) -> None:
     path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
 
 
-def _found(effect: dict[str, Any]) -> dict[str, Any]:
-    def about(value: Any) -> Any:
-        return None if isinstance(value, list) else [value - 0.1 * abs(value), value + 0.1 * abs(value)]
+def _found(effect: TrueEffect) -> dict[str, Any]:
+    def about(value: float | tuple[float, ...]) -> list[float] | None:
+        return None if isinstance(value, tuple) else [value - 0.1 * abs(value), value + 0.1 * abs(value)]
 
     parameters = {
-        name: {"value": known["value"], "ci95": about(known["value"]), "unit": known["unit"]}
-        for name, known in effect["parameters"].items()
+        name: {"value": known.value, "ci95": about(known.value), "unit": known.unit}
+        for name, known in effect.parameters.items()
     }
-    return finding(effect["effect"], effect["joint"], parameters)
+    return finding(effect.effect, effect.joint, parameters)

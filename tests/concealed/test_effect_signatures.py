@@ -28,7 +28,7 @@ from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.effects.springs import Cable, Compensator, Ripple
 from armlab.concealed.outside import OUTSIDE
-from armlab.effects.library import EFFECT_IDS
+from armlab.effects.library import BUILT_IN
 from problem.arm import link_poses
 from problem.motion import Motion
 
@@ -146,19 +146,22 @@ def test_a_contact_is_felt_in_its_run_and_its_time_alone() -> None:
     assert np.abs(other).max() < 0.05
 
 
-def test_every_effect_of_the_vocabulary_can_be_hidden() -> None:
-    assert {kind.effect for kind in LIBRARY} == set(EFFECT_IDS) - {"unknown"}
+def test_the_library_and_the_vocabulary_have_the_same_effects_at_the_same_kind_of_place() -> None:
+    named = {family.effect: family.facts.where for family in BUILT_IN}
+    assert {kind.effect: kind.where for kind in LIBRARY} == named
 
 
-def test_parameters_have_names_and_units_of_the_vocabulary() -> None:
-    for kind in LIBRARY:
-        effect = _drawn(kind)
-        assert effect.units().keys() == effect.parameters().keys()
+@pytest.mark.parametrize("kind", LIBRARY, ids=[kind.effect for kind in LIBRARY])
+def test_parameters_have_names_and_units_of_the_vocabulary(kind: type[HiddenEffect]) -> None:
+    effect = next(family.facts for family in BUILT_IN if family.effect == kind.effect)
+    units = {parameter.name: parameter.unit_for() for parameter in effect.parameters}
+    assert kind.units.items() <= units.items()
+    assert _drawn(kind).parameters().keys() == kind.units.keys()
 
 
 def test_outside_effects_are_ten_and_none_has_a_name_of_the_library() -> None:
     assert len(OUTSIDE) == 10
-    assert not {kind.effect for kind in OUTSIDE} & set(EFFECT_IDS)
+    assert not {kind.effect for kind in OUTSIDE} & {family.effect for family in BUILT_IN}
 
 
 @pytest.mark.parametrize("kind", OUTSIDE, ids=[kind.effect for kind in OUTSIDE])

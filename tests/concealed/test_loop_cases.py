@@ -12,10 +12,16 @@ from refusals import refusal
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
+from armlab.concealed.formats import LoopManifest
 from armlab.concealed.loop import case
 from armlab.concealed.loop.case import Forecast, SecondMotion, Tools, play_case
-from armlab.concealed.loop.draw import draw_case, poor_reference
-from armlab.concealed.loop.recordings import simulate_first_recording, simulate_second_recording, write_loop_recording
+from armlab.concealed.loop.recordings import (
+    draw_case,
+    poor_reference,
+    simulate_first_recording,
+    simulate_second_recording,
+    write_loop_recording,
+)
 from armlab.concealed.loop.run import ANSWERS_FILE, LoopSettings, close_loop, play_cases, read_results, seal_loop
 from armlab.concealed.sets import read_checked_manifest
 from armlab.recordings.load import load_recording
@@ -77,8 +83,7 @@ def test_a_second_recording_holds_the_first_runs_and_the_motion_that_was_asked_f
         simulate_second_recording(first, gentle(), "designed"), tmp_path / "both", tmp_path / "both.json"
     )
     for run in ("run-1.parquet", "run-2.parquet"):
-        alone, together = (pd.read_parquet(tmp_path / part / run) for part in ("first", "both"))
-        assert alone.equals(together)
+        assert pd.read_parquet(tmp_path / "first" / run).equals(pd.read_parquet(tmp_path / "both" / run))
     recording = load_recording(tmp_path / "both")
     third, asked = recording.runs[2], gentle()
     wanted = np.column_stack([np.interp(third.time, asked[:, 0], column) for column in asked.T[1:]])
@@ -122,7 +127,7 @@ def test_an_ambiguous_case_is_played_with_all_three_second_motions(tmp_path: Pat
     assert found["ends"] == {"designed": "right", "random": "right", "condition": "right"}
     assert found["forecast"] == {kind: [0.7, 0.1, 0.2] for kind in ("designed", "random", "condition")}
     close_loop(settings, out, answers)
-    assert read_checked_manifest(out)[0]["cases"] == [found["name"]]
+    assert read_checked_manifest(out, LoopManifest)[0].cases == (found["name"],)
     assert seal_loop(settings, out) == answers
     assert not list(play_cases(settings, out, Tools(told, suspect, move), 1))  # nothing is left to do
 

@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from made_answers import effect, truth
 
-from armlab.concealed.loop.case import Truth, find_suspects, judge_end, judge_start, read_truth
+from armlab.concealed.loop.case import TrueNames, find_suspects, judge_end, judge_start, true_names
 from armlab.concealed.loop.counts import (
     MotionComparison,
     Share,
@@ -21,7 +22,7 @@ from armlab.concealed.loop.run import LoopSettings
 
 LATE = ("time_delay", None)
 VISCOUS = ("viscous_friction", 2)
-TRUTH = Truth(LATE)
+TRUTH = TrueNames(LATE)
 
 
 def verdict(*findings: tuple[tuple[str, int | None], list[tuple[str, int | None]]]) -> dict[str, Any]:
@@ -73,16 +74,12 @@ def test_only_the_hidden_name_alone_is_right(given: dict[str, Any], end: str) ->
 
 def test_a_suspect_that_is_there_as_well_may_be_named() -> None:
     given = verdict((LATE, []), (VISCOUS, []))
-    assert judge_end(given, Truth(LATE, frozenset({VISCOUS})), frozenset({LATE, VISCOUS})) == "right"
+    assert judge_end(given, TrueNames(LATE, frozenset({VISCOUS})), frozenset({LATE, VISCOUS})) == "right"
 
 
 def test_background_and_links_that_are_off_count_as_there() -> None:
-    answer = {
-        "injected": [{"effect": "time_delay", "joint": None}],
-        "background": [{"effect": "viscous_friction", "joint": 2}],
-        "cad_errors": [{"effect": "inertial_parameter_error", "joint": 1}],
-    }
-    assert read_truth(answer) == Truth(LATE, frozenset({VISCOUS, ("inertial_parameter_error", 1)}))
+    answer = truth(effect("time_delay", None), background=(effect("viscous_friction", 2),), cad=1)
+    assert true_names(answer) == TrueNames(LATE, frozenset({VISCOUS, ("inertial_parameter_error", 1)}))
 
 
 def result(number: int, start: str, designed: str, random: str, condition: str) -> dict[str, Any]:
@@ -145,7 +142,7 @@ def test_the_page_tells_shares_comparisons_forecasts_and_draws_that_were_passed_
     seal = Seals("abc", "def")
     page = render_page(LoopSettings(4, 1001), FOUND, seal)
     assert "Seed 1001, 2 ambiguous cases of 4" in page
-    assert "told before the first diagnosis: abc" in page
+    assert "printed before the first diagnosis: abc" in page
     assert "| designed motion | 100 % (34-100) |" in page
     assert "| random motion | decided rightly | 1 | 0 | 1 |" in page
     assert "| time_delay | viscous_friction | 2 | 2, 0, 0 | 1, 0, 1 | 0, 1, 1 |" in page

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden_cases import case, plan
+from hidden_cases import case
 
 from armlab.concealed.arms import make_machine
 from armlab.concealed.case_files import log_run
 from armlab.concealed.effects.friction import Viscous
 from armlab.concealed.plan import RunPlan, draw_plan
 from armlab.concealed.simulate import rigid_torque
-from armlab.concealed.sizing import simulate_case
+from armlab.concealed.sizing import SimulatedCase, simulate_case
 from armlab.recordings.differentiate import Signals, differentiate
 from armlab.recordings.recording import Run
 from problem.motion import Motion
@@ -19,8 +19,8 @@ from problem.motion import Motion
 FIFTH = 0.2
 
 
-def _signals(made: object, number: int, cutoff_hz: float = 40.0) -> Signals:
-    log = log_run(made, number, noisy=False)  # type: ignore[arg-type]
+def _signals(made: SimulatedCase, number: int, cutoff_hz: float = 40.0) -> Signals:
+    log = log_run(made, number, noisy=False)
     return differentiate(Run("run", "identify", log.time, log.position, log.torque), cutoff_hz=cutoff_hz)
 
 
@@ -60,7 +60,7 @@ def test_recorded_positions_are_rounded_to_the_encoder_and_torques_are_not_late(
 
 
 def test_a_seed_gives_the_same_run_again() -> None:
-    first, second = (log_run(simulate_case(plan(), ()), 0) for _ in range(2))
+    first, second = log_run(case(), 0), log_run(case(), 0)
     np.testing.assert_array_equal(first.torque, second.torque)
     np.testing.assert_array_equal(first.position, second.position)
 

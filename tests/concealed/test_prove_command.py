@@ -12,6 +12,7 @@ from armlab.common.errors import InputError
 from armlab.concealed import prove as proving
 from armlab.concealed.ablation import AblationSettings, ablate
 from armlab.concealed.prove import LOG_FILE, Proof, choose_proof, prove
+from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.sets import SetSettings
 
 SETS = {"mixed": SetSettings(1, 5000, "clean", "nulls")}
@@ -41,7 +42,14 @@ def test_a_judged_proof_is_logged_once_with_commit_seed_seal_and_score(silent: l
     assert entries[0]["commit"] == "a" * 40
     assert entries[0]["seed"] == 5000
     assert any(entries[0]["manifest"] in line for line in said)
-    assert entries[0]["score"]["clean"]["false claims on nulls"][0] == 0
+    assert entries[0]["score"]["clean"]["false_claims_on_nulls"][0] == 0
+
+
+def test_the_committed_log_selects_measures_by_id() -> None:
+    log = Path(__file__).parents[2] / "results/proof" / LOG_FILE
+    for line in log.read_text(encoding="utf-8").splitlines():
+        for measures in json.loads(line)["score"].values():
+            assert measures.keys() <= MEASURE_TEXTS.keys()
 
 
 def test_sets_that_are_proved_one_after_another_are_logged_each(silent: list[str], tmp_path: Path) -> None:

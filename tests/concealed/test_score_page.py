@@ -15,6 +15,7 @@ from made_verdicts import finding, perfect, verdict
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
+from armlab.concealed.formats import Truth
 from armlab.concealed.score import held_out
 from armlab.concealed.score.cases import MISSING_VERDICT, JudgedCase
 from armlab.concealed.score.figures import draw_confusion, draw_figures
@@ -55,7 +56,7 @@ UNEXPLAINED = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depen
     ],
 )
 def test_every_case_is_a_success_or_a_failure_of_one_kind(
-    answer: dict[str, Any], said: dict[str, Any], groups: list[str]
+    answer: Truth, said: dict[str, Any], groups: list[str]
 ) -> None:
     assert list_outcomes(scored((answer, said)))["group"].tolist() == groups
 
@@ -136,8 +137,8 @@ def test_the_page_puts_what_is_wanted_beside_what_was_found_and_names_the_misses
 
 def test_the_longest_diagnosis_is_on_the_page_beside_the_median() -> None:
     cases = [replace(judged(NULL, verdict(), f"c{seconds}"), seconds=float(seconds)) for seconds in (1, 2, 9)]
-    found = {each.name: each.value for each in compute_measures(make_rows(cases), "clean")}
-    assert (found["seconds a case (median)"], found["seconds a case (longest)"]) == (2.0, 9.0)
+    found = {each.id: each.value for each in compute_measures(make_rows(cases), "clean")}
+    assert (found["seconds_median"], found["seconds_longest"]) == (2.0, 9.0)
     assert arm_table(make_rows(cases))[["cases", "seconds, median", "seconds, longest"]].to_numpy().tolist() == [
         [3, 2.0, 9.0]
     ]
@@ -152,10 +153,9 @@ def test_right_answers_stand_on_the_diagonal_of_the_matrix() -> None:
     hidden = truth(effect("torque_ripple", 2))
     table = confusion_table(scored((COULOMB, perfect(COULOMB)), (hidden, ELSEWHERE), (OUTSIDE, verdict())), "clean")
     axes = draw_confusion(table, "made by hand").axes[0]
-    rows_, columns = (
-        [each.get_text() for each in labels] for labels in (axes.get_yticklabels(), axes.get_xticklabels())
-    )
-    assert rows_ == ["coulomb friction  (1)", "torque ripple  (1)", "viscous map  (1)"]
+    rows = [each.get_text() for each in axes.get_yticklabels()]
+    columns = [each.get_text() for each in axes.get_xticklabels()]
+    assert rows == ["coulomb friction  (1)", "torque ripple  (1)", "viscous map  (1)"]
     assert columns == ["coulomb friction", "torque ripple", "backlash", "nothing said"]
 
 
@@ -189,7 +189,8 @@ def friction(tmp_path_factory: pytest.TempPathFactory) -> JudgedCase:
     (own / "predicted").mkdir(parents=True)
     predicted = pd.DataFrame({"t": time, "tau1": torque[:, 0], "tau2": torque[:, 1]})
     predicted.to_csv(own / "predicted" / "run-2.csv", index=False)
-    answer = {**truth(effect("coulomb_friction", 1, level=LEVEL)), "case": "friction", "arm": "scara", "joints": 2}
+    hidden = truth(effect("coulomb_friction", 1, level=LEVEL))
+    answer = hidden.model_copy(update={"case": "friction", "arm": "scara", "joints": 2})
     return JudgedCase(answer, perfect(answer), recording, clean, own, 1.0)
 
 
@@ -230,7 +231,9 @@ def test_the_gap_beyond_plain_friction_is_counted_where_friction_is_in_the_backg
     monkeypatch.setattr(
         held_out, "filter_held_out_run", lambda case: HeldOut(np.arange(5.0), np.zeros((5, 1)), **constant)
     )
-    realistic = replace(friction, truth={**friction.truth, "background": [effect("viscous_friction", 1)]})
+    realistic = replace(
+        friction, truth=friction.truth.model_copy(update={"background": (effect("viscous_friction", 1),)})
+    )
     assert measure_gap_closed(realistic) == Gap(pytest.approx(2.5 / 3), pytest.approx(0.5), "counted")
     assert measure_gap_closed(friction).beyond is None
 

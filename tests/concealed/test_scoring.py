@@ -1,5 +1,6 @@
 """Scores of verdicts that were written by hand."""
 
+import re
 from typing import Any
 
 import pandas as pd
@@ -8,8 +9,10 @@ from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
 from armlab.common.statistics import wilson_interval
+from armlab.concealed.formats import Truth
 from armlab.concealed.score.cases import categorize_finding
 from armlab.concealed.score.measures import (
+    MEASURE_TEXTS,
     Measure,
     compute_measures,
     confusion_table,
@@ -19,41 +22,48 @@ from armlab.concealed.score.measures import (
 from armlab.concealed.score.rows import ScoreRows, make_rows
 
 
-def measured(table: ScoreRows, start: str) -> Measure:
-    return next(each for each in compute_measures(table, "clean") if each.name.startswith(start))
+def measured(table: ScoreRows, id: str) -> Measure:
+    return next(each for each in compute_measures(table, "clean") if each.id == id)
+
+
+def test_each_measure_has_one_id_and_a_title() -> None:
+    measures = compute_measures(scored((NULL, verdict())), "clean")
+    assert [each.id for each in measures] == list(MEASURE_TEXTS)
+    assert all(re.fullmatch("[a-z_]+", each.id) for each in measures)
+    assert len({each.title for each in measures}) == len(measures)
 
 
 def test_perfect_verdicts_score_perfectly() -> None:
     table = scored(*((each, perfect(each)) for each in (NULL, COULOMB, OUTSIDE)))
-    assert measured(table, "right name or class").value == 1
-    assert measured(table, "right joint").value == 1
-    assert measured(table, "false claims on nulls").value == 0
-    assert measured(table, "wrong names among claims").value == 0
-    assert measured(table, "unknown on effects outside").value == 1
-    assert measured(table, "95 %").value == 1
+    assert measured(table, "right_name_or_class").value == 1
+    assert measured(table, "right_joint").value == 1
+    assert measured(table, "false_claims_on_nulls").value == 0
+    assert measured(table, "wrong_names").value == 0
+    assert measured(table, "unknown_outside").value == 1
+    assert measured(table, "interval_coverage").value == 1
 
 
 def test_silence_makes_no_false_claim_and_names_nothing() -> None:
     table = scored(*((each, verdict()) for each in (NULL, COULOMB, OUTSIDE)))
-    assert measured(table, "right name or class").value == 0
-    assert measured(table, "unknown on effects outside").value == 0
-    assert measured(table, "false claims on nulls").value == 0
-    assert measured(table, "wrong names among claims").value is None
+    assert measured(table, "right_name_or_class").value == 0
+    assert measured(table, "unknown_outside").value == 0
+    assert measured(table, "false_claims_on_nulls").value == 0
+    assert measured(table, "wrong_names").value is None
 
 
 def test_wrong_names_are_counted_among_claims_and_on_nulls() -> None:
     wrong = verdict("mismatch", (finding("backlash", 3),))
     table = scored((NULL, wrong), (COULOMB, wrong))
-    assert measured(table, "wrong names among claims").value == 1
-    assert measured(table, "false claims on nulls").value == 1
+    assert measured(table, "wrong_names").value == 1
+    assert measured(table, "false_claims_on_nulls").value == 1
     assert confusion_table(table, "clean").loc["coulomb_friction", "backlash"] == 1
     assert confusion_table(table, "clean").loc["nothing", "backlash"] == 1
 
 
 def test_the_right_name_at_the_wrong_joint_is_misplaced() -> None:
     table = scored((COULOMB, verdict("mismatch", (finding("coulomb_friction", 3),))))
-    assert measured(table, "right first name, all").value == 1
-    assert measured(table, "right joint").value == 0
+    assert measured(table, "right_name_all_sizes").value == 1
+    assert measured(table, "right_joint").value == 0
     assert table.claims["category"].tolist() == ["misplaced"]
 
 
@@ -63,17 +73,17 @@ THREE = ("backlash", "coulomb_friction", "cable_stiffness")
 @pytest.mark.parametrize(("rivals", "right"), [(THREE, True), ((*THREE, "payload"), False)])
 def test_a_class_counts_with_at_most_three_rivals(rivals: tuple[str, ...], right: bool) -> None:
     table = scored((COULOMB, verdict("mismatch", (finding("stribeck_friction", 2, rivals=rivals),))))
-    assert measured(table, "right name or class").value == right
-    assert measured(table, "right first name, above").value == 0
+    assert measured(table, "right_name_or_class").value == right
+    assert measured(table, "right_name").value == 0
 
 
 def test_findings_of_the_background_are_right_answers() -> None:
     friction = effect("viscous_friction", 3)
     answer = truth(kind="null", background=(friction,), cad=3)
     said = verdict("mismatch", (finding("viscous_friction", 3), finding("inertial_parameter_error", 2)))
-    assert measured(scored((answer, said)), "false claims on nulls").value == 0
+    assert measured(scored((answer, said)), "false_claims_on_nulls").value == 0
     elsewhere = verdict("mismatch", (finding("viscous_friction", 1),))
-    assert measured(scored((answer, elsewhere)), "false claims on nulls").value == 1
+    assert measured(scored((answer, elsewhere)), "false_claims_on_nulls").value == 1
 
 
 IDENTICAL = [
@@ -98,12 +108,12 @@ NOT_IDENTICAL = [
 
 
 @pytest.mark.parametrize(("answer", "said"), IDENTICAL)
-def test_what_no_motion_separates_is_no_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
+def test_what_no_motion_separates_is_no_wrong_name(answer: Truth, said: dict[str, Any]) -> None:
     assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "identical"
 
 
 @pytest.mark.parametrize(("answer", "said"), NOT_IDENTICAL)
-def test_what_motion_can_separate_is_a_wrong_name(answer: dict[str, Any], said: dict[str, Any]) -> None:
+def test_what_motion_can_separate_is_a_wrong_name(answer: Truth, said: dict[str, Any]) -> None:
     assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "wrong"
 
 
@@ -111,9 +121,9 @@ def test_unknown_is_right_for_an_effect_outside_and_false_where_nothing_is() -> 
     said = verdict("mismatch", (finding("unknown", 1),))
     assert categorize_finding(judged(OUTSIDE, said), said["findings"][0]) == "injected"
     assert categorize_finding(judged(NULL, said), said["findings"][0]) == "unknown"
-    assert measured(scored((NULL, said)), "false claims on nulls").value == 1
+    assert measured(scored((NULL, said)), "false_claims_on_nulls").value == 1
     listed = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depends_on": ["position_1"]}])
-    assert measured(scored((OUTSIDE, listed)), "unknown on effects outside").value == 1
+    assert measured(scored((OUTSIDE, listed)), "unknown_outside").value == 1
 
 
 def test_intervals_that_miss_the_truth_are_counted() -> None:
@@ -122,7 +132,7 @@ def test_intervals_that_miss_the_truth_are_counted() -> None:
         return verdict("mismatch", (finding("coulomb_friction", 2, values),))
 
     table = scored((COULOMB, said(1.9, 2.5)), (COULOMB, said(2.1, 2.3)))
-    assert measured(table, "95 %").value == 0.5
+    assert measured(table, "interval_coverage").value == 0.5
     assert table.parameters["relative_error"].tolist() == pytest.approx([0.1, 0.1])
 
 
@@ -161,9 +171,10 @@ def test_rows_of_no_case_keep_their_columns() -> None:
 
 
 def test_levels_by_direction_are_named_by_a_level_and_an_offset_together() -> None:
-    hidden = {**effect("asymmetric_friction", 2), "equivalent": ["coulomb_friction", "torque_offset"]}
+    hidden = effect("asymmetric_friction", 2).model_copy(update={"equivalent": ("coulomb_friction", "torque_offset")})
     parts = (finding("coulomb_friction", 2), finding("torque_offset", 2))
-    both, one = (scored((truth(hidden), verdict("mismatch", found))) for found in (parts, parts[:1]))
-    assert measured(both, "right first name, above").value == 1
-    assert measured(both, "right joint").value == 1
-    assert measured(one, "right first name, above").value == 0
+    both = scored((truth(hidden), verdict("mismatch", parts)))
+    one = scored((truth(hidden), verdict("mismatch", parts[:1])))
+    assert measured(both, "right_name").value == 1
+    assert measured(both, "right_joint").value == 1
+    assert measured(one, "right_name").value == 0

@@ -13,28 +13,37 @@ from made_verdicts import perfect, verdict, write
 from armlab.cli.proof import conceal as conceal_command
 from armlab.cli.proof import score as score_command
 from armlab.common.errors import InputError
+from armlab.concealed.formats import SetManifest, Truth, read_model
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS
-from armlab.concealed.plan import DEVELOPMENT_SEEDS, MIN_MULTIPLE, draw_plan, target_multiple
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, PLAN, draw_plan, target_multiple
 from armlab.concealed.prove import diagnose_all, judged_seed
 from armlab.concealed.score.cases import FAILURE_FILE
 from armlab.concealed.score.scoring import score_set
 from armlab.concealed.sets import (
     MANIFEST_FILE,
     SetSettings,
-    conceal_set,
+    conceal_cases,
     file_digest,
     make_set_settings,
     read_checked_manifest,
+    seal_set,
 )
 from armlab.recordings.load import load_recording
 
 SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
 
 
+def make_set(settings: SetSettings, folder: Path, jobs: int) -> list[str]:
+    """Conceals the missing cases and seals the set; the names of the cases that were made."""
+    made = list(conceal_cases(settings, folder, jobs))
+    seal_set(settings, folder)
+    return made
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("concealed") / "set"
-    list(conceal_set(SETTINGS, folder, 1))
+    make_set(SETTINGS, folder, 1)
     return folder
 
 
@@ -45,12 +54,12 @@ def copy(made: Path, tmp_path: Path) -> Path:
 
 def _verdicts(folder: Path, out: Path) -> Path:
     for path in (folder / "truth").glob("*.json"):
-        write(out, path.stem, perfect(json.loads(path.read_text())))
+        write(out, path.stem, perfect(read_model(Truth, path)))
     return out
 
 
 def test_a_set_is_the_same_to_the_byte_for_one_and_two_jobs(made: Path, tmp_path: Path) -> None:
-    list(conceal_set(SETTINGS, tmp_path / "again", 2))
+    make_set(SETTINGS, tmp_path / "again", 2)
     assert file_digest(tmp_path / "again" / MANIFEST_FILE) == file_digest(made / MANIFEST_FILE)
 
 
@@ -58,13 +67,19 @@ def test_an_interrupted_set_goes_on_where_it_stopped(copy: Path) -> None:
     sealed = file_digest(copy / MANIFEST_FILE)
     lost = sorted((copy / "observations").iterdir())[0]
     shutil.rmtree(lost)
-    assert list(conceal_set(SETTINGS, copy, 1)) == [lost.name]
+    assert make_set(SETTINGS, copy, 1) == [lost.name]
     assert file_digest(copy / MANIFEST_FILE) == sealed
+
+
+def test_an_incomplete_set_has_no_seal(copy: Path) -> None:
+    shutil.rmtree(sorted((copy / "observations").iterdir())[0])
+    next(conceal_cases(SETTINGS, copy, 1))
+    assert not (copy / MANIFEST_FILE).exists()
 
 
 def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
     with pytest.raises(InputError, match="holds another concealed set"):
-        list(conceal_set(SetSettings(3, 1006), copy, 1))
+        make_set(SetSettings(3, 1006), copy, 1)
 
 
 @pytest.mark.parametrize("part", ["truth", "observations"])
@@ -79,7 +94,7 @@ def test_a_manifest_made_anew_is_refused_by_its_printed_hash(copy: Path) -> None
     sealed = file_digest(copy / MANIFEST_FILE)
     (copy / MANIFEST_FILE).write_text((copy / MANIFEST_FILE).read_text().replace('"seed": 1005', '"seed": 1006'))
     with pytest.raises(InputError, match="is not the manifest that was sealed"):
-        read_checked_manifest(copy, sealed)
+        read_checked_manifest(copy, SetManifest, sealed)
 
 
 def test_conceal_prints_the_hash_and_score_takes_it(made: Path, tmp_path: Path) -> None:
@@ -138,7 +153,7 @@ def test_a_judged_seed_follows_from_the_commit_and_is_no_development_seed() -> N
 
 def test_sizes_spread_evenly_from_half_a_limit_to_twenty() -> None:
     sizes = [target_multiple(draw_plan(1000, index, "clean", False, True), 0) for index in range(60)]
-    assert MIN_MULTIPLE <= min(sizes) < 0.6
+    assert PLAN.multiples[0] <= min(sizes) < 0.6
     assert 17 < max(sizes) <= 20
     counts, _ = np.histogram(np.log(sizes), bins=6, range=(np.log(0.5), np.log(20)))
     assert counts.min() >= 8
@@ -165,7 +180,7 @@ def test_missing_and_broken_verdicts_count_against_and_stop_nothing(made: Path, 
     write(tmp_path / "v", cases[1], "{ no json")
     found = score_set(made, tmp_path / "v", None, tmp_path / "out")
     counted = {
-        tier: next(each for each in measures if each["name"] == "missing or invalid verdicts")
+        tier: next(each for each in measures if each["id"] == "missing_verdicts")
         for tier, measures in found["tiers"].items()
     }
     assert sum(each["value"] * each["number"] for each in counted.values()) == 2

@@ -1,7 +1,8 @@
 """Effects of bodies: links, lengths and gravity that differ from the simulation."""
 
 from collections.abc import Sequence
-from typing import Self
+from dataclasses import replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -12,26 +13,26 @@ from problem.inertia import link_from_centre_of_mass
 
 
 class Payload(HiddenEffect):
-    """A body on a link, mostly the last; other form: a long one. size: mass, kg."""
+    """A compact body on a link, mostly the last; other form: a long body. size: mass, kg."""
 
     effect, forms = "payload", ("compact", "long")
+    where = "link"
+    units: ClassVar = {"mass": "kg", "centre": "m"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
-        """The last link three times as often as each of the two before."""
+        """The last link, three times as often as each of the two before it."""
         last = machine.joints - 1
         return [last, last, last, *(link for link in (last - 1, last - 2) if link > 0)]
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Within some centimetres of the link's frame."""
         x, y, z = rng.uniform((-0.04, -0.04, -0.02), (0.04, 0.04, 0.12))
         shape = {"x": float(x), "y": float(y), "z": float(z), "radius": float(rng.uniform(0.03, 0.08))}
         return cls(joint, 1.0, 6.0, cls.draw_form(rng), shape)
 
     @property
     def comparable(self) -> tuple[str, ...]:
-        """Mass and centre mean the same for every body."""
         return ("mass",)
 
     @property
@@ -40,11 +41,9 @@ class Payload(HiddenEffect):
         return [self.shape[axis] for axis in "xyz"]
 
     def parameters(self) -> ParameterValues:
-        """Mass and centre."""
         return {"mass": self.size, "centre": self.centre}
 
     def arm(self, arm: Arm) -> Arm:
-        """With the body fixed to its link."""
         long = 16.0 if self.form == "long" else 1.0
         inertia = 0.4 * self.size * self.shape["radius"] ** 2 * np.diag([1, 1, long]) / max(1.0, long / 2)
         inertia[2, 2] = min(inertia[2, 2], inertia[0, 0] + inertia[1, 1])
@@ -52,56 +51,53 @@ class Payload(HiddenEffect):
 
 
 class LinkError(HiddenEffect):
-    """A link that is heavier than drawn, its centre elsewhere. size: relative error of the mass."""
+    """A link that is heavier than its model and has another centre and inertia. size: relative error of the mass."""
 
     effect, forms = "inertial_parameter_error", ("mass and centre",)
+    where = "link"
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """In all ten parameters."""
         x, y, z = rng.uniform(-0.02, 0.02, 3)
         shape = {"x": float(x), "y": float(y), "z": float(z), "spread": float(rng.uniform(-0.3, 0.5))}
         return cls(joint, 0.1, 1.0, cls.draw_form(rng), shape)
 
     @property
     def comparable(self) -> tuple[str, ...]:
-        """None: which of the ten can be seen depends on the arm."""
+        """None: the arm decides which of the ten parameters can be identified."""
         return ()
 
     def parameters(self) -> ParameterValues:
-        """The relative error stands with the shape."""
         return {}
 
     def arm(self, arm: Arm) -> Arm:
-        """With the link as it really is."""
         shift = 10 * self.size * np.array([self.shape[axis] for axis in "xyz"])
         spread = float(np.exp(10 * self.size * np.log1p(self.shape["spread"])))
         return with_stretched_link(arm, self.joint, 1 + self.size, shift, min(max(spread, 0.3), 3.0))
 
 
 class Tilt(HiddenEffect):
-    """A base that does not stand level. size: rad."""
+    """A base that is not level. size: angle, rad."""
 
     effect, forms = "base_tilt", ("tilt",)
+    where = "robot"
+    units: ClassVar = {"gravity": "m/s2"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """In any direction."""
         return cls(joint, 0.017, 0.2, cls.draw_form(rng), {"direction": float(rng.uniform(0, 2 * np.pi))})
 
     @property
     def place(self) -> None:
-        """The whole robot."""
         return None
 
     @property
     def joints(self) -> tuple[int, ...]:
-        """None in particular."""
         return ()
 
     @property
     def comparable(self) -> tuple[str, ...]:
-        """None: the vector would need another measure."""
+        """None: a direction needs another measure of error than a number."""
         return ()
 
     def parameters(self) -> ParameterValues:
@@ -109,40 +105,35 @@ class Tilt(HiddenEffect):
         return {"gravity": [float(value) for value in self._tilted((0.0, 0.0, -9.81))]}
 
     def arm(self, arm: Arm) -> Arm:
-        """On its base."""
         about = self.size * np.array([np.cos(self.shape["direction"]), np.sin(self.shape["direction"])])
         return with_tilt(arm, float(about[0]), float(about[1]))
 
     def _tilted(self, gravity: tuple[float, float, float]) -> tuple[float, float, float]:
-        from dataclasses import replace
-
         return self.arm(replace(Arm("", ()), gravity=gravity)).gravity
 
 
 class Geometry(HiddenEffect):
-    """A link that is longer along x, or a joint further out along its axis. size: m."""
+    """A link that is longer along x (`a`), or a joint that lies further along its axis (`d`). size: m."""
 
     effect, forms = "geometry_error", ("a", "d")
+    units: ClassVar = {"offset": "m"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
-        """All joints but the last: what comes behind has to be carried."""
+        """All joints but the last, which carries nothing."""
         return range(max(machine.joints - 1, 1))
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Some millimetres."""
         return cls(joint, 5e-3, 6e-2, cls.draw_form(rng))
 
     @property
     def comparable(self) -> tuple[str, ...]:
-        """None: along which axis is part of the finding."""
+        """None: a finding names the axis as well."""
         return ()
 
     def parameters(self) -> ParameterValues:
-        """The additional length."""
         return {"offset": self.size}
 
     def arm(self, arm: Arm) -> Arm:
-        """With the length that it really has."""
         return with_longer_link(arm, self.joint, self.form, self.size)

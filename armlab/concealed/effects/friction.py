@@ -1,6 +1,6 @@
 """Friction: functions of velocity, position and load, presliding hysteresis, and drift with temperature."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -11,24 +11,22 @@ from armlab.concealed.engine import Track
 
 
 class Coulomb(HiddenEffect):
-    """Level times the sign of velocity; other form: a soft turn-over (arc tangent)."""
+    """tau = F sgn(v); other form: tau = F (2 / pi) atan(v / w), a soft turn-over. size: F, N m."""
 
     effect, forms = "coulomb_friction", ("sign", "soft")
+    units: ClassVar = {"level": "N.m"}
     blurred = ("level",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Up to a fifth of the rating."""
         shape = {"width": float(rng.uniform(0.01, 0.05))}
         level = torque_share(0.03, machine, joint)
         return cls(joint, level, 7 * level, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """The level."""
         return {"level": self.size}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         velocity = track.velocity[:, self.joint]
         if self.form == "soft":
             return np.asarray(self.size * 2 / np.pi * np.arctan(velocity / self.shape["width"]))
@@ -36,47 +34,44 @@ class Coulomb(HiddenEffect):
 
 
 class Viscous(HiddenEffect):
-    """Proportional to velocity; other form: uneven over the turn by a tenth."""
+    """tau = c v; other form: tau = c (1 + 0.1 sin(2 q + p)) v, uneven over the turn. size: c, N m s/rad."""
 
     effect, forms = "viscous_friction", ("linear", "uneven")
+    units: ClassVar = {"coefficient": "N.m.s/rad"}
     blurred = ("coefficient",)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Up to a quarter of the rating at 1 rad/s."""
         coefficient = torque_share(0.03, machine, joint)
         return cls(joint, coefficient, 8 * coefficient, cls.draw_form(rng), {"phase": float(rng.uniform(0, 6))})
 
     def parameters(self) -> ParameterValues:
-        """The coefficient."""
         return {"coefficient": self.size}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         velocity, position = track.velocity[:, self.joint], track.position[:, self.joint]
         wave = 0.1 * np.sin(2 * position + self.shape["phase"]) if self.form == "uneven" else 0.0
         return np.asarray(self.size * velocity * (1 + wave))
 
 
 class NonlinearViscous(HiddenEffect):
-    """A power of velocity; other form: Eyring's inverse hyperbolic sine of thin oil films."""
+    """tau = c sgn(v) |v|^n; other form: tau = c asinh(v / v0), Eyring's law of thin oil films. size: c."""
 
     effect, forms = "nonlinear_viscous_friction", ("power", "eyring")
+    units: ClassVar = {"coefficient": "N.m/(rad/s)^exponent", "exponent": "1"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Exponents of churning oil (2 to 3) or of boundary films (below 2/3)."""
+        """Exponents of churning oil (1.7 to 3) or of boundary films (0.3 to 0.65)."""
         low = bool(rng.random() < 0.4)
         shape = {"exponent": float(rng.uniform(0.3, 0.65) if low else rng.uniform(1.7, 3.0)), "knee": 0.1}
         coefficient = torque_share(0.02, machine, joint)
         return cls(joint, coefficient, 10 * coefficient, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Coefficient and exponent."""
         return {"coefficient": self.size, "exponent": self.shape["exponent"]}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         velocity = track.velocity[:, self.joint]
         if self.form == "eyring":
             return np.asarray(self.size * np.arcsinh(velocity / self.shape["knee"]))
@@ -85,17 +80,17 @@ class NonlinearViscous(HiddenEffect):
 
 
 class Stribeck(HiddenEffect):
-    """Friction that falls with speed: Gaussian; other forms: another exponent, or a rational law (Hess 1990).
+    """tau = sgn(v) (F + S g(|v| / vs)): friction that falls with speed.
 
-    size: static level less Coulomb level, N m.
+    g(x): exp(-x^2); other forms: exp(-x^n), or 1 / (1 + x^2) (Hess 1990). size: S, static less Coulomb level, N m.
     """
 
     effect, forms = "stribeck_friction", ("gauss", "exponent", "rational")
+    units: ClassVar = {"level": "N.m", "static_level": "N.m", "velocity": "rad/s", "exponent": "1"}
     companions, blurred = ("coulomb", "viscous"), ("level", "static_level")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Coulomb level beside it, as in every bearing that has this."""
         fall = torque_share(0.02, machine, joint)
         shape = {
             "level": torque_share(float(rng.uniform(0.01, 0.05)), machine, joint),
@@ -105,13 +100,11 @@ class Stribeck(HiddenEffect):
         return cls(joint, fall, 8 * fall, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Levels, velocity, and the exponent of the Gaussian form."""
         level, exponent = self.shape["level"], self.shape["exponent"] if self.form == "exponent" else 2.0
         velocity = self.shape["velocity"]
         return {"level": level, "static_level": level + self.size, "velocity": velocity, "exponent": exponent}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         velocity = track.velocity[:, self.joint]
         ratio = np.abs(velocity) / self.shape["velocity"]
         fall = {
@@ -123,30 +116,31 @@ class Stribeck(HiddenEffect):
 
 
 class Asymmetric(HiddenEffect):
-    """Levels that differ by direction; other form: slopes differ too. size: half the difference, N m."""
+    """tau = D (k sgn(v) + 1): levels that differ by direction.
+
+    Other form: + D (s v + |v|), slopes that differ too. size: D, half the difference, N m.
+    """
 
     effect, forms = "asymmetric_friction", ("levels", "levels and slopes")
+    units: ClassVar = {"positive": "N.m", "negative": "N.m"}
     companions, blurred = ("coulomb", "viscous"), ("positive", "negative")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """About a mean level and slope that are larger than the difference."""
         half = torque_share(0.012, machine, joint)
         shape = {"level": float(rng.uniform(1.2, 3)), "slope": float(rng.uniform(1.2, 2))}
         return cls(joint, half, 8 * half, cls.draw_form(rng), shape)
 
     @property
     def equivalent(self) -> tuple[str, ...]:
-        """Levels alone are a mean level and an offset."""
+        """Levels alone equal a mean level and an offset."""
         return ("coulomb_friction", "torque_offset") if self.form == "levels" else ()
 
     def parameters(self) -> ParameterValues:
-        """Levels of both directions."""
         level = self.size * self.shape["level"]
         return {"positive": level + self.size, "negative": level - self.size}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         velocity = track.velocity[:, self.joint]
         direction = smooth_sign(velocity)
         torque = self.size * (self.shape["level"] * direction + np.abs(direction))
@@ -156,47 +150,46 @@ class Asymmetric(HiddenEffect):
 
 
 class LoadDependent(HiddenEffect):
-    """A share of the transmitted torque; other form: a share that fades in with the load."""
+    """tau = m |tau_load| sgn(v); other form: |tau_load| fades in above a knee. size: m."""
 
     effect, forms = "load_dependent_friction", ("share", "fading in")
+    units: ClassVar = {"coefficient": "1"}
     companions = ("coulomb", "viscous")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Up to a third of the load, as in worm and screw gears."""
         shape = {"knee": torque_share(0.03, machine, joint), "width": float(rng.uniform(0.002, 0.01))}
         return cls(joint, 0.06, 0.35, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """The share."""
         return {"coefficient": self.size}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         load, knee = track.load[:, self.joint], self.shape["knee"]
         felt = np.abs(load) if self.form == "share" else load**2 / np.sqrt(load**2 + knee**2)
         return np.asarray(self.size * felt * smooth_sign(track.velocity[:, self.joint], self.shape["width"]))
 
 
 class Presliding(HiddenEffect):
-    """Dahl's hysteresis; other forms: LuGre with a Stribeck curve, Maxwell slip elements. size: level, N m."""
+    """Dahl's hysteresis, z' = v - |v| z / w, tau = F z / w; other forms: LuGre, Maxwell slip. size: F, N m.
+
+    LuGre: the level rises at low speed (a Stribeck curve). Maxwell slip: three elements that slip one after another.
+    """
 
     effect, forms = "presliding_hysteresis", ("dahl", "lugre", "maxwell slip")
+    units: ClassVar = {"level": "N.m", "stiffness": "N.m/rad"}
     companions, blurred = ("coulomb", "viscous"), ("level", "stiffness")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Friction that needs some milliradians to turn over."""
         shape = {"way": float(np.exp(rng.uniform(np.log(2e-3), np.log(3e-2)))), "rise": float(rng.uniform(0.2, 0.6))}
         level = torque_share(0.04, machine, joint)
         return cls(joint, level, 6 * level, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Level and the stiffness at a reversal."""
         return {"level": self.size, "stiffness": self.size / self.shape["way"]}
 
     def torque(self, track: Track, run: int) -> Array:
-        """The state of the contact times its stiffness."""
         steps = np.diff(track.position[:, self.joint], prepend=track.position[:1, self.joint])
         if self.form == "maxwell slip":
             return self.size * _maxwell_slip(steps, self.shape["way"])
@@ -208,28 +201,27 @@ class Presliding(HiddenEffect):
 
 
 class Drift(HiddenEffect):
-    """Viscous friction that falls as the joint warms: in time; other form: with the heat that it makes.
+    """tau = D (f + exp(-t / T)) v: viscous friction that falls as the joint warms up.
 
-    size: initial less final coefficient, N m s/rad. Every run starts cold.
+    Other form: the heat of friction takes the place of time. Every run starts cold. size: D, N m s/rad.
     """
 
     effect, forms = "friction_drift", ("time", "heat")
+    units: ClassVar = {"initial": "N.m.s/rad", "final": "N.m.s/rad", "time_constant": "s"}
     companions, blurred = ("viscous", "coulomb"), ("initial", "final")
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Grease that thins within seconds: a fast stand-in for what takes minutes."""
+        """Time constants of seconds stand in for the minutes of real grease."""
         shape = {"final": float(rng.uniform(0.5, 2.0)), "time_constant": float(rng.uniform(3, 8))}
         fall = torque_share(0.02, machine, joint)
         return cls(joint, fall, 6 * fall, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Both coefficients and the time constant."""
         final = self.size * self.shape["final"]
         return {"initial": final + self.size, "final": final, "time_constant": self.shape["time_constant"]}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Against the motion."""
         velocity, constant = track.velocity[:, self.joint], self.shape["time_constant"]
         cold = np.exp(-np.maximum(track.time, 0) / constant)
         if self.form == "heat":

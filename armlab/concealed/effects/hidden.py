@@ -1,34 +1,44 @@
-"""The base class of hidden effects: what an effect may change between the mechanism and the recording."""
+"""The base class of hidden effects: what an effect may change between the mechanism and the recording.
 
-from collections.abc import Sequence
+Symbols in the docstrings of the effects: q, v, a are position, velocity and acceleration of the effect's joint (rad,
+s); q_j, v_j, a_j are those of another joint; tau is the torque that the motor gives on top of what moves the mechanism
+(N m); sgn changes its sign within 0.5 mrad/s.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.engine import Parts, Track
-from armlab.recordings.vocabulary import effect_named
 from problem.arm import Arm
 
-OTHER_FORM_SHARE = 0.4  # share of the effects whose law is not the one that anyone would fit first
-SIGN_WIDTH = 5e-4  # rad/s: a Coulomb friction turns over within this
+OTHER_FORM_SHARE = 0.4  # share of the draws whose law is not the obvious one
+SIGN_WIDTH = 5e-4  # rad/s: Coulomb friction changes its sign within this
 ParameterValues = dict[str, float | list[float]]
+Where = Literal["joint", "coupling", "link", "robot"]
 
 
 @dataclass(frozen=True)
 class HiddenEffect:
     """An effect at a joint or link (from 0) with one size and a shape.
 
-    size: what grows until the effect is as visible as wanted; in the unit of its main parameter. most: the
-    size beyond which the effect would be absurd. form: which law. shape: its other numbers. companions: plain
-    friction of the same joint that is free beside it. blurred: parameters that cannot be told from the plain friction
-    of a background.
+    Of the class. effect: its id. forms: its laws, the obvious one first. where: at one joint; at two joints, where the
+    torque of one follows the motion of the other; at a link; or in the whole robot. units: unit of each parameter at
+    a joint that turns. companions: plain friction of the same joint that is free beside it. blurred: parameters that
+    cannot be separated from the plain friction of a background.
+
+    size: what grows until the effect is as visible as wanted; in the unit of its main parameter. max_size: the size
+    beyond which the effect would be absurd. form: which law. shape: the other numbers of the law.
     """
 
     effect: ClassVar[str]
     forms: ClassVar[tuple[str, ...]]
+    where: ClassVar[Where] = "joint"
+    units: ClassVar[Mapping[str, str]] = {}
     companions: ClassVar[tuple[str, ...]] = ()
     blurred: ClassVar[tuple[str, ...]] = ()
     joint: int
@@ -54,7 +64,7 @@ class HiddenEffect:
         return str(rng.choice(cls.forms[1:])) if other else cls.forms[0]
 
     def sized(self, size: float) -> Self:
-        """The same effect, larger or smaller, but not absurd."""
+        """The same effect with another size, at most its largest."""
         return replace(self, size=float(min(size, self.max_size)))
 
     @property
@@ -74,24 +84,19 @@ class HiddenEffect:
 
     @property
     def equivalent(self) -> tuple[str, ...]:
-        """Names at the same joint that together say the same, and come first."""
+        """Effects that, found together at the same joint, describe this one as well."""
         return ()
 
     def parameters(self) -> ParameterValues:
-        """Parameters by their names in the vocabulary, SI units."""
+        """Parameters by name, in the units of `units`."""
         return {}
 
-    def units(self) -> dict[str, str]:
-        """Unit of each parameter."""
-        known = effect_named(self.effect)
-        return {name: known.parameter(name).unit_for() for name in self.parameters()}
-
     def with_peak_torque(self, peak: Array) -> Self:
-        """The effect when the largest torque (joints,) of each joint without it is known, N m."""
+        """The effect adapted to the largest torque of each joint without it, (joints,), N m."""
         return self
 
     def arm(self, arm: Arm) -> Arm:
-        """The arm as it really is."""
+        """The nominal arm with the changes of the effect."""
         return arm
 
     def parts(self) -> Parts:
@@ -99,7 +104,7 @@ class HiddenEffect:
         return Parts()
 
     def torque(self, track: Track, run: int) -> Array | None:
-        """Torque that the motor of the effect's joint gives on top, (steps,), N m; None for other effects.
+        """Torque that the motor of the effect's joint gives on top, (steps,), N m; None for an effect without a law.
 
         run: from 0, the identification runs first.
         """
@@ -124,7 +129,7 @@ class HiddenEffect:
 
 
 def smooth_sign(velocity: Array, width: float = SIGN_WIDTH) -> Array:
-    """Sign of a velocity, turned over within a width, rad/s."""
+    """Sign of a velocity that changes within a width, rad/s."""
     return np.asarray(np.tanh(velocity / width))
 
 

@@ -1,4 +1,4 @@
-"""The list of all hidden effects that have a name in the vocabulary."""
+"""All hidden effects that the diagnosis has a name for, in the order of figures."""
 
 from armlab.concealed.effects.bodies import Geometry, LinkError, Payload, Tilt
 from armlab.concealed.effects.channels import Contact, Delay, EncoderOffset, Gain, Offset, Saturation, Skew

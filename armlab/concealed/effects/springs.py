@@ -1,7 +1,7 @@
 """Effects that depend on position: springs, hoses, ripple."""
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -22,37 +22,36 @@ def gravity_wave(machine: Machine, joint: int) -> tuple[float, float]:
     position[:, joint] = angles
     still = np.zeros_like(position)
     torque = rigid_body_torque(machine.arm, Motion(position, still, still))[:, joint]
-    sine, cosine = (2 * np.mean(torque * wave(angles)) for wave in (np.sin, np.cos))
+    sine, cosine = 2 * np.mean(torque * np.sin(angles)), 2 * np.mean(torque * np.cos(angles))
     return float(np.hypot(sine, cosine)), float(np.arctan2(cosine, sine))
 
 
 class Compensator(HiddenEffect):
-    """A spring against gravity: a sine; other forms: a coil spring on a linkage, a gas cylinder.
+    """tau = A sin(q + p), a spring against gravity; other forms: a coil spring on a linkage, a gas cylinder.
 
-    size: the largest torque over a turn, N m.
+    size: A, the largest torque over a turn, N m.
     """
 
     effect, forms = "gravity_compensator", ("sine", "linkage", "gas")
+    units: ClassVar = {"amplitude": "N.m", "phase": "rad"}
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
-        """Joints that gravity loads."""
+        """Joints whose gravity torque exceeds 3 % of the rating."""
         loads = [gravity_wave(machine, joint)[0] for joint in range(machine.joints)]
         return [joint for joint, load in enumerate(loads) if load > 0.03 * machine.rating[joint]]
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """About half of the gravity torque, mounted some degrees off."""
+        """Balances about half of the gravity torque, mounted up to 0.2 rad off."""
         load, phase = gravity_wave(machine, joint)
         shape = {"phase": phase + np.pi + float(rng.uniform(-0.2, 0.2)), "crank": float(rng.uniform(0.2, 0.4))}
         return cls(joint, 0.5 * load, 1.2 * load, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Amplitude and phase."""
         return {"amplitude": self.size, "phase": float(np.angle(np.exp(1j * self.shape["phase"])))}
 
     def torque(self, track: Track, run: int) -> Array:
-        """What the motor no longer has to hold."""
         return self.size * self._unit(track.position[:, self.joint] + self.shape["phase"])
 
     def _unit(self, angle: Array) -> Array:
@@ -70,13 +69,13 @@ class Compensator(HiddenEffect):
 
 
 class Cable(HiddenEffect):
-    """Linear pull to a rest position; other form: a hose that stiffens. size: stiffness, N m/rad."""
+    """tau = k (q - r); other form: tau = k ((q - r) + b (q - r)^3), a hose that stiffens. size: k, N m/rad."""
 
     effect, forms = "cable_stiffness", ("linear", "stiffening")
+    units: ClassVar = {"stiffness": "N.m/rad", "rest": "rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Rest near the middle of the range."""
         low, high = machine.range[:, joint]
         rest = (low + high) / 2 + rng.uniform(-0.4, 0.4)
         shape = {"rest": float(rest), "cubic": float(rng.uniform(0.2, 0.8))}
@@ -84,34 +83,31 @@ class Cable(HiddenEffect):
         return cls(joint, stiffness, 10 * stiffness, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Stiffness and rest."""
         return {"stiffness": self.size, "rest": self.shape["rest"]}
 
     def torque(self, track: Track, run: int) -> Array:
-        """What the motor needs against the pull."""
         bent = track.position[:, self.joint] - self.shape["rest"]
         cubic = self.shape["cubic"] * bent**3 if self.form == "stiffening" else 0.0
         return np.asarray(self.size * (bent + cubic))
 
 
 class Ripple(HiddenEffect):
-    """A sine over the turn; other form: narrow teeth (five harmonics), no work over a turn. size: amplitude, N m."""
+    """tau = A sin(n q + p); other form: narrow teeth of the same order that do no work over a turn. size: A, N m."""
 
     effect, forms = "torque_ripple", ("sine", "teeth")
+    units: ClassVar = {"order": "1/rev", "amplitude": "N.m", "phase": "rad"}
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
-        """Pole and tooth numbers of direct drives and last gear stages."""
+        """Orders of the poles of direct drives and of the teeth of last gear stages."""
         shape = {"order": float(rng.integers(6, 60)), "phase": float(rng.uniform(-np.pi, np.pi))}
         amplitude = torque_share(0.008, machine, joint)
         return cls(joint, amplitude, 10 * amplitude, cls.draw_form(rng), shape)
 
     def parameters(self) -> ParameterValues:
-        """Order, amplitude, phase."""
         return {"order": self.shape["order"], "amplitude": self.size, "phase": self.shape["phase"]}
 
     def torque(self, track: Track, run: int) -> Array:
-        """Waves with the angle."""
         angle = self.shape["order"] * track.position[:, self.joint] + self.shape["phase"]
         if self.form == "sine":
             return np.asarray(self.size * np.sin(angle))

@@ -9,9 +9,10 @@ from typing import Any, Literal
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.concealed.loop.draw import draw_case
+from armlab.concealed.formats import Truth, read_model
 from armlab.concealed.loop.recordings import (
     FirstRecording,
+    draw_case,
     simulate_first_recording,
     simulate_second_recording,
     write_loop_recording,
@@ -24,23 +25,22 @@ End = Literal["right", "wrong", "open"]
 
 
 @dataclass(frozen=True)
-class Truth:
-    """hidden: the effect and its joint. background: what is there as well and may be named."""
+class TrueNames:
+    """hidden: name and joint of the hidden effect. background: what is there as well and may be named."""
 
     hidden: Place
     background: frozenset[Place] = frozenset()
 
 
-def read_truth(answer: dict[str, Any]) -> Truth:
-    """The truth about a case, from its sealed answer."""
-    hidden = answer["injected"][0]
-    others = [*answer["background"], *answer["cad_errors"]]
-    return Truth((hidden["effect"], hidden["joint"]), frozenset((each["effect"], each["joint"]) for each in others))
+def true_names(truth: Truth) -> TrueNames:
+    """The names that are right in a case with one hidden effect."""
+    hidden = truth.injected[0]
+    return TrueNames((hidden.effect, hidden.joint), frozenset((each.effect, each.joint) for each in truth.beside))
 
 
-def judge_start(verdict: dict[str, Any], truth: Truth) -> Start:
+def judge_start(verdict: dict[str, Any], answer: TrueNames) -> Start:
     """Whether a first verdict leaves the hidden effect among rivals."""
-    groups = [(own, rivals) for own, rivals in _name_groups(verdict) if truth.hidden in {own, *rivals}]
+    groups = [(own, rivals) for own, rivals in _name_groups(verdict) if answer.hidden in {own, *rivals}]
     if any(rivals for _, rivals in groups):
         return "ambiguous"
     if groups:
@@ -48,24 +48,24 @@ def judge_start(verdict: dict[str, Any], truth: Truth) -> Start:
     return "another class" if verdict["findings"] else "nothing"
 
 
-def find_suspects(verdict: dict[str, Any], truth: Truth) -> frozenset[Place]:
+def find_suspects(verdict: dict[str, Any], answer: TrueNames) -> frozenset[Place]:
     """All names of the groups that hold the hidden effect."""
     return frozenset(
-        name for own, rivals in _name_groups(verdict) if truth.hidden in {own, *rivals} for name in (own, *rivals)
+        name for own, rivals in _name_groups(verdict) if answer.hidden in {own, *rivals} for name in (own, *rivals)
     )
 
 
-def judge_end(verdict: dict[str, Any], truth: Truth, suspected: frozenset[Place]) -> End:
+def judge_end(verdict: dict[str, Any], answer: TrueNames, suspected: frozenset[Place]) -> End:
     """What became of the suspects of the first verdict.
 
     right: the hidden effect alone is named, without rivals. wrong: another suspect is claimed, and the hidden effect
     is not among its rivals. open: everything else, a verdict without any of them too.
     """
-    groups = [(own, rivals) for own, rivals in _name_groups(verdict) if own in suspected or truth.hidden in rivals]
-    false = [own for own, rivals in groups if own != truth.hidden and truth.hidden not in rivals]
-    if any(own not in truth.background for own in false):
+    groups = [(own, rivals) for own, rivals in _name_groups(verdict) if own in suspected or answer.hidden in rivals]
+    false = [own for own, rivals in groups if own != answer.hidden and answer.hidden not in rivals]
+    if any(own not in answer.background for own in false):
         return "wrong"
-    return "right" if (truth.hidden, frozenset()) in groups else "open"
+    return "right" if (answer.hidden, frozenset()) in groups else "open"
 
 
 def _name_groups(verdict: dict[str, Any]) -> Iterable[tuple[Place, frozenset[Place]]]:
@@ -102,9 +102,8 @@ class SecondMotion:
 class Tools:
     """What is judged, reached through functions that see the folder of a recording and never the truth.
 
-    diagnose: (recording, out) writes out/verdict.json. suspect: (verdict, robot, recording) tells groups of names that
-    may be taken for each other. move: (kind, verdict, robot, recording, seed) gives a second motion, None where none
-    can help.
+    diagnose: (recording, out) writes out/verdict.json. suspect: (verdict, robot, recording) gives groups of names that
+    are easily confused. move: (kind, verdict, robot, recording, seed) gives a second motion, None if none can help.
     """
 
     diagnose: Callable[[Path, Path], None]
@@ -114,7 +113,7 @@ class Tools:
 
 @dataclass(frozen=True)
 class MotionOutcome:
-    """How a second motion ended; why: what went wrong, if anything; forecast: what was expected, where anything was."""
+    """How a second motion ended. why: the error, if any. forecast: what was expected, if anything."""
 
     end: str
     why: str = ""
@@ -141,7 +140,7 @@ class Folders:
         return self.out / "truth" / f"{self.name}-{what}.json"
 
     def clear(self) -> None:
-        """Removes what an earlier draw left."""
+        """Removes the files of an earlier draw."""
         for part in ("observations", "verdicts"):
             shutil.rmtree(self.out / part / self.name, ignore_errors=True)
         for path in (self.out / "truth").glob(f"{self.name}-*"):
@@ -149,7 +148,7 @@ class Folders:
 
 
 def play_case(seed: int, number: int, out: Path, tools: Tools) -> dict[str, Any]:
-    """The result of a case as plain data; ends is empty where no draw was ambiguous."""
+    """The result of a case as plain data; `ends` is empty if no draw was ambiguous."""
     folders = Folders(out, random_stream("loop case", seed, number).bytes(6).hex())
     passed: list[dict[str, Any]] = []
     for attempt in range(MAX_ATTEMPTS):
@@ -161,8 +160,8 @@ def play_case(seed: int, number: int, out: Path, tools: Tools) -> dict[str, Any]
             passed.append({"pair": drawn.pair, "start": "ran away"})
             continue
         try:
-            verdict, truth = _diagnose_first(recorded, folders, tools)
-            start, suspected = _find_ambiguity(verdict, truth, folders, tools)
+            verdict, answer = _diagnose_first(recorded, folders, tools)
+            start, suspected = _find_ambiguity(verdict, answer, folders, tools)
         except JUDGED_FAILURES as error:
             passed.append({"pair": drawn.pair, "start": "failed", "why": str(error)})
             continue
@@ -170,14 +169,15 @@ def play_case(seed: int, number: int, out: Path, tools: Tools) -> dict[str, Any]
             passed.append({"pair": drawn.pair, "start": start})
             continue
         found = {
-            kind: _play_second(kind, recorded, folders, tools, truth, suspected, seed + number) for kind in MOTION_KINDS
+            kind: _play_second(kind, recorded, folders, tools, answer, suspected, seed + number)
+            for kind in MOTION_KINDS
         }
         about = {"tier": drawn.plan.tier, "pair": drawn.pair, "multiple": recorded.simulated.multiples[0]}
         return {
             "case": number,
             "name": folders.name,
             "attempt": attempt,
-            "hidden": list(truth.hidden),
+            "hidden": list(answer.hidden),
             **about,
             "start": start,
             "suspected": sorted(suspected, key=str),
@@ -197,30 +197,29 @@ def _result_fields(found: dict[str, MotionOutcome]) -> dict[str, Any]:
     }
 
 
-def _diagnose_first(recorded: FirstRecording, folders: Folders, tools: Tools) -> tuple[dict[str, Any], Truth]:
+def _diagnose_first(recorded: FirstRecording, folders: Folders, tools: Tools) -> tuple[dict[str, Any], TrueNames]:
     write_loop_recording(recorded.simulated, folders.observation(FIRST_RECORDING), folders.truth(FIRST_RECORDING))
     tools.diagnose(folders.observation(FIRST_RECORDING), folders.verdict(FIRST_RECORDING))
-    return _read_json(folders.verdict(FIRST_RECORDING) / "verdict.json"), read_truth(
-        _read_json(folders.truth(FIRST_RECORDING))
-    )
+    verdict = _read_json(folders.verdict(FIRST_RECORDING) / "verdict.json")
+    return verdict, true_names(read_model(Truth, folders.truth(FIRST_RECORDING)))
 
 
 def _find_ambiguity(
-    verdict: dict[str, Any], truth: Truth, folders: Folders, tools: Tools
+    verdict: dict[str, Any], answer: TrueNames, folders: Folders, tools: Tools
 ) -> tuple[str, frozenset[Place]]:
-    """How a case begins, and the names that are suspected beside the hidden one; none where there is no doubt.
+    """How a case begins, and the suspected names, the hidden one among them; none if nothing is in doubt.
 
-    told: the verdict lists the hidden effect among rivals. mistaken: it names another one alone, which the first
-    recording does not tell from the hidden effect.
+    told: the verdict lists the hidden effect among rivals. mistaken: it names another effect alone, which the first
+    recording does not separate from the hidden one.
     """
-    start = judge_start(verdict, truth)
+    start = judge_start(verdict, answer)
     if start == "ambiguous":
-        return "told", find_suspects(verdict, truth)
+        return "told", find_suspects(verdict, answer)
     if start == "another class":
         first = folders.observation(FIRST_RECORDING)
         groups = tools.suspect(folders.verdict(FIRST_RECORDING) / "verdict.json", first / "limits.yaml", first)
         names = [frozenset((name.effect, name.joint) for name in group) for group in groups]
-        near = [group for group in names if truth.hidden in group]
+        near = [group for group in names if answer.hidden in group]
         if near:
             return "mistaken", near[0]
     return start, frozenset()
@@ -231,11 +230,11 @@ def _play_second(
     recorded: FirstRecording,
     folders: Folders,
     tools: Tools,
-    truth: Truth,
+    answer: TrueNames,
     suspected: frozenset[Place],
     seed: int,
 ) -> MotionOutcome:
-    """How it ended: where the diagnosis or the design fails, the question stays open."""
+    """How a second motion ended; if the diagnosis or the design fails, the question stays open."""
     first = folders.observation(FIRST_RECORDING)
     try:
         moved = tools.move(kind, folders.verdict(FIRST_RECORDING) / "verdict.json", first / "limits.yaml", first, seed)
@@ -243,7 +242,7 @@ def _play_second(
         return MotionOutcome("open", str(error))
     if moved is None:
         return MotionOutcome("open")  # the design says that no motion helps
-    forecast = next((each for each in moved.forecasts if truth.hidden in each.names), None)
+    forecast = next((each for each in moved.forecasts if answer.hidden in each.names), None)
     try:
         both = simulate_second_recording(recorded, moved.motion, kind)
     except FloatingPointError:
@@ -253,7 +252,7 @@ def _play_second(
         tools.diagnose(folders.observation(kind), folders.verdict(kind))
     except JUDGED_FAILURES as error:
         return MotionOutcome("open", str(error), forecast)
-    return MotionOutcome(judge_end(_read_json(folders.verdict(kind) / "verdict.json"), truth, suspected), "", forecast)
+    return MotionOutcome(judge_end(_read_json(folders.verdict(kind) / "verdict.json"), answer, suspected), "", forecast)
 
 
 def _read_json(path: Path) -> dict[str, Any]:

@@ -136,13 +136,13 @@ def reliability_bins(table: pd.DataFrame) -> list[ChanceBin]:
 
 
 def mean_chances(table: pd.DataFrame) -> dict[str, tuple[float, float]]:
-    """For each end its mean expected chance and how often it came."""
+    """For each end its mean expected chance and its observed share."""
     known = table.dropna(subset=["expected right"])
     return {end: (float(known[f"expected {end}"].mean()), float(np.mean(known["end"] == end))) for end in ENDS}
 
 
 def brier_scores(table: pd.DataFrame) -> tuple[float, float]:
-    """Mean squared error of the expected chance of a right end, and that of always telling the share that came."""
+    """Mean squared error of the chance of a right end as expected, and as a constant equal to the observed share."""
     known = table.dropna(subset=["expected right"])
     came = (known["end"] == "right").to_numpy(dtype=np.float64)
     return float(np.mean((known["expected right"] - came) ** 2)), float(np.mean((came - came.mean()) ** 2))

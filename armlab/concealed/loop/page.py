@@ -94,17 +94,18 @@ class Seals:
 
 
 def render_page(settings: LoopSettings, found: Sequence[dict[str, Any]], seal: Seals) -> str:
-    """The page."""
+    """The page of a closed loop in Markdown."""
     table = make_table(found)
     lines = [
         "# The closed loop: does the designed motion decide?",
         "",
         f"Seed {settings.seed}, {len(table) // len(MOTION_KINDS)} ambiguous cases of {len(found)}.",
-        f"SHA-256 of the answers, told before the first diagnosis: {seal.answers};",
+        f"SHA-256 of the answers, printed before the first diagnosis: {seal.answers};",
         f"of the manifest of all recordings, at the end: {seal.manifest}.",
-        "Each case: a poor first recording with one hidden effect, a second motion within the same limits, both",
-        "diagnosed together. *told*: the first verdict lists the hidden effect among rivals. *mistaken*: it names",
-        "another one alone that the recording does not tell from it. Shares with 95 % Wilson intervals.",
+        "A case has a poor first recording with one hidden effect and a second motion within the same limits. Both are",
+        "diagnosed together. *Told*: the first verdict lists the hidden effect among rivals. *Mistaken*: it names",
+        "another effect alone, which the recording does not separate from the hidden one. Shares have 95 % Wilson",
+        "intervals.",
         "",
     ]
     for title, start in (("all", None), ("told", "told"), ("mistaken", "mistaken")):
@@ -115,7 +116,7 @@ def render_page(settings: LoopSettings, found: Sequence[dict[str, Any]], seal: S
     lines += ["## Was it foreseen?", "", *_forecast_table(table), ""]
     failed = sum(len(each.get("failed", {})) for each in found)
     lines += [f"Second motions or verdicts that failed, counted as open: {failed}.", ""]
-    lines += ["## Draws that were passed over, because nothing was in doubt", "", *_passed_over_list(found), ""]
+    lines += ["## Draws that were left out because nothing was in doubt", "", *_passed_over_list(found), ""]
     return "\n".join(lines)
 
 
@@ -149,7 +150,7 @@ def _pair_table(table: pd.DataFrame) -> Iterator[str]:
 
 
 def _forecast_table(table: pd.DataFrame) -> Iterator[str]:
-    """The chance of a right end that `armlab next` tells before the motion is recorded, all kinds of motion."""
+    """The chance of a right end that `armlab next` expects before the motion is recorded, all kinds of motion."""
     if table["expected right"].isna().all():
         yield "Nothing was expected of any motion."
         return
@@ -167,7 +168,7 @@ def _forecast_table(table: pd.DataFrame) -> Iterator[str]:
     )
     yield "On average: " + "; ".join(told) + "."
     score, constant = brier_scores(table)
-    yield f"Brier score {score:.3f} (always telling the share that came: {constant:.3f})."
+    yield f"Brier score {score:.3f} (a constant forecast of the observed share: {constant:.3f})."
 
 
 def _passed_over_list(found: Sequence[dict[str, Any]]) -> list[str]:

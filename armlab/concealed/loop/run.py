@@ -1,4 +1,4 @@
-"""The closed loop over many cases: sealed answers, cases in parallel, resumable."""
+"""The closed loop over many cases: answers are sealed first, cases run in parallel, an interrupted loop continues."""
 
 import json
 from collections.abc import Iterator
@@ -9,9 +9,10 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
+from armlab.concealed.formats import LoopManifest, write_model
 from armlab.concealed.loop.case import MAX_ATTEMPTS, Tools, play_case
-from armlab.concealed.loop.draw import draw_case
-from armlab.concealed.sets import file_digest, write_manifest
+from armlab.concealed.loop.recordings import draw_case
+from armlab.concealed.sets import MANIFEST_FILE, file_digest, seal_files
 
 ANSWERS_FILE = "answers.json"
 
@@ -59,7 +60,7 @@ SETTINGS_FILE = "settings.json"
 
 @dataclass(frozen=True)
 class LoopSettings:
-    """What a set of cases is made of."""
+    """Number of cases and seed of a closed loop."""
 
     cases: int
     seed: int
@@ -72,14 +73,14 @@ def seal_loop(settings: LoopSettings, out: Path) -> str:
 
 
 def play_cases(settings: LoopSettings, out: Path, tools: Tools, jobs: int) -> Iterator[dict[str, Any]]:
-    """Plays what is missing in a folder whose answers are sealed, and tells each result as it is done."""
+    """Plays the missing cases in a folder whose answers are sealed, and yields each result."""
     missing = [number for number in range(settings.cases) if not _result_path(out, number).is_file()]
     work = (delayed(_play_and_write)(settings.seed, number, out, tools) for number in missing)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(work)
 
 
 def read_results(settings: LoopSettings, out: Path) -> list[dict[str, Any]]:
-    """All results that are there, by number."""
+    """All results in the folder, by number."""
     paths = [_result_path(out, number) for number in range(settings.cases)]
     return [json.loads(path.read_text(encoding="utf-8")) for path in paths if path.is_file()]
 
@@ -88,7 +89,9 @@ def close_loop(settings: LoopSettings, out: Path, answers: str) -> str:
     """Checks the results against the sealed answers, and returns the SHA-256 of the manifest of all recordings."""
     check_answers(out / "truth", answers, read_results(settings, out))
     names = sorted(each["name"] for each in read_results(settings, out))
-    return write_manifest(out, {**asdict(settings), "cases": names})
+    manifest = LoopManifest(schema="manifest/1", cases=tuple(names), seed=settings.seed, files=seal_files(out))
+    write_model(manifest, out / MANIFEST_FILE)
+    return file_digest(out / MANIFEST_FILE)
 
 
 def _play_and_write(seed: int, number: int, out: Path, tools: Tools) -> dict[str, Any]:
@@ -96,7 +99,7 @@ def _play_and_write(seed: int, number: int, out: Path, tools: Tools) -> dict[str
     path = _result_path(out, number)
     draft = path.with_suffix(".draft")
     draft.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    draft.replace(path)  # says that the case is whole
+    draft.replace(path)  # marks the case as complete
     return result
 
 
@@ -110,7 +113,7 @@ def _claim_folder(settings: LoopSettings, out: Path) -> None:
     if note.is_file() and note.read_text(encoding="utf-8") != content:
         raise InputError(f"{out} holds a closed loop of other settings (see {note}): choose another folder")
     if not note.is_file() and out.exists() and any(out.iterdir()):
-        raise InputError(f"{out} is there already and holds no closed loop: choose another folder")
+        raise InputError(f"{out} exists and holds no closed loop: choose another folder")
     for part in ("cases", "observations", "truth", "verdicts"):
         (out / part).mkdir(parents=True, exist_ok=True)
     note.write_text(content, encoding="utf-8")

@@ -7,13 +7,16 @@ linear spring is a cable; a payload is a change of its link; an equal delay is v
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from armlab.common.errors import InputError
+from armlab.concealed.formats import LinkDeviation, TrueEffect, Truth, read_model
 
-FAILURE_FILE = "failed.txt"  # beside where a verdict should be: what a diagnosis that gave none complained of
+FAILURE_FILE = "failed.txt"  # in the place of a verdict: the error message of a diagnosis that failed
+TIME_FILE = "time.json"  # beside a verdict: how long the diagnosis took; written last, when the verdict is complete
 VALID_STATUSES = ("mismatch", "none", "inconclusive")
 MISSING_VERDICT: dict[str, Any] = {"status": "invalid", "findings": [], "unexplained": [], "fit": []}
 
@@ -26,7 +29,7 @@ class JudgedCase:
     verdict is.
     """
 
-    truth: dict[str, Any]
+    truth: Truth
     verdict: dict[str, Any]
     recording: Path
     clean: Path
@@ -36,7 +39,7 @@ class JudgedCase:
     @property
     def name(self) -> str:
         """The case's name."""
-        return str(self.truth["case"])
+        return self.truth.case
 
     @property
     def findings(self) -> list[dict[str, Any]]:
@@ -50,12 +53,12 @@ class JudgedCase:
         return named or bool(self.verdict["unexplained"])
 
 
-def read_cases(folder: Path, verdicts: Path, names: list[str]) -> list[JudgedCase]:
+def read_cases(folder: Path, verdicts: Path, names: Sequence[str]) -> list[JudgedCase]:
     """All cases of a set; a missing or invalid verdict is kept as one that found nothing."""
     out = []
     for name in names:
         answer, own = folder / "truth" / f"{name}.json", verdicts / name
-        truth = json.loads(answer.read_text(encoding="utf-8"))
+        truth = read_model(Truth, answer)
         recording, clean = folder / "observations" / name, answer.with_suffix(".parquet")
         out.append(JudgedCase(truth, _read_verdict(own / "verdict.json"), recording, clean, own, _read_seconds(own)))
     if all(case.verdict["status"] == "invalid" for case in out):
@@ -91,7 +94,7 @@ def _is_valid_verdict(verdict: Any) -> bool:
 
 
 def _read_seconds(folder: Path) -> float | None:
-    path = folder / "time.json"
+    path = folder / TIME_FILE
     return float(json.loads(path.read_text(encoding="utf-8"))["seconds"]) if path.is_file() else None
 
 
@@ -113,52 +116,49 @@ DELAY_LIKE_EFFECTS = ("viscous_friction",)
 
 
 def categorize_finding(case: JudgedCase, finding: dict[str, Any]) -> Category:
-    """Of one finding of a case."""
-    truth, effect = case.truth, finding["effect"]
-    if effect == "unknown":
-        return "injected" if any(each["outside"] for each in truth["injected"]) else "unknown"
-    if any(is_same_effect(finding, each) for each in truth["injected"]):
+    """The category of one finding of a case; see the module."""
+    truth, name = case.truth, finding["effect"]
+    if name == "unknown":
+        return "injected" if any(effect.outside for effect in truth.injected) else "unknown"
+    if any(is_same_effect(finding, effect) for effect in truth.injected):
         return "injected"
-    if any(is_same_effect(finding, each) for each in (*truth["background"], *truth["cad_errors"])):
+    if any(is_same_effect(finding, effect) for effect in truth.present):
         return "background"
-    if any(
-        _is_indistinguishable(finding, each, truth)
-        for each in (*truth["injected"], *truth["background"], *truth["cad_errors"])
-    ):
+    if any(_is_indistinguishable(finding, effect, truth) for effect in truth.present):
         return "identical"
     if _is_sum_of_parts(finding, truth):
         return "identical"
-    return "misplaced" if any(effect == each["effect"] for each in truth["injected"]) else "wrong"
+    return "misplaced" if any(name == effect.effect for effect in truth.injected) else "wrong"
 
 
-def is_same_effect(finding: dict[str, Any], effect: dict[str, Any]) -> bool:
+def is_same_effect(finding: dict[str, Any], effect: TrueEffect | LinkDeviation) -> bool:
     """The same name at the same place."""
-    return bool(finding["effect"] == effect["effect"] and finding["joint"] == effect["joint"])
+    return bool(finding["effect"] == effect.effect and finding["joint"] == effect.joint)
 
 
-def _is_indistinguishable(finding: dict[str, Any], effect: dict[str, Any], truth: dict[str, Any]) -> bool:
-    """One finding that no motion tells from an effect, or that is part of its law."""
-    found, place = finding["effect"], finding["joint"]
-    if effect["effect"] == "time_delay":
+def _is_indistinguishable(finding: dict[str, Any], effect: TrueEffect | LinkDeviation, truth: Truth) -> bool:
+    """True for a finding that no motion separates from an effect, or that is a part of its law."""
+    found, place, name = finding["effect"], finding["joint"], effect.effect
+    if name == "time_delay":
         return found in DELAY_LIKE_EFFECTS
-    if effect["effect"] == "slosh":
-        return found in ("payload", "inertial_parameter_error") and place == truth["joints"]
-    if found == "rotor_inertia" and effect["effect"] == "inertial_parameter_error":
-        return place in truth["absorbed_rotors"]
-    if found not in CONTAINED_EFFECTS.get(effect["effect"], ()) or place is None:
+    if name == "slosh":
+        return found in ("payload", "inertial_parameter_error") and place == truth.joints
+    if found == "rotor_inertia" and name == "inertial_parameter_error":
+        return place in truth.absorbed_rotors
+    if found not in CONTAINED_EFFECTS.get(name, ()) or place is None or effect.joint is None:
         return False
     if found == "payload":
-        return bool(place == truth["joints"] and abs(place - effect["joint"]) <= 1)
+        return bool(place == truth.joints and abs(place - effect.joint) <= 1)
     if found != "inertial_parameter_error":
-        return bool(place == effect["joint"])
-    if effect["effect"] == "payload":
-        return bool(abs(place - effect["joint"]) <= 1)
-    return bool(place >= effect["joint"])
+        return bool(place == effect.joint)
+    if name == "payload":
+        return bool(abs(place - effect.joint) <= 1)
+    return bool(place >= effect.joint)
 
 
-def _is_sum_of_parts(finding: dict[str, Any], truth: dict[str, Any]) -> bool:
+def _is_sum_of_parts(finding: dict[str, Any], truth: Truth) -> bool:
     """Asymmetric friction where Coulomb friction and an offset are both there."""
     if finding["effect"] != "asymmetric_friction":
         return False
-    there = {each["effect"] for each in (*truth["injected"], *truth["background"]) if each["joint"] == finding["joint"]}
+    there = {each.effect for each in (*truth.injected, *truth.background) if each.joint == finding["joint"]}
     return {"coulomb_friction", "torque_offset"} <= there

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.outside import OUTSIDE
 from armlab.concealed.score.measures import (
     MIN_NAMED_MULTIPLE,
@@ -16,7 +17,6 @@ from armlab.concealed.score.measures import (
     effect_table,
 )
 from armlab.concealed.score.rows import ScoreRows
-from armlab.recordings.vocabulary import EFFECTS
 
 # Okabe and Ito 2008
 BLACK, BLUE, ORANGE, SKY, GREEN = "#000000", "#0072B2", "#D55E00", "#56B4E9", "#009E73"
@@ -144,7 +144,7 @@ ANSWERS_WITHOUT_NAME = {
     "inconclusive": "inconclusive",
     "invalid": "no verdict",
 }
-LIBRARY_NAMES = tuple(each.id for each in EFFECTS if each.id != "unknown")
+LIBRARY_NAMES = tuple(each.effect for each in LIBRARY)
 OUTSIDE_NAMES = tuple(each.effect for each in OUTSIDE)
 CELL_SIZE_IN = 0.35  # inches a cell
 
@@ -201,10 +201,9 @@ def _cell_color(hidden: str, said: str, share: float) -> tuple[float, float, flo
     """White for none, the full colour of the kind of answer for all."""
     from matplotlib.colors import to_rgb
 
-    full = {"right": to_rgb(BLUE), "wrong": to_rgb(ORANGE), "missed": to_rgb("0.6")}[_answer_kind(hidden, said)]
+    red, green, blue = to_rgb({"right": BLUE, "wrong": ORANGE, "missed": GREY}[_answer_kind(hidden, said)])
     strength = 0.0 if share == 0 or np.isnan(share) else 0.2 + 0.8 * share
-    red, green, blue = (1 - strength * (1 - each) for each in full)
-    return red, green, blue
+    return 1 - strength * (1 - red), 1 - strength * (1 - green), 1 - strength * (1 - blue)
 
 
 def _draw_grid_lines(axes: Any, rows: list[str], columns: list[str]) -> None:

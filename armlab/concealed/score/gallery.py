@@ -1,7 +1,7 @@
 """The gallery: pictures of cases, successes and failures alike, chosen by a fixed rule.
 
 Of each group of outcomes and each tier the first cases in the order of the manifest are shown. Names are random, so
-this order is independent of the diagnosis. The number of cases in each group is given beside the pictures.
+this order is independent of the diagnosis. The number of cases in each group stands beside the pictures.
 """
 
 from collections.abc import Sequence
@@ -29,12 +29,12 @@ from armlab.concealed.score.words import (
 )
 
 PICTURE_SIZE_IN, PICTURE_DPI = (7.8, 4.9), 100
-PALETTE_SIZE = 48  # of the palette of a picture: a file of some 30 kB, and no difference that one could see
+PALETTE_SIZE = 48  # colours of a picture: a file of about 30 kB without a visible difference
 FLOOR_BAND = 2  # times the noise floor
 
 
 def choose_joint(run: HeldOut, joint: int | None) -> int:
-    """The joint to draw, from 0: the one asked for, else where the simulation as given misses most, in noise floors."""
+    """The joint to draw, from 0: the given one, else that with the largest error of the simulation in noise floors."""
     return int(np.argmax(rms(run.given) / rms(run.floor))) if joint is None else joint - 1
 
 
@@ -78,7 +78,7 @@ def _draw_residual(axes: Any, time: Array, residual: Array, colour: str, what: s
 
 
 def _write_png(figure: Any, path: Path) -> None:
-    """With few colours, and nothing in the file that depends on the day."""
+    """Writes few colours and no date, so that the file is small and always the same."""
     from PIL import Image
 
     drawn = BytesIO()
@@ -91,14 +91,12 @@ def _write_png(figure: Any, path: Path) -> None:
 GALLERY_FOLDER, GALLERY_PAGE = "gallery", "gallery.md"
 CASES_PER_GROUP = 2  # pictures a group and tier
 SELECTION_RULE = (
-    f"Of each group and tier the first {CASES_PER_GROUP} cases in the order of the manifest, whose names are "
-    "random. Shown is the "
-    "joint of the hidden effect or of the claim; for the whole arm, and where nothing is hidden, the joint where the "
-    "simulation as given misses most, in noise floors. All torques of the held-out run, low-passed at "
-    f"{SCORE_CUTOFF_HZ:g} "
-    f"Hz; grey is ±{FLOOR_BAND} rms of what the true torque itself leaves. Sizes are in detection limits, and "
-    "groups of "
-    "effects hold those above three. *Said* leaves out right findings of the background."
+    f"Each group and tier shows its first {CASES_PER_GROUP} cases in the order of the manifest; names are random. "
+    "A picture shows the joint of the hidden effect or of the claim; for the whole arm, and where nothing is hidden, "
+    "it shows the joint with the largest error of the simulation as given, in noise floors. All torques are of the "
+    f"held-out run, low-passed at {SCORE_CUTOFF_HZ:g} Hz. Grey: ±{FLOOR_BAND} rms of what the true torque leaves. "
+    "Sizes are in detection limits; groups of effects hold those above three. *Said* leaves out right findings of the "
+    "background."
 )
 
 
@@ -133,18 +131,18 @@ def tally_outcomes(table: ScoreRows) -> str:
 
 
 def _draw_item(case: JudgedCase, item: dict[str, Any], folder: Path) -> str:
-    """The file's name; a case that is shown in two groups at one joint has one picture."""
+    """Name of the picture; a case that two groups show at one joint has one picture."""
     run = filter_held_out_run(case)
     joint = choose_joint(run, None if pd.isna(item["joint"]) else int(item["joint"]))
     file = f"{case.name}-joint-{joint + 1}.png"
     if not (folder / file).is_file():
-        draw_residuals(run, joint, _picture_title(case, joint), bool(case.truth["background"]), folder / file)
+        draw_residuals(run, joint, _picture_title(case, joint), bool(case.truth.background), folder / file)
     return file
 
 
 def _picture_title(case: JudgedCase, joint: int) -> str:
     """Which case, what was hidden, what was said beyond the background: a line each."""
-    about = f"joint {joint + 1} of {case.truth['arm']}, {case.truth['tier']} tier, case {case.name}"
+    about = f"joint {joint + 1} of {case.truth.arm}, {case.truth.tier} tier, case {case.name}"
     lines = (about, f"hidden: {name_hidden(case)}", f"said: {name_said(case)}")
     return "\n".join(shorten(line, 125, placeholder=" ...") for line in lines)
 
@@ -156,7 +154,7 @@ def _render_gallery(cases: dict[str, JudgedCase], table: ScoreRows, shown: pd.Da
         parts.append(f"## {title}")
         for group, about in OUTCOME_GROUPS.items():
             if about.success == success:
-                own, of = (frame[frame["group"] == group] for frame in (shown, everything))
+                own, of = shown[shown["group"] == group], everything[everything["group"] == group]
                 parts.append(f"### {about.title}: {_count_shown(own, of)}")
                 parts += [_render_entry(cases[item["case"]], item) for item in to_records(own)]
     return "\n\n".join(parts) + "\n"
@@ -175,7 +173,7 @@ def _render_entry(case: JudgedCase, item: dict[str, Any]) -> str:
     if item["group"] in ("wrong claim", "false claim"):
         place = describe_place(None if pd.isna(item["joint"]) else item["joint"])
         of = f" - {item['effect']} claimed, {place}, counted as {item['answered']}"
-    head = f"**{case.name}**, {case.truth['arm']}, {item['tier']} tier{of}"
+    head = f"**{case.name}**, {case.truth.arm}, {item['tier']} tier{of}"
     return (
         f"{head}<br>\n*hidden:* {hidden}<br>\n*said:* "
         f"{describe_said(case)}\n\n![{case.name}]({GALLERY_FOLDER}/{item['file']})"

@@ -1,9 +1,9 @@
 """The held-out run of a case in the filter of the scorer, and the share of the gap that a diagnosis has closed.
 
-The scorer shares no code with what it judges: the torque after a diagnosis is the prediction of the verdict's model
+The scorer shares no code with the diagnosis. The torque after a diagnosis is the prediction of its model
 (`predicted/<run>.csv` beside the verdict, columns t, tau1, ...); everything else is computed here. The gap lies
-between the refitted rigid model and the true floor. Where there is no prediction, the figures of the verdict are
-taken, and the row says so.
+between the refitted rigid model and the true floor. Without a prediction, the figures of the verdict are used, and the
+row says `reported`.
 """
 
 from dataclasses import dataclass
@@ -56,15 +56,16 @@ def filter_held_out_run(case: JudgedCase) -> HeldOut:
     predicted = case.folder / "predicted" / f"{Path(run.file).stem}.csv"
     refit, friction = _refit_residuals(recording.arm, identify, signals)
     given = signals.filter(rigid_torque(recording.arm, signals.motion))
+    after = None
+    if predicted.is_file():
+        after = signals.torque - signals.filter(_read_prediction(predicted, signals.run.time))
     return HeldOut(
         time=signals.time,
         torque=signals.torque,
         given=signals.torque - given,
         refit=refit,
         friction=friction,
-        after=signals.torque - signals.filter(_read_prediction(predicted, signals.run.time))
-        if predicted.is_file()
-        else None,
+        after=after,
         floor=signals.torque - signals.filter(clean),
     )
 
@@ -85,11 +86,8 @@ def _refit_residuals(arm: Arm, identify: list[Signals], signals: Signals) -> tup
     learned = np.vstack([_fit_columns(arm, each, base) for each in identify])
     torque = np.concatenate([_torque_without_rotors(arm, each).ravel() for each in identify])
     there, wanted = _fit_columns(arm, signals, base), _torque_without_rotors(arm, signals)
-    left = (
-        _fit_residual(learned[:, :number], torque, there[:, :number], wanted)
-        for number in (len(base), learned.shape[1])
-    )
-    return next(left), next(left)
+    links = _fit_residual(learned[:, : len(base)], torque, there[:, : len(base)], wanted)
+    return links, _fit_residual(learned, torque, there, wanted)
 
 
 def _fit_residual(learned: Array, torque: Array, there: Array, wanted: Array) -> Array:
@@ -128,7 +126,7 @@ def _resample_evenly(run: Run, even: Run, torque: Array) -> Array:
     return np.column_stack([np.interp(even.time, time, column) for column in torque.T])
 
 
-MIN_GAP_RATIO = 1.15  # times the floor: where the rigid model is nearly there, no gap is left to close
+MIN_GAP_RATIO = 1.15  # times the floor: below, the rigid model leaves no gap to close
 
 
 @dataclass(frozen=True)
@@ -145,8 +143,8 @@ class Gap:
 
 
 def measure_gap_closed(case: JudgedCase) -> Gap:
-    """What the diagnosis of one case has closed."""
-    if not case.truth["injected"] or case.verdict["status"] == "invalid":
+    """The share of the gap that the diagnosis of one case has closed."""
+    if not case.truth.injected or case.verdict["status"] == "invalid":
         return Gap(None, None, "none")
     if not (case.folder / "predicted").is_dir():
         return _reported_gap(case)
@@ -154,7 +152,7 @@ def measure_gap_closed(case: JudgedCase) -> Gap:
     if found.after is None:
         return _reported_gap(case)
     after, floor = rms(found.after), rms(found.floor)
-    beyond = _share_closed(rms(found.friction), after, floor) if case.truth["background"] else None
+    beyond = _share_closed(rms(found.friction), after, floor) if case.truth.background else None
     return Gap(_share_closed(rms(found.refit), after, floor), beyond, "counted")
 
 
@@ -163,8 +161,8 @@ def _share_closed(before: Array, after: Array, floor: Array) -> float | None:
     worth = before > MIN_GAP_RATIO * floor
     if not worth.any():
         return None
-    scaled = [each[worth] / floor[worth] for each in (before, after)]
-    return float(np.sum(scaled[0] - scaled[1]) / np.sum(scaled[0] - 1))
+    scaled_before, scaled_after = before[worth] / floor[worth], after[worth] / floor[worth]
+    return float(np.sum(scaled_before - scaled_after) / np.sum(scaled_before - 1))
 
 
 def _reported_gap(case: JudgedCase) -> Gap:

@@ -1,7 +1,7 @@
 """The measures of a set with their intervals, and the tables: detection by size, by effect, by arm, and confusion."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -28,15 +28,24 @@ Unit = Literal["share", "s", ""]
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure, its interval (None where it has none), how many it was counted on, what is wanted, and its unit."""
+    """A figure of a score.
 
-    name: str
+    id: a key of `MEASURE_TEXTS`. low, high: its 95 % interval, None where it has none. number: how many items it was
+    counted on. wanted: a key of `WANTED_BOUNDS`, empty where nothing is wanted.
+    """
+
+    id: str
     value: float | None
     low: float | None
     high: float | None
     number: int
     wanted: str
     unit: Unit = ""
+
+    @property
+    def title(self) -> str:
+        """What pages print for the id."""
+        return MEASURE_TEXTS[self.id].title
 
     @property
     def is_met(self) -> bool | None:
@@ -55,40 +64,70 @@ class Measure:
         return least <= self.low and self.high <= most if self.is_met else self.high < least or self.low > most
 
 
+@dataclass(frozen=True)
+class MeasureText:
+    """What pages print about a measure: its title, and what is wanted of it."""
+
+    title: str
+    wanted: str = ""
+
+
+ABOVE = f"above {MIN_NAMED_MULTIPLE:g} limits"
+MEASURE_TEXTS = {
+    "false_claims_on_nulls": MeasureText("false claims on nulls", "at most 2 %"),
+    "false_claims_on_decoys": MeasureText("false claims on decoys", "at most 2 %"),
+    "false_unknown": MeasureText("unknown said on nulls and decoys"),
+    "wrong_names": MeasureText("wrong names among claims", "at most 5 %"),
+    "wrong_names_beyond_background": MeasureText("wrong names among claims beyond background"),
+    "misplaced": MeasureText("misplaced among claims"),
+    "right_name_or_class": MeasureText(f"right name or class of four, {ABOVE}", "at least 90 %"),
+    "right_name": MeasureText(f"right first name, {ABOVE}"),
+    "right_name_all_sizes": MeasureText("right first name, all sizes"),
+    "right_joint": MeasureText("right joint, given a right name", "at least 98 %"),
+    "class_size": MeasureText("class size where the class is right (mean)"),
+    "gap_closed": MeasureText("gap closed on held-out runs (median)", "at least 0.9"),
+    "gap_closed_beyond_friction": MeasureText("gap closed beyond plain friction (median)"),
+    "unknown_outside": MeasureText(f"unknown on effects outside, {ABOVE}", "at least 80 %"),
+    "interval_coverage": MeasureText("95 % intervals that hold the truth", "90-98 %"),
+    "parameter_error": MeasureText("relative parameter error (median)"),
+    "seconds_median": MeasureText("seconds a case (median)"),
+    "seconds_longest": MeasureText("seconds a case (longest)"),
+    "missing_verdicts": MeasureText("missing or invalid verdicts", "none"),
+}
+
+
 def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
-    """All measures of one tier."""
-    cases, claims, parameters = (frame[frame["tier"] == tier] for frame in (rows.cases, rows.claims, rows.parameters))
-    nulls, decoys = (cases[cases["kind"] == kind] for kind in ("null", "decoy"))
+    """All measures of one tier, in the order of `MEASURE_TEXTS`."""
+    cases = rows.cases[rows.cases["tier"] == tier]
+    claims = rows.claims[rows.claims["tier"] == tier]
+    parameters = rows.parameters[rows.parameters["tier"] == tier]
+    nulls, decoys = cases[cases["kind"] == "null"], cases[cases["kind"] == "decoy"]
     inside, outside = split_tier(rows.effects, tier)
-    large, unknown = (each[each["multiple"] > MIN_NAMED_MULTIPLE] for each in (inside, outside))
+    large = inside[inside["multiple"] > MIN_NAMED_MULTIPLE]
+    large_outside = outside[outside["multiple"] > MIN_NAMED_MULTIPLE]
     named = inside[inside["named_first"].astype(bool)]
     classed = inside[inside["named_class"].astype(bool)]
-    beyond = claims[~claims["category"].isin(["background"])]
-    covered = parameters["covered"].dropna()
+    beyond = claims[claims["category"] != "background"]
     return [
-        share_measure("false claims on nulls", nulls["false_claims"] > 0, "at most 2 %"),
-        share_measure("false claims on decoys", decoys["false_claims"] > 0, "at most 2 %"),
-        share_measure("unknown said on nulls and decoys", pd.concat([nulls, decoys])["false_unknown"], ""),
-        share_measure("wrong names among claims", claims["category"].isin(["wrong"]), "at most 5 %"),
-        share_measure("wrong names among claims beyond background", beyond["category"].isin(["wrong"]), ""),
-        share_measure("misplaced among claims", claims["category"].isin(["misplaced"]), ""),
-        share_measure(
-            f"right name or class of four, above {MIN_NAMED_MULTIPLE:g} limits", large["named_class"], "at least 90 %"
-        ),
-        share_measure(f"right first name, above {MIN_NAMED_MULTIPLE:g} limits", large["named_first"], ""),
-        share_measure("right first name, all sizes", inside["named_first"], ""),
-        share_measure("right joint, given a right name", named["right_joint"], "at least 98 %"),
-        _middle_measure("class size where the class is right (mean)", classed["class_size"], "", np.mean),
-        _middle_measure("gap closed on held-out runs (median)", cases["gap_closed"], "at least 0.9"),
-        _middle_measure("gap closed beyond plain friction (median)", cases["gap_closed_beyond_friction"], ""),
-        share_measure(
-            f"unknown on effects outside, above {MIN_NAMED_MULTIPLE:g} limits", unknown["named_first"], "at least 80 %"
-        ),
-        share_measure("95 % intervals that hold the truth", covered, "90-98 %"),
-        _middle_measure("relative parameter error (median)", parameters["relative_error"], ""),
-        replace(_middle_measure("seconds a case (median)", cases["seconds"], ""), unit="s"),
-        _longest_measure("seconds a case (longest)", cases["seconds"]),
-        share_measure("missing or invalid verdicts", cases["status"] == "invalid", "none"),
+        share_measure("false_claims_on_nulls", nulls["false_claims"] > 0),
+        share_measure("false_claims_on_decoys", decoys["false_claims"] > 0),
+        share_measure("false_unknown", pd.concat([nulls, decoys])["false_unknown"]),
+        share_measure("wrong_names", claims["category"] == "wrong"),
+        share_measure("wrong_names_beyond_background", beyond["category"] == "wrong"),
+        share_measure("misplaced", claims["category"] == "misplaced"),
+        share_measure("right_name_or_class", large["named_class"]),
+        share_measure("right_name", large["named_first"]),
+        share_measure("right_name_all_sizes", inside["named_first"]),
+        share_measure("right_joint", named["right_joint"]),
+        middle_measure("class_size", classed["class_size"], np.mean),
+        middle_measure("gap_closed", cases["gap_closed"]),
+        middle_measure("gap_closed_beyond_friction", cases["gap_closed_beyond_friction"]),
+        share_measure("unknown_outside", large_outside["named_first"]),
+        share_measure("interval_coverage", parameters["covered"].dropna()),
+        middle_measure("parameter_error", parameters["relative_error"]),
+        replace(middle_measure("seconds_median", cases["seconds"]), unit="s"),
+        longest_measure("seconds_longest", cases["seconds"]),
+        share_measure("missing_verdicts", cases["status"] == "invalid"),
     ]
 
 
@@ -99,33 +138,37 @@ def split_tier(effects: pd.DataFrame, tier: str) -> tuple[pd.DataFrame, pd.DataF
     return own[~outside], own[outside]
 
 
-def share_measure(name: str, flags: "pd.Series[Any]", wanted: str) -> Measure:
+def share_measure(id: str, flags: "pd.Series[Any]") -> Measure:
     """A share with Wilson's interval."""
-    hits, number = int(flags.astype(bool).sum()), len(flags)
+    wanted, hits, number = MEASURE_TEXTS[id].wanted, int(flags.astype(bool).sum()), len(flags)
     if not number:
-        return Measure(name, None, None, None, 0, wanted, "share")
-    return Measure(name, hits / number, *wilson_interval(hits, number, CONFIDENCE_LEVEL), number, wanted, "share")
+        return Measure(id, None, None, None, 0, wanted, "share")
+    low, high = wilson_interval(hits, number, CONFIDENCE_LEVEL)
+    return Measure(id, hits / number, low, high, number, wanted, "share")
 
 
-def _middle_measure(name: str, values: "pd.Series[float]", wanted: str, middle: Any = np.median) -> Measure:
+def middle_measure(id: str, values: "pd.Series[float]", middle: Callable[..., Any] = np.median) -> Measure:
     """A median or mean with a bootstrap interval."""
-    numbers = values.dropna().to_numpy(dtype=np.float64)
+    wanted, numbers = MEASURE_TEXTS[id].wanted, values.dropna().to_numpy(dtype=np.float64)
     if not len(numbers):
-        return Measure(name, None, None, None, 0, wanted)
+        return Measure(id, None, None, None, 0, wanted)
     draws = np.random.default_rng(0).choice(numbers, (1000, len(numbers)))
     ends = np.quantile(middle(draws, axis=1), [(1 - CONFIDENCE_LEVEL) / 2, (1 + CONFIDENCE_LEVEL) / 2])
-    return Measure(name, float(middle(numbers)), float(ends[0]), float(ends[1]), len(numbers), wanted)
+    value = float(middle(numbers))
+    return Measure(id, value, float(ends[0]), float(ends[1]), len(numbers), wanted)
 
 
-def _longest_measure(name: str, seconds: "pd.Series[float]") -> Measure:
-    known = seconds.dropna()
-    return Measure(name, float(known.max()) if len(known) else None, None, None, len(known), "", "s")
+def longest_measure(id: str, seconds: "pd.Series[float]") -> Measure:
+    """The longest time, which has no interval."""
+    wanted, known = MEASURE_TEXTS[id].wanted, seconds.dropna()
+    longest = float(known.max()) if len(known) else None
+    return Measure(id, longest, None, None, len(known), wanted, "s")
 
 
 SIZE_BINS = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, np.inf)  # detection limits
 COARSE_SIZE_BINS = (0.0, 1.0, 3.0, 10.0, np.inf)  # for the few cases that one effect has
 NOTHING_HIDDEN = "nothing"
-MEASURE_COLUMNS = ("name", "value", "low", "high", "number")
+SHARE_COLUMNS = ["from", "to", "name", "value", "low", "high", "number"]
 
 
 def detection_table(rows: ScoreRows, tier: str) -> pd.DataFrame:
@@ -152,9 +195,11 @@ def _bin_shares(curves: Sequence[tuple[str, pd.DataFrame, str]], bins: tuple[flo
     for low, high in pairwise(bins):
         for name, effects, flag in curves:
             chosen = effects[(effects["multiple"] > low) & (effects["multiple"] <= high)]
-            counted = asdict(share_measure(name, chosen[flag], ""))
-            out.append({"from": low, "to": high, **{key: counted[key] for key in MEASURE_COLUMNS}})
-    return pd.DataFrame(out, columns=["from", "to", *MEASURE_COLUMNS])
+            hits, number = int(chosen[flag].astype(bool).sum()), len(chosen)
+            ends = wilson_interval(hits, number, CONFIDENCE_LEVEL) if number else (None, None)
+            share = hits / number if number else None
+            out.append(dict(zip(SHARE_COLUMNS, (low, high, name, share, *ends, number), strict=True)))
+    return pd.DataFrame(out, columns=SHARE_COLUMNS)
 
 
 def effect_table(rows: ScoreRows, tier: str) -> pd.DataFrame:

@@ -51,23 +51,15 @@ def list_outcomes(table: ScoreRows) -> pd.DataFrame:
     rows: list[dict[str, Any]] = []
     for case in to_records(table.cases):
         about = {key: case[key] for key in ("case", "tier", "kind")}
-        own, false = (
-            effects.get(case["case"], []),
-            [each for each in claims.get(case["case"], []) if _is_false_claim(each)],
-        )
-        rows += [
-            about | item
-            for item in (_outcomes_with_hidden(own, false) if own else _outcomes_without_hidden(case, false))
-        ]
+        own = effects.get(case["case"], [])
+        false = [each for each in claims.get(case["case"], []) if each["category"] in FALSE_CATEGORIES]
+        items = _outcomes_with_hidden(own, false) if own else _outcomes_without_hidden(case, false)
+        rows += [about | item for item in items]
     return pd.DataFrame(rows, columns=OUTCOME_COLUMNS).astype({"joint": "Int64"})
 
 
 def _records_by_case(frame: pd.DataFrame) -> dict[str, list[dict[str, Any]]]:
     return {str(case): to_records(own) for case, own in frame.groupby("case", sort=False)}
-
-
-def _is_false_claim(claim: dict[str, Any]) -> bool:
-    return claim["category"] in FALSE_CATEGORIES
 
 
 def _outcomes_with_hidden(effects: list[dict[str, Any]], false: list[dict[str, Any]]) -> Iterator[dict[str, Any]]:
@@ -143,7 +135,7 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
     found = found.sort_values("miss", kind="stable").astype({"miss": str})
     known = {case.name: case for case in cases}
     own = [known[name] for name in found["case"]]
-    found["rate_hz"] = [case.truth.get("rate_hz") for case in own]
+    found["rate_hz"] = [case.truth.rate_hz for case in own]
     for column, words in WORD_COLUMNS.items():
         found[column] = [words(case) for case in own]
     found["law"] = [_hidden_law(case, effect) for case, effect in zip(own, found["effect"], strict=True)]
@@ -153,4 +145,4 @@ def list_misses(cases: Sequence[JudgedCase], table: ScoreRows) -> pd.DataFrame:
 
 def _hidden_law(case: JudgedCase, effect: str) -> str:
     """The law behind a hidden effect; empty for a claim of something that is not there."""
-    return next((str(each["form"]) for each in case.truth["injected"] if each["effect"] == effect), "")
+    return next((each.form for each in case.truth.injected if each.effect == effect), "")

@@ -5,49 +5,49 @@ from typing import Any
 import pandas as pd
 
 from armlab.concealed.score.gallery import CASES_PER_GROUP, GALLERY_PAGE, tally_outcomes
-from armlab.concealed.score.measures import MIN_NAMED_MULTIPLE, Measure, arm_table, effect_table
+from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure, arm_table, effect_table
 from armlab.concealed.score.rows import ScoreRows
 
 STRICTER_MEASURES = {  # shown below the measure that is wanted: the same, counted more strictly
-    "wrong names among claims": "wrong names among claims beyond background",
-    "gap closed on held-out runs (median)": "gap closed beyond plain friction (median)",
+    "wrong_names": "wrong_names_beyond_background",
+    "gap_closed": "gap_closed_beyond_friction",
 }
 MAX_SHOWN_MISSES = 30
 SHOWN_MISS_COLUMNS = ["miss", "case", "tier", "arm", "effect", "law", "joint", "limits", "hidden", "said"]
 HOW_TO_READ = f"""\
 A *detection limit* is the size at which an oracle that knows the true law and the true noise finds the effect with 90
-% power, at one per cent over all effects and places. Whoever does not know the law needs more: names are expected
-above {MIN_NAMED_MULTIPLE:g} limits. *Clean*: the simulation is exact but for what is hidden. *Realistic*: every link
-is 3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden; *decoy*: only wrong links.
-A *claim* is a finding; one of what really is there, friction of the background too, is right; one whose first name is
-wrong is a wrong claim, even with the right name among its rivals. Intervals are 95 %: Wilson's for shares (as if the
-effects of a case were independent), bootstrap for medians. *Met*: the figure is as wanted; *surely*: so is its whole
-interval (or, not met, none of it); *perhaps*: the interval reaches across what was wanted."""
+% power, at a level of 1 % over all effects and places. A diagnosis that does not know the law needs more: names are
+expected above {MIN_NAMED_MULTIPLE:g} limits. *Clean*: only the hidden effects differ from the simulation. *Realistic*:
+every link is 3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden. *Decoy*: only
+links are wrong. A *claim* is a finding. A claim of something that is there is right, friction of the background
+included. A claim whose first name is wrong is a wrong claim, even if the right name is among its rivals. Intervals are
+95 %: Wilson's for shares (as if the effects of a case were independent), bootstrap for medians. *Met*: the figure is as
+wanted. *Surely*: so is its whole interval (or, if not met, none of it). *Perhaps*: the interval crosses the bound."""
 CAPTIONS = {
     "detection": "Size against share named. Bands: Wilson, 95 %; dotted: three limits.",
     "detection_by_effect": (
-        "The same for each effect. Circles clean, squares realistic; at the top a case that was named, at the bottom "
-        "one that was not; crosses: share, Wilson interval and the sizes that it was counted on."
+        "The same for each effect. Circles: clean; squares: realistic; a case that was named is at the top, one that "
+        "was not at the bottom. Crosses: share, its Wilson interval, and the range of sizes of its cases."
     ),
     "confusion_clean": (
-        "What was said of what was hidden, above three limits ([all sizes](confusion_clean_all.svg)). A right "
-        "name counts first, then a wrong one, then `unknown`."
+        "What was hidden and what was said, above three limits ([all sizes](confusion_clean_all.svg)). If a verdict "
+        "says several things, a right name counts first, then a wrong one, then `unknown`."
     ),
     "confusion_realistic": "The same, realistic tier ([all sizes](confusion_realistic_all.svg)).",
-    "names_clean": "Names by effect; to the left, how often a name was claimed wrongly, at any size.",
+    "names_clean": "Names by effect. To the left: how often a name was claimed wrongly, at any size.",
     "names_realistic": "The same, realistic tier.",
     "gap": (
-        "How much of the gap to the true floor was closed on held-out runs, case by case; right, counted from a model "
-        "that has plain friction already."
+        "Share of the gap to the true floor that was closed on held-out runs, case by case. Right: counted from a "
+        "model that has plain friction already."
     ),
-    "seconds": "Run time of one diagnosis, everything included.",
+    "seconds": "Run time of one diagnosis, all steps included.",
 }
 
 
 def render_page(table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, drawn: list[str]) -> str:
     """The score of a set. missed: see `misses`. drawn: names of the figures, without suffix."""
     tiers = {tier: [Measure(**each) for each in found] for tier, found in result["tiers"].items()}
-    kind = "Development set: to learn from, not judged." if result["development"] else "Judged set."
+    kind = "Development set, not judged." if result["development"] else "Judged set."
     seal = f"{kind} {result['cases']} cases, seed {result['seed']}, manifest SHA-256 `{result['manifest']}`."
     parts = ["# Score on concealed effects", seal, "## Wanted and found", _wanted_table(tiers), HOW_TO_READ]
     parts += [
@@ -74,12 +74,14 @@ def format_measure(each: Measure) -> str:
     if each.value is None:
         return "-"
     scale, unit = (100, " %") if each.unit == "share" else (1, f" {each.unit}".rstrip())
-    value, *ends = (None if x is None else f"{scale * x:.3g}" for x in (each.value, each.low, each.high))
-    return f"{value}{unit} ({ends[0]} to {ends[1]})" if None not in ends else f"{value}{unit}"
+    text = f"{scale * each.value:.3g}{unit}"
+    if each.low is None or each.high is None:
+        return text
+    return f"{text} ({scale * each.low:.3g} to {scale * each.high:.3g})"
 
 
 def judge_measure(each: Measure) -> str:
-    """Whether a figure is as wanted, and how sure that is."""
+    """Whether a figure is as wanted, and whether this holds for its whole interval."""
     if each.is_met is None:
         return "-"
     text = "met" if each.is_met else "**not met**"
@@ -102,33 +104,36 @@ def _format_cell(value: Any) -> str:
 
 def _wanted_table(tiers: dict[str, list[Measure]]) -> str:
     """The measures that have to reach something, and their stricter companions, the tiers side by side."""
-    names = [each.name for each in next(iter(tiers.values())) if each.wanted]
     head = [
         f"| measure | wanted |{''.join(f' {tier} | of | |' for tier in tiers)}",
         "|---|---|" + "---|---:|---|" * len(tiers),
     ]
     rows = []
-    for name in names:
-        rows.append(_wanted_row(name, name, tiers))
-        if name in STRICTER_MEASURES:
-            rows.append(_wanted_row(STRICTER_MEASURES[name], f"&nbsp;&nbsp;{STRICTER_MEASURES[name]}", tiers))
+    for id, text in MEASURE_TEXTS.items():
+        if text.wanted:
+            rows.append(_wanted_row(id, "", tiers))
+            if id in STRICTER_MEASURES:
+                rows.append(_wanted_row(STRICTER_MEASURES[id], "&nbsp;&nbsp;", tiers))
     return "\n".join([*head, *rows])
 
 
-def _wanted_row(name: str, title: str, tiers: dict[str, list[Measure]]) -> str:
-    found = [next(each for each in measures if each.name == name) for measures in tiers.values()]
+def _wanted_row(id: str, indent: str, tiers: dict[str, list[Measure]]) -> str:
+    found = [_find_measure(measures, id) for measures in tiers.values()]
     cells = "".join(f" {format_measure(each)} | {each.number} | {judge_measure(each)} |" for each in found)
-    return f"| {title} | {found[0].wanted} |{cells}"
+    return f"| {indent}{MEASURE_TEXTS[id].title} | {MEASURE_TEXTS[id].wanted} |{cells}"
 
 
 def _all_measures_table(tiers: dict[str, list[Measure]]) -> str:
-    names = [each.name for each in next(iter(tiers.values()))]
     head = [f"| measure |{''.join(f' {tier} | of |' for tier in tiers)}", "|---|" + "---|---:|" * len(tiers)]
     rows = []
-    for name in names:
-        found = [next(each for each in measures if each.name == name) for measures in tiers.values()]
-        rows.append(f"| {name} |" + "".join(f" {format_measure(each)} | {each.number} |" for each in found))
+    for id, text in MEASURE_TEXTS.items():
+        found = [_find_measure(measures, id) for measures in tiers.values()]
+        rows.append(f"| {text.title} |" + "".join(f" {format_measure(each)} | {each.number} |" for each in found))
     return "\n".join([*head, *rows])
+
+
+def _find_measure(measures: list[Measure], id: str) -> Measure:
+    return next(each for each in measures if each.id == id)
 
 
 def _count_kinds(table: ScoreRows) -> pd.DataFrame:
@@ -142,8 +147,8 @@ def _misses_section(missed: pd.DataFrame) -> str:
         return "None."
     more = f"The first {MAX_SHOWN_MISSES} of {len(missed)}" if len(missed) > MAX_SHOWN_MISSES else f"All {len(missed)}"
     text = (
-        f"{more}; effect, joint: what was missed, or what was wrongly claimed. *Hidden* and *said* are of the whole "
-        "case, right findings of the background left out; noise, gap closed and all sizes are in "
+        f"{more}. Effect and joint are what was missed or wrongly claimed. *Hidden* and *said* describe the whole "
+        "case without right findings of the background. Noise, gap closed and all sizes are in "
         "[misses.csv](misses.csv)."
     )
     return f"{text}\n\n{markdown_table(missed.head(MAX_SHOWN_MISSES)[SHOWN_MISS_COLUMNS])}"

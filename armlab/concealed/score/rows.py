@@ -6,6 +6,7 @@ from typing import Any
 
 import pandas as pd
 
+from armlab.concealed.formats import InjectedEffect, TrueEffect
 from armlab.concealed.score.cases import JudgedCase, categorize_finding, is_same_effect
 from armlab.concealed.score.held_out import measure_gap_closed
 
@@ -13,11 +14,15 @@ MAX_CLASS_SIZE = 4
 KEY_COLUMNS = ["case", "tier", "kind"]
 GAP_COLUMNS = ["gap_closed", "gap_closed_beyond_friction", "gap_source"]
 CASE_COLUMNS = [*KEY_COLUMNS, "arm", "noise", "status", "false_claims", "false_unknown", *GAP_COLUMNS, "seconds"]
-COPIED_EFFECT_KEYS = ["effect", "form", "obvious_form", "joint", "outside", "multiple"]
 EFFECT_COLUMNS = [
     *KEY_COLUMNS,
     "arm",
-    *COPIED_EFFECT_KEYS,
+    "effect",
+    "form",
+    "obvious_form",
+    "joint",
+    "outside",
+    "multiple",
     "named_first",
     "named_class",
     "class_size",
@@ -41,14 +46,15 @@ class ScoreRows:
 
 def make_rows(cases: list[JudgedCase]) -> ScoreRows:
     """The rows of judged cases."""
-    frames = (
-        [_case_row(case) for case in cases],
-        [row for case in cases for row in _effect_rows(case)],
-        [row for case in cases for row in _claim_rows(case)],
-        [row for case in cases for row in _parameter_rows(case)],
+    effects = [row for case in cases for row in _effect_rows(case)]
+    claims = [row for case in cases for row in _claim_rows(case)]
+    parameters = [row for case in cases for row in _parameter_rows(case)]
+    return ScoreRows(
+        cases=pd.DataFrame([_case_row(case) for case in cases], columns=CASE_COLUMNS),
+        effects=pd.DataFrame(effects, columns=EFFECT_COLUMNS),
+        claims=pd.DataFrame(claims, columns=CLAIM_COLUMNS),
+        parameters=pd.DataFrame(parameters, columns=PARAMETER_COLUMNS),
     )
-    columns = (CASE_COLUMNS, EFFECT_COLUMNS, CLAIM_COLUMNS, PARAMETER_COLUMNS)
-    return ScoreRows(*(pd.DataFrame(each, columns=names) for each, names in zip(frames, columns, strict=True)))
 
 
 def to_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
@@ -57,18 +63,18 @@ def to_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _key_values(case: JudgedCase) -> dict[str, Any]:
-    return {"case": case.name, "tier": case.truth["tier"], "kind": case.truth["kind"]}
+    return {"case": case.name, "tier": case.truth.tier, "kind": case.truth.kind}
 
 
 def _case_row(case: JudgedCase) -> dict[str, Any]:
     categories = [categorize_finding(case, finding) for finding in case.findings]
     gap = measure_gap_closed(case)
     return _key_values(case) | {
-        "arm": case.truth["arm"],
-        "noise": case.truth["noise"]["kind"],
+        "arm": case.truth.arm,
+        "noise": case.truth.noise.kind,
         "status": case.verdict["status"],
         "false_claims": sum(each in ("wrong", "misplaced", "unknown") for each in categories),
-        "false_unknown": case.says_unknown and not case.truth["injected"],
+        "false_unknown": case.says_unknown and not case.truth.injected,
         "gap_closed": gap.closed,
         "gap_closed_beyond_friction": gap.beyond,
         "gap_source": gap.source,
@@ -77,30 +83,33 @@ def _case_row(case: JudgedCase) -> dict[str, Any]:
 
 
 def _effect_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
-    for effect in case.truth["injected"]:
-        outside = effect["outside"]
-        named = [each for each in case.findings if each["effect"] == effect["effect"]] or _equivalent_findings(
-            case, effect
-        )
-        in_class = [finding for finding in case.findings if _class_holds(finding, effect["effect"])]
+    for effect in case.truth.injected:
+        named = [each for each in case.findings if each["effect"] == effect.effect]
+        named = named or _equivalent_findings(case, effect)
+        in_class = [finding for finding in case.findings if _class_holds(finding, effect.effect)]
         sizes = [1 + len(finding["rivals"]) for finding in in_class]
+        right_joint = any(each["joint"] == effect.joint for each in named)
         yield _key_values(case) | {
-            "arm": case.truth["arm"],
-            **{key: effect[key] for key in COPIED_EFFECT_KEYS},
-            "named_first": case.says_unknown if outside else bool(named),
-            "named_class": case.says_unknown if outside else bool(named or in_class),
+            "arm": case.truth.arm,
+            "effect": effect.effect,
+            "form": effect.form,
+            "obvious_form": effect.obvious_form,
+            "joint": effect.joint,
+            "outside": effect.outside,
+            "multiple": effect.multiple,
+            "named_first": case.says_unknown if effect.outside else bool(named),
+            "named_class": case.says_unknown if effect.outside else bool(named or in_class),
             "class_size": min(sizes) if sizes else None,
-            "right_joint": any(each["joint"] == effect["joint"] for each in named) if named and not outside else None,
+            "right_joint": right_joint if named and not effect.outside else None,
             "answered": _given_answer(case, effect),
         }
 
 
-def _equivalent_findings(case: JudgedCase, effect: dict[str, Any]) -> list[dict[str, Any]]:
-    """The findings at the effect's joint that together say the same, if all of them are there."""
-    parts = [
-        each for each in case.findings if each["joint"] == effect["joint"] and each["effect"] in effect["equivalent"]
-    ]
-    return parts if {each["effect"] for each in parts} == set(effect["equivalent"]) else []
+def _equivalent_findings(case: JudgedCase, effect: InjectedEffect) -> list[dict[str, Any]]:
+    """The findings at the effect's joint that together describe it, if all of them are there."""
+    here = [finding for finding in case.findings if finding["joint"] == effect.joint]
+    parts = [finding for finding in here if finding["effect"] in effect.equivalent]
+    return parts if {each["effect"] for each in parts} == set(effect.equivalent) else []
 
 
 def _class_holds(finding: dict[str, Any], effect: str) -> bool:
@@ -109,12 +118,12 @@ def _class_holds(finding: dict[str, Any], effect: str) -> bool:
     return len(names) <= MAX_CLASS_SIZE and effect in names
 
 
-def _given_answer(case: JudgedCase, effect: dict[str, Any]) -> str:
+def _given_answer(case: JudgedCase, effect: InjectedEffect) -> str:
     """The column of the confusion matrix: the right name if it was said, else what was said instead."""
-    if _equivalent_findings(case, effect) or any(finding["effect"] == effect["effect"] for finding in case.findings):
-        return str(effect["effect"])
+    if _equivalent_findings(case, effect) or any(finding["effect"] == effect.effect for finding in case.findings):
+        return effect.effect
     wrong = [each for each in case.findings if categorize_finding(case, each) in ("wrong", "misplaced", "identical")]
-    at_joint = [finding for finding in wrong if finding["joint"] == effect["joint"]]
+    at_joint = [finding for finding in wrong if finding["joint"] == effect.joint]
     if at_joint or wrong:
         return str((at_joint or wrong)[0]["effect"])
     if case.says_unknown:
@@ -130,19 +139,25 @@ def _claim_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
 
 def _parameter_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
     about = {key: value for key, value in _key_values(case).items() if key != "kind"}
-    for hidden_as in ("injected", "background"):
-        for effect in case.truth[hidden_as]:
+    hidden: dict[str, tuple[TrueEffect, ...]] = {
+        "injected": case.truth.injected,
+        "background": case.truth.background,
+    }
+    for hidden_as, effects in hidden.items():
+        for effect in effects:
             for finding in (each for each in case.findings if is_same_effect(each, effect)):
                 for row in _comparison_rows(effect, finding):
-                    yield about | {"effect": effect["effect"], "joint": effect["joint"], "hidden_as": hidden_as} | row
+                    yield about | {"effect": effect.effect, "joint": effect.joint, "hidden_as": hidden_as} | row
 
 
-def _comparison_rows(effect: dict[str, Any], finding: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    for name, known in effect["parameters"].items():
+def _comparison_rows(effect: TrueEffect, finding: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    for name, known in effect.parameters.items():
         found = finding["parameters"].get(name)
-        if not known["comparable"] or not isinstance(found, dict) or not _is_number(found.get("value")):
+        if not known.comparable or isinstance(known.value, tuple):
             continue
-        truth, value, interval = known["value"], found["value"], found.get("ci95")
+        if not isinstance(found, dict) or not _is_number(found.get("value")):
+            continue
+        truth, value, interval = known.value, found["value"], found.get("ci95")
         covered = bool(interval[0] <= truth <= interval[1]) if interval and _is_interval(interval) else None
         error = abs(value - truth) / max(abs(truth), 1e-12)
         yield {"parameter": name, "truth": truth, "value": value, "relative_error": error, "covered": covered}

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from armlab.concealed.formats import SetManifest
 from armlab.concealed.score.cases import JudgedCase, read_cases
 from armlab.concealed.score.figures import draw_figures
 from armlab.concealed.score.gallery import write_gallery
@@ -46,15 +47,15 @@ def compute_score(
     folder: Path, verdicts: Path, sealed: str | None
 ) -> tuple[list[JudgedCase], ScoreRows, dict[str, Any]]:
     """The cases, their rows and what score.json holds; nothing is written. Raises InputError as `score` does."""
-    manifest, found = read_checked_manifest(folder, sealed)
-    cases = read_cases(folder, verdicts, manifest["cases"])
+    manifest, found = read_checked_manifest(folder, SetManifest, sealed)
+    cases = read_cases(folder, verdicts, manifest.cases)
     table = make_rows(cases)
     result = {
         "schema": "score/1",
         "manifest": found,
-        "seed": manifest["seed"],
-        "kind": manifest["kind"],
-        "development": manifest["development"],
+        "seed": manifest.seed,
+        "kind": manifest.kind,
+        "development": manifest.development,
         "cases": len(table.cases),
         "tiers": {
             tier: [asdict(each) for each in compute_measures(table, tier)] for tier in sorted(set(table.cases["tier"]))
@@ -67,10 +68,8 @@ def format_lines(result: dict[str, Any]) -> list[str]:
     """The measures, a line each, for the terminal."""
     out = []
     for tier, found in result["tiers"].items():
-        out += [
-            f"{tier}:",
-            *(f"  {each['name']}: {format_measure(Measure(**each))}  {each['wanted']}" for each in found),
-        ]
+        measures = [Measure(**each) for each in found]
+        out += [f"{tier}:", *(f"  {each.title}: {format_measure(each)}  {each.wanted}" for each in measures)]
     return out
 
 

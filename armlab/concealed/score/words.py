@@ -3,20 +3,21 @@
 from collections.abc import Sequence
 from typing import Any
 
+from armlab.concealed.formats import InjectedEffect
 from armlab.concealed.score.cases import FAILURE_FILE, JudgedCase, categorize_finding
 
-MAX_COMPLAINT_LENGTH = 240  # letters kept of a text that is not ours
+MAX_COMPLAINT_LENGTH = 240  # characters kept of the error message of a diagnosis
 
 
 def describe_hidden(case: JudgedCase) -> str:
     """What was hidden, each effect with its law, place, size and parameters."""
-    effects = [describe_hidden_effect(each) for each in case.truth["injected"]]
+    effects = [describe_hidden_effect(each) for each in case.truth.injected]
     return "; ".join(effects) if effects else "nothing"
 
 
 def name_hidden(case: JudgedCase) -> str:
     """What was hidden, in a few words."""
-    told = [f"{each['effect']}, {_describe_size(each)}" for each in case.truth["injected"]]
+    told = [f"{each.effect}, {_describe_size(each)}" for each in case.truth.injected]
     return "; ".join(told) if told else "nothing"
 
 
@@ -35,21 +36,23 @@ def name_said(case: JudgedCase) -> str:
     return "; ".join(parts) if parts else f"nothing{beyond}"
 
 
-def describe_hidden_effect(effect: dict[str, Any]) -> str:
+def describe_hidden_effect(effect: InjectedEffect) -> str:
     """One hidden effect, as `backlash (gap), joint 1, 8.2 limits: gap = 0.00031 rad`."""
-    law = "" if effect["outside"] else f" ({effect['form']})"
+    law = "" if effect.outside else f" ({effect.form})"
     sizes = [
-        f"{name} = {_format_value(each)}" for name, each in effect["parameters"].items() if _is_number(each["value"])
+        f"{name} = {each.value:.3g} {_format_unit(each.unit)}".rstrip()
+        for name, each in effect.parameters.items()
+        if not isinstance(each.value, tuple)
     ]
-    return f"{effect['effect']}{law}, {_describe_size(effect)}" + (f": {', '.join(sizes)}" if sizes else "")
+    return f"{effect.effect}{law}, {_describe_size(effect)}" + (f": {', '.join(sizes)}" if sizes else "")
 
 
 def describe_background(case: JudgedCase) -> str:
     """What stands beside the hidden effects and is no mistake to find."""
     parts = []
-    if case.truth["background"]:
+    if case.truth.background:
         parts.append("friction on every joint")
-    if case.truth["cad_errors"]:
+    if case.truth.cad_errors:
         parts.append("links 3-10 % off")
     return ", ".join(parts)
 
@@ -83,8 +86,8 @@ def describe_place(joint: Any) -> str:
     return "whole arm" if joint is None else f"joint {int(joint)}"
 
 
-def _describe_size(effect: dict[str, Any]) -> str:
-    return f"{describe_place(effect['joint'])}, {effect['multiple']:.1f} limits"
+def _describe_size(effect: InjectedEffect) -> str:
+    return f"{describe_place(effect.joint)}, {effect.multiple:.1f} limits"
 
 
 def _category_mark(what: str) -> str:
@@ -105,7 +108,7 @@ def _read_complaint(case: JudgedCase) -> str:
 
 
 def _is_number(value: Any) -> bool:
-    """True for a number; a link's ten parameters would fill the page."""
+    """True for a number; lists, as the ten parameters of a link, are left out of the words."""
     return isinstance(value, int | float)
 
 
@@ -113,17 +116,13 @@ def _has_number(parameter: Any) -> bool:
     return isinstance(parameter, dict) and _is_number(parameter.get("value"))
 
 
-def _format_value(parameter: dict[str, Any]) -> str:
-    return f"{parameter['value']:.3g} {_format_unit(parameter)}".rstrip()
-
-
 def _format_estimate(parameter: dict[str, Any]) -> str:
     """A value, its interval and unit."""
     interval: Sequence[Any] = parameter.get("ci95") or ()
     ends = " to ".join(f"{end:.3g}" for end in interval if _is_number(end))
-    return f"{parameter['value']:.3g}{f' ({ends})' if ends else ''} {_format_unit(parameter)}".rstrip()
+    unit = _format_unit(str(parameter.get("unit", "")))
+    return f"{parameter['value']:.3g}{f' ({ends})' if ends else ''} {unit}".rstrip()
 
 
-def _format_unit(parameter: dict[str, Any]) -> str:
-    unit = str(parameter.get("unit", ""))
+def _format_unit(unit: str) -> str:
     return "" if unit == "1" else unit.replace(".", " ")
