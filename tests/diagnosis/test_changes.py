@@ -14,7 +14,7 @@ from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.report import comparison_content, comparison_lines, comparison_sentences
+from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.compare.structure import Change, holm_correction, predict_torque
 from armlab.effects.contract import Scene
 from armlab.recordings.load import load_recording
@@ -106,7 +106,7 @@ def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path)
 
 
 def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
-    content = json.loads(json.dumps(comparison_content(comparison("warm")), allow_nan=False))
+    content = json.loads(make_comparison_file(comparison("warm")).to_json())
     assert content["schema"] == "comparison/1"
     assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient"]
     assert content["against"]["status"] == "mismatch"

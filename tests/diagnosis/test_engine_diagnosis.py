@@ -13,7 +13,7 @@ import yaml
 from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.verdict_files import verdict_content, write_verdict
+from armlab.diagnosis.verdict_files import make_verdict, write_verdict
 from armlab.identification.identifier import Identifier
 from problem.motion import Motion
 from problem.robot_file import load_arm
@@ -71,7 +71,7 @@ def test_excess_error_is_located_at_the_guilty_joint(viscous_found: Diagnosis) -
 
 def test_verdict_is_valid_json_of_its_schema(viscous_found: Diagnosis) -> None:
     schema = json.loads((SCHEMAS / "verdict.schema.json").read_text())
-    content = json.loads(json.dumps(verdict_content(viscous_found), allow_nan=False))
+    content = json.loads(make_verdict(viscous_found).to_json())
     jsonschema.validate(content, schema)
 
 
@@ -84,7 +84,7 @@ def test_files_are_written_whole_and_the_model_follows_its_schema(viscous_found:
 
 
 def test_the_same_seed_gives_the_same_verdict(viscous_found: Diagnosis) -> None:
-    assert verdict_content(diagnose(cases.recording(viscous))) == verdict_content(viscous_found)
+    assert make_verdict(diagnose(cases.recording(viscous))) == make_verdict(viscous_found)
 
 
 def test_friction_on_every_joint_of_an_arm_with_wrong_links_is_named_as_such() -> None:
