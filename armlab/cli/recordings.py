@@ -14,8 +14,10 @@ ASKED_SIGNALS = ("time", "position", "torque")
 OPTIONAL_SIGNALS = (
     "velocity",
     "temperature",
+    "voltage",
     "link_position",
     "reference_position",
+    "reference_velocity",
     "simulated_torque",
     "simulated_position",
 )

@@ -32,8 +32,16 @@ def load_recording(folder: str | Path) -> Recording:
 
 
 def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
-    """The recording without its runs, and the file that lists them; InputError where the file is wrong."""
+    """The recording without its runs, and the file that lists them.
+
+    Raises InputError where the file is wrong, and for a recording of motion only.
+    """
     file = read_recording_file(folder)
+    if not file.has_torque:
+        raise InputError(
+            f"columns in {folder / FILE_NAME} has neither torque nor current with `gains`: "
+            "motion-only recordings cannot be diagnosed yet"
+        )
     arm = load_arm(file.robot, folder)
     transmission = make_transmission(file, arm, folder)
     simulation = folder / file.simulation if file.simulation else None

@@ -17,8 +17,10 @@ SIGNALS = (
     "torque",
     "velocity",
     "temperature",
+    "voltage",
     "link_position",
     "reference_position",
+    "reference_velocity",
     "simulated_torque",
     "simulated_position",
 )
@@ -45,7 +47,7 @@ class Run:
 
     time: (samples,), s, strictly increasing. position, torque: (samples, joints), rad and N m (m and N for
     prismatic joints). The other signals are None where they were not recorded; a column of NaN in one of them
-    is a joint without that sensor. temperature: (samples, sensors), degrees Celsius.
+    is a joint without that sensor. temperature, voltage: (samples, sensors), degrees Celsius and V.
     file: name of its file; part: from 1 where one file was cut into several runs, else 0.
     """
 
@@ -56,8 +58,10 @@ class Run:
     torque: Array
     velocity: Array | None = None
     temperature: Array | None = None
+    voltage: Array | None = None
     link_position: Array | None = None
     reference_position: Array | None = None
+    reference_velocity: Array | None = None
     simulated_torque: Array | None = None
     simulated_position: Array | None = None
     part: int = 0

@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from refusals import refusal
+from shipped_schemas import check_against_schema
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
@@ -107,7 +108,7 @@ def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path)
 
 def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
     content = json.loads(make_comparison_file(comparison("warm")).to_json())
-    assert content["schema"] == "comparison/1"
+    check_against_schema(content, "comparison")
     assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient"]
     assert content["against"]["status"] == "mismatch"
     text = " ".join(comparison_lines(comparison("warm")))

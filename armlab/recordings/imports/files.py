@@ -15,7 +15,7 @@ from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 from armlab.recordings.table import Table, read_table
-from armlab.recordings.units import SI_UNITS, UNITS_BY_SIGNAL
+from armlab.recordings.units import SIGNAL_QUANTITIES
 from problem.robot_file import built_in_arms, load_arm
 
 BAG_SUFFIXES = (".db3", ".mcap", ".bag")
@@ -134,19 +134,23 @@ def _choose_units(found: Mapping[str, str], assignment: Assignment) -> Keys:
         said = assignment.units.get(signal)
         listed = [parse_unit(signal, said)] * len(names) if said else [found.get(name) for name in names]
         if any(unit is None for unit in listed):
-            raise InputError(
-                f"no unit is known for {signal}: give --unit {signal}=UNIT ({', '.join(UNITS_BY_SIGNAL[signal])})"
-            )
+            raise _missing_unit(signal)
         checked = tuple(parse_unit(signal, str(unit)) for unit in listed)
         units[signal] = checked[0] if len(set(checked)) == 1 else checked
     return units
 
 
+def _missing_unit(signal: str) -> InputError:
+    known = ", ".join(SIGNAL_QUANTITIES[signal].units)
+    return InputError(f"no unit is known for {signal}: give --unit {signal}=UNIT ({known})")
+
+
 def parse_unit(signal: str, name: str) -> str:
     """The unit as `recording.yaml` writes it; InputError for an unknown one."""
     unit = UNIT_ALIASES.get(name.strip(), name.strip())
-    if unit not in UNITS_BY_SIGNAL[signal]:
-        raise InputError(f"unknown unit '{name}' of {signal}: {suggest_name(unit, list(UNITS_BY_SIGNAL[signal]))}")
+    known = list(SIGNAL_QUANTITIES[signal].units)
+    if unit not in known:
+        raise InputError(f"unknown unit '{name}' of {signal}: {suggest_name(unit, known)}")
     return unit
 
 
@@ -196,7 +200,7 @@ def _choose_robot(given: str | None, ask: Ask | None) -> str:
 def _make_assignment(source: Source, options: Mapping[str, Any], ask: Ask | None) -> Assignment:
     units = dict(_parse_unit_option(text) for text in options["units"])
     columns: dict[str, tuple[str, ...]] = {}
-    for signal in SI_UNITS:
+    for signal in SIGNAL_QUANTITIES:
         given = options.get(signal)
         if given is None and signal in ASKED_SIGNALS:
             given = _ask_columns(source, signal, ask)
@@ -219,10 +223,9 @@ def _ask_columns(source: Source, signal: str, ask: Ask | None) -> str:
 
 def _ask_unit(signal: str, ask: Ask | None) -> str:
     if ask is None:
-        raise InputError(
-            f"no unit is known for {signal}: give --unit {signal}=UNIT ({', '.join(UNITS_BY_SIGNAL[signal])})"
-        )
-    return parse_unit(signal, ask(f"unit of {signal} ({', '.join(UNITS_BY_SIGNAL[signal])})", SI_UNITS[signal][0]))
+        raise _missing_unit(signal)
+    quantity = SIGNAL_QUANTITIES[signal]
+    return parse_unit(signal, ask(f"unit of {signal} ({', '.join(quantity.units)})", quantity.si[0]))
 
 
 def _expand_names(given: str, names: Sequence[str], signal: str) -> tuple[str, ...]:
@@ -238,8 +241,8 @@ def _expand_names(given: str, names: Sequence[str], signal: str) -> tuple[str, .
 
 def _parse_unit_option(text: str) -> tuple[str, str]:
     signal, sign, unit = text.partition("=")
-    if not sign or signal not in UNITS_BY_SIGNAL:
-        raise InputError(f"--unit {text} should be SIGNAL=UNIT: {suggest_name(signal, list(UNITS_BY_SIGNAL))}")
+    if not sign or signal not in SIGNAL_QUANTITIES:
+        raise InputError(f"--unit {text} should be SIGNAL=UNIT: {suggest_name(signal, list(SIGNAL_QUANTITIES))}")
     return signal, parse_unit(signal, unit)
 
 
