@@ -9,7 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, Joint, Limits, Link
-from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
+from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, roll_pitch_yaw, turn_z_to
 
 MOVING_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}

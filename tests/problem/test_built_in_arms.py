@@ -8,7 +8,7 @@ from shipped_schemas import check_against_schema
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml
 from problem.arm import Link, link_poses
-from problem.inertia import (
+from problem.pseudo_inertia import (
     link_from_centre_of_mass,
     link_from_pseudo_inertia,
     pseudo_inertia_of,
