@@ -99,8 +99,11 @@ def base_parameters(arm: Arm, preference: Preference = "later_columns") -> BaseP
 def _random_observation_matrix(arm: Arm) -> Array:
     """Observation matrix at random states, the same for each call."""
     rng = np.random.default_rng(0)
-    states = (rng.uniform(-2, 2, (RANDOM_STATES, len(arm))) for _ in range(3))
-    return observation_matrix(arm, Motion(*states))
+    shape = (RANDOM_STATES, len(arm))
+    position = rng.uniform(-2, 2, shape)
+    velocity = rng.uniform(-2, 2, shape)
+    acceleration = rng.uniform(-2, 2, shape)
+    return observation_matrix(arm, Motion(position, velocity, acceleration))
 
 
 def _column_order(arm: Arm, preference: Preference) -> list[int]:

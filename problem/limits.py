@@ -97,6 +97,6 @@ def peaks(motion: Motion) -> Array:
     """
     points, samples, joints = motion.position.shape
     out = np.empty((points, joints, 4))
-    arrays = (motion.position, motion.velocity, motion.acceleration, out)
-    lib.peaks(points, samples, joints, *(pointer(array) for array in arrays))
+    position, velocity, acceleration = pointer(motion.position), pointer(motion.velocity), pointer(motion.acceleration)
+    lib.peaks(points, samples, joints, position, velocity, acceleration, pointer(out))
     return out

@@ -44,8 +44,12 @@ class LimitSettings(Settings):
 
     def of(self, arm: Arm) -> tuple[Limits, ...]:
         """The limits in force, one a joint. Raises InputError for a wrong number of entries or order."""
-        rates = [self._rates(arm, name) for name in ("velocity", "acceleration", "torque")]
-        return tuple(Limits(*entries) for entries in zip(self._positions(arm), *rates, strict=True))
+        positions = self._positions(arm)
+        velocities = self._rates(arm, "velocity")
+        accelerations = self._rates(arm, "acceleration")
+        torques = self._rates(arm, "torque")
+        joints = range(len(arm))
+        return tuple(Limits(positions[i], velocities[i], accelerations[i], torques[i]) for i in joints)
 
     def _positions(self, arm: Arm) -> list[Range]:
         if self.position == "robot":

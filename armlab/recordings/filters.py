@@ -73,10 +73,8 @@ class Butterworth(LowPass):
         sections, settled = _butterworth_sections(self.cutoff_hz, self.rate_hz)
         padding = min(int(np.ceil(3 * self.rate_hz / self.cutoff_hz)), len(signal) - 1)
         columns = signal.reshape(len(signal), -1).T
-        before, after = (
-            2 * columns[:, :1] - columns[:, padding:0:-1],
-            2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1],
-        )
+        before = 2 * columns[:, :1] - columns[:, padding:0:-1]
+        after = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
         passed = np.concatenate([before, columns, after], axis=1)
         for _ in range(2):  # scipy's sosfiltfilt, which finds the settled state anew at each call
             passed = sosfilt(sections, passed, zi=settled[:, None] * passed[:, :1])[0][:, ::-1]

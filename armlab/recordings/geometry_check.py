@@ -63,18 +63,20 @@ def _unexplained_warning(what: str, errors: Array) -> Finding:
 
 def thin_runs(runs: Sequence[Run]) -> ThinnedSignals:
     """A few filtered instants of each run; blocks of time are held out in turn."""
-    parts = []
+    motions, torques, held_out = [], [], []
     step = max(sum(run.samples for run in runs) // MAX_FIT_ROWS, 1)
     for signals in (differentiate(run, step=step) for run in runs):
-        rows = signals.filter.rows
+        rows, motion = signals.filter.rows, signals.motion
+        motions.append(Motion(motion.position[rows], motion.velocity[rows], motion.acceleration[rows]))
+        torques.append(signals.torque)
         count = len(signals.torque)
-        held_out = (np.arange(count) * BLOCKS_PER_RUN // count) % 2 == 1
-        motion = signals.motion
-        parts.append(
-            (motion.position[rows], motion.velocity[rows], motion.acceleration[rows], signals.torque, held_out)
-        )
-    position, velocity, acceleration, torque, held_out = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return ThinnedSignals(Motion(position, velocity, acceleration), torque, held_out)
+        held_out.append((np.arange(count) * BLOCKS_PER_RUN // count) % 2 == 1)
+    motion = Motion(
+        position=np.concatenate([each.position for each in motions]),
+        velocity=np.concatenate([each.velocity for each in motions]),
+        acceleration=np.concatenate([each.acceleration for each in motions]),
+    )
+    return ThinnedSignals(motion, np.concatenate(torques), np.concatenate(held_out))
 
 
 def fit_columns(arm: Arm, base: BaseParameters, motion: Motion) -> Array:

@@ -131,8 +131,9 @@ def _series_motion(position: Array, period: float, harmonics: int) -> Motion:
     series[harmonics + 1 :] = 0
     omega = 2j * np.pi * np.arange(len(series))[:, None] / period
     samples = len(position)
-    derivatives = (np.fft.irfft(series * omega**order, n=samples, axis=0) for order in range(3))
-    return Motion(*derivatives)
+    velocity = np.fft.irfft(series * omega, n=samples, axis=0)
+    acceleration = np.fft.irfft(series * omega**2, n=samples, axis=0)
+    return Motion(np.fft.irfft(series, n=samples, axis=0), velocity, acceleration)
 
 
 def _covariance_of_mean(residuals: Array) -> Array:

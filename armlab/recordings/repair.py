@@ -15,8 +15,6 @@ from armlab.recordings.recording import Finding, Run
 MAX_PLAUSIBLE_VALUE = 1e9  # no arm moves, pulls or lasts this much in SI units
 MAX_BAD_ROW_SHARE = 0.05  # more bad rows than this, and the file is broken rather than a few rows
 REQUIRED_SIGNALS = ("position", "torque")
-MAX_SHORT_GAP = 5.0  # samples: over a shorter gap of a well sampled motion, interpolation is safe
-MIN_RUN_SAMPLES = 50  # samples: a shorter part tells nothing
 
 
 def drop_bad_rows(run: Run, rows: NDArray[np.intp], names: dict[str, tuple[str, ...]]) -> Run:

@@ -74,7 +74,8 @@ def fit_even_grid(time: Array) -> Grid:
     steps = np.diff(time)
     usual = float(np.median(steps)) or float(np.mean(steps))
     counted = np.append(0, np.cumsum(np.maximum(1, np.rint(steps / usual)))).astype(np.intp)
-    complete, with_gaps = (_fit_grid(time, count) for count in (np.arange(len(time)), counted))
+    complete = _fit_grid(time, np.arange(len(time)))
+    with_gaps = _fit_grid(time, counted)
     return with_gaps if with_gaps.scatter < MAX_GAP_SCATTER_RATIO * complete.scatter else complete
 
 

@@ -119,7 +119,9 @@ def _parse_header(lines: list[list[str]], width: int) -> tuple[tuple[str, ...], 
     """Names and units from the rows above the numbers: `q1 [deg]`, or a row of units below the names."""
     if not lines:
         return tuple(f"c{column + 1}" for column in range(width)), {}
-    names, units = zip(*(_split_unit(cell) for cell in lines[0]), strict=True)
+    cells = [_split_unit(cell) for cell in lines[0]]
+    names = tuple(name for name, _ in cells)
+    units = tuple(unit for _, unit in cells)
     below = [_strip_brackets(cell) for cell in lines[1]] if len(lines) > 1 else [""] * width
     unique = tuple(_make_unique(names))
     return unique, {
