@@ -15,6 +15,7 @@ from shipped_schemas import check_against_schema
 from armlab.common.errors import InputError
 from armlab.common.settings import validate
 from armlab.diagnosis.formats import ComparisonFile, VerdictFile, kind_of_effect, read_verdict_file
+from armlab.effects.library import effect_named
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording_file import Draft, DraftRun, RecordingFile, read_recording_file, write_recording
 from armlab.schemas import FORMATS, generate_schema, schema_path
@@ -315,14 +316,13 @@ def test_a_comparison_is_written_with_the_keys_that_were_set_and_no_others() -> 
     [
         ("viscous_friction", "physics"),
         ("base_tilt", "physics"),
-        ("effect_of_a_user", "physics"),
         ("payload", "link"),
         ("inertial_parameter_error", "link"),
         ("unknown", "unknown"),
     ],
 )
 def test_each_effect_has_its_kind(effect: str, kind: str) -> None:
-    assert kind_of_effect(effect) == kind
+    assert kind_of_effect(effect_named(effect)) == kind
 
 
 @pytest.mark.parametrize(
