@@ -1,4 +1,4 @@
-"""Base parameters: what joint torques can tell about the inertial parameters of an arm.
+"""Base parameters: the combinations of inertial parameters that joint torques identify.
 
 Columns of the observation matrix that are zero belong to parameters without any effect. Of the others, a
 largest independent set is kept, in an order of preference; the torque depends on the rest only through
@@ -40,7 +40,7 @@ class BaseParameters:
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """Parameters that are identifiable each for itself."""
+        """Parameters that are identifiable individually."""
         return tuple(self.names[column] for column in self.columns[self._single])
 
     @property

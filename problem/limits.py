@@ -1,4 +1,4 @@
-"""Limits of the arm and of its workspace, and by how much a motion breaks them."""
+"""Limits of the arm and of its workspace, and how far a motion exceeds them."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Workspace:
 
     @property
     def limited(self) -> bool:
-        """Whether there is anything to check."""
+        """Whether any limit is finite."""
         return np.isfinite(self.reach) or np.isfinite(self.floor) or self.keep_out is not None
 
     def excess(self, points: Array) -> Array:

@@ -1,4 +1,4 @@
-"""URDF files: the serial chain of moving joints, with the links of fixed joints welded on."""
+"""URDF files: the serial chain of moving joints; links at fixed joints become part of the link that carries them."""
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass

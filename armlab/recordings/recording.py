@@ -1,4 +1,4 @@
-"""A recording: an arm, its runs in SI units on the joint side, and the findings about them."""
+"""A recording: an arm, its runs in SI units on the joint side, and remarks about them."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,10 +29,10 @@ EVEN_TOLERANCE = 1e-6  # of a sample: stamps this close to an even grid count as
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a person should know about a recording, in one line.
+    """A remark about a recording for its user, in one line.
 
-    kind: a short name like `time_jitter`. severity: `repaired` where the data were changed, `warning` where
-    they were left as they are, `note` where there is nothing to do. joint: from 1, if it concerns one.
+    kind: a short name like `time_jitter`. severity: `repaired` if the data were changed, `warning` if they look wrong
+    and were not changed, `note` if nothing is wrong. joint: from 1, if the remark concerns one joint.
     """
 
     kind: str
@@ -126,7 +126,7 @@ class Transmission:
     """How raw channels become joint signals: q = position @ raw + offset, tau = torque @ (gains * raw).
 
     position, torque: (joints, channels). offset: (joints,), rad (m). gains: (channels,), N m (N) per A or V,
-    ones where the torque itself was recorded. Every run has passed it already: kept to know, not to use.
+    ones where the torque itself was recorded. Kept for information: the runs are on the joint side already.
     """
 
     position: Array

@@ -34,7 +34,7 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """A table with what else the file said: its layout, and the unit of each column where it names one."""
+    """A table with the layout of the file, and the units that the file names."""
 
     table: Table
     layout: Layout
@@ -92,12 +92,12 @@ def _split_lines(text: str, layout: Layout, where: str) -> NumberedRows:
     return [
         (line, _drop_empty_last_cell(cells))
         for line, cells in rows
-        if not (line in comments and _is_data(cells, layout))  # numbers in a comment are no measurement
+        if not (line in comments and _is_data(cells, layout))  # numbers in a comment are not measurements
     ]
 
 
 def _drop_empty_last_cell(cells: list[str]) -> list[str]:
-    """A separator at the end of a line opens no cell."""
+    """A separator at the end of a line does not start another cell."""
     return cells[:-1] if len(cells) > 1 and not cells[-1].strip() else cells
 
 
@@ -111,7 +111,7 @@ def _parse_cells(cells: list[str], layout: Layout) -> Array:
 
 
 def _to_decimal_point(cell: str) -> str:
-    """A number with a decimal comma; one with a point is none then (a thousands separator?)."""
+    """A number with a decimal comma; a cell with a point is refused: the point may separate thousands."""
     return cell.replace(",", ".") if "." not in cell else "not a number"
 
 
