@@ -32,7 +32,10 @@ def recording() -> None:
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="HTML file to write [default: NAME-check.html].")
 def check(folder: Path, out: Path | None) -> None:
-    """Check a recording: list errors, repairs and suspicious channels, and draw the signals on one HTML page."""
+    """Check and draw a recording.
+
+    Lists errors, repairs and suspicious channels, and draws the signals on one HTML page.
+    """
     from armlab.recordings.check import check_recording
     from armlab.recordings.check_report import write_check_page
 
@@ -49,7 +52,10 @@ def check(folder: Path, out: Path | None) -> None:
 @click.argument("name", type=click.Choice(PUBLIC_RECORDING_NAMES))
 @click.option("--out", type=click.Path(path_type=Path), help="New folder for the recording [default: NAME].")
 def fetch(name: str, out: Path | None) -> None:
-    """Fetch a public recording of a real arm and write it as a recording folder."""
+    """Fetch a public recording of a real arm.
+
+    The recording is written as a recording folder.
+    """
     from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
 
     folder = fetch_recording(name, out or Path(name))
@@ -76,7 +82,9 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--topic", help="Topic of the joint states in a bag.")
 @click.option("--ask/--no-ask", default=None, help="Ask for missing options [default: ask if the input is a terminal].")
 def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
-    """Convert files of another format into a new recording folder: .mat, ROS bags, MCAP, CSV of any layout.
+    """Convert files of other formats.
+
+    Reads .mat, ROS bags, MCAP, Parquet and CSV of any layout, and writes a new recording folder.
 
     NAMES are column names with commas between them; * and ? stand for any characters.
     """
