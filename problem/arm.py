@@ -20,7 +20,7 @@ PARAMETER_UNITS = ("kg", *("kg.m",) * 3, *("kg.m2",) * 6)
 
 @dataclass(frozen=True)
 class Limits:
-    """What a joint may do: rad or m, per second, per second squared, N m or N; infinite where unknown."""
+    """Limits of a joint: rad or m, per second, per second squared, N m or N; infinite where unknown."""
 
     position: tuple[float, float] = (-np.inf, np.inf)
     velocity: float = np.inf
@@ -103,7 +103,7 @@ class Arm:
         return tuple(f"{name}{link + 1}" for link in range(len(self)) for name in PARAMETER_NAMES)
 
     def first(self, joints: int) -> "Arm":
-        """The arm cut behind its first `joints` joints; what came behind is gone, not locked."""
+        """The arm with its first `joints` joints only; the later joints and links are removed, not locked."""
         links = self.links[:joints] if self.links is not None else None
         return Arm(self.name, self.joints[:joints], links, self.gravity, self.rotor_inertia[:joints])
 

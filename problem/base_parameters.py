@@ -1,4 +1,4 @@
-"""Base parameters: what joint torques can tell about the inertial parameters of an arm.
+"""Base parameters: the combinations of inertial parameters that joint torques identify.
 
 Columns of the observation matrix that are zero belong to parameters without any effect. Of the others, a
 largest independent set is kept, in an order of preference; the torque depends on the rest only through
@@ -40,7 +40,7 @@ class BaseParameters:
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """Parameters that are identifiable each for itself."""
+        """Parameters that are identifiable individually."""
         return tuple(self.names[column] for column in self.columns[self._single])
 
     @property
@@ -99,8 +99,11 @@ def base_parameters(arm: Arm, preference: Preference = "later_columns") -> BaseP
 def _random_observation_matrix(arm: Arm) -> Array:
     """Observation matrix at random states, the same for each call."""
     rng = np.random.default_rng(0)
-    states = (rng.uniform(-2, 2, (RANDOM_STATES, len(arm))) for _ in range(3))
-    return observation_matrix(arm, Motion(*states))
+    shape = (RANDOM_STATES, len(arm))
+    position = rng.uniform(-2, 2, shape)
+    velocity = rng.uniform(-2, 2, shape)
+    acceleration = rng.uniform(-2, 2, shape)
+    return observation_matrix(arm, Motion(position, velocity, acceleration))
 
 
 def _column_order(arm: Arm, preference: Preference) -> list[int]:

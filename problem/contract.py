@@ -1,4 +1,4 @@
-"""What every problem offers: a box, and what is said of a population of points in it."""
+"""The contract of a problem: a box, and the evaluation of a population of points in it."""
 
 from typing import NamedTuple, Protocol
 
@@ -8,8 +8,8 @@ from armlab.common.arrays import Array
 class Evaluation(NamedTuple):
     """Results of a population, (points,) each.
 
-    fitness: what is minimised, penalties included. value: what is reported, without them (for an excitation
-    the condition number of the trajectory itself). violation: 0 where every limit is kept.
+    fitness: what is minimised, with penalties. value: what is reported, without penalties (for an excitation the
+    condition number of the trajectory). violation: 0 where every limit is kept.
     """
 
     fitness: Array

@@ -1,7 +1,7 @@
 """The excitation problem: a point in a box, its trajectory, and the fitness of that trajectory.
 
-A problem can also be shifted at random, so that only the origin of coordinates moves: an algorithm that is drawn to
-the origin gains or loses by the shift, any other finds the same trajectories.
+The coordinates of a problem can also be shifted at random. A shift changes the results of an algorithm that is drawn to
+the origin; any other algorithm finds the same trajectories.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from problem.trajectories import Trajectory, sample_instants
 
 @dataclass(frozen=True)
 class Penalty:
-    """What a broken limit costs: fitness + step + weight * violation, with `step` paid once."""
+    """The fitness of a point that breaks limits: merit + step + weight * violation."""
 
     step: float
     weight: float
@@ -33,9 +33,9 @@ class Penalty:
 
 @dataclass(frozen=True)
 class FeasibilityRules:
-    """Deb 2000: a feasible point beats an infeasible one, the merit orders the first, the violation the others.
+    """Deb 2000: feasible points come first, ordered by merit; the others follow, ordered by violation.
 
-    One number a point says so, since a search that only compares fitness then keeps the rules.
+    The rules are one number per point, so that every search that compares fitness follows them.
     """
 
     floor: float = 1e30  # above every finite merit, and far enough below the largest double for any violation
@@ -47,7 +47,7 @@ class FeasibilityRules:
 
 @dataclass(frozen=True, eq=False)
 class ExcitationProblem:
-    """Find the trajectory from which the base parameters of an arm are seen best."""
+    """Find the trajectory that identifies the base parameters of an arm best."""
 
     name: str
     arm: Arm

@@ -52,7 +52,7 @@ def singular_values(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_co
     """Singular values (points, chosen), descending, of chosen columns of the observation matrix.
 
     motion: (points, samples, joints). unit_columns: scale each column to unit length first.
-    Taken from the Gram matrix where that is accurate (see GRAM_LIMIT), else from the matrix itself.
+    Taken from the Gram matrix where that is accurate (see MAX_GRAM_CONDITION), else from the matrix itself.
     """
     gram = gram_matrix(arm, motion, columns)
     if unit_columns:

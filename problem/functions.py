@@ -1,4 +1,4 @@
-"""Classical test functions, with the optimum at a stated place; for measuring algorithms, not arms."""
+"""Classical test functions with a known optimum, to test algorithms without an arm."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -54,8 +54,12 @@ class PlanarArm:
         first = (_unwrap_angles(turn[0] - self.azimuth), turn[1], turn[2])
         second = (_wrap_angles(self.upper_angle - upper[0]), -upper[1], -upper[2])
         third = (_wrap_angles(self.fore_angle - self.upper_angle - elbow[0]), -elbow[1], -elbow[2])
-        joints = (np.stack(derivative, axis=-1) for derivative in zip(first, second, third, strict=True))
-        return Motion(*joints), overreach
+        motion = Motion(
+            position=np.stack([first[0], second[0], third[0]], axis=-1),
+            velocity=np.stack([first[1], second[1], third[1]], axis=-1),
+            acceleration=np.stack([first[2], second[2], third[2]], axis=-1),
+        )
+        return motion, overreach
 
     def _planar(
         self, radial: tuple[Array, ...], height: tuple[Array, ...], side: float
@@ -106,12 +110,23 @@ def planar_arm(arm: Arm, tool: Array) -> PlanarArm:
             f"a Cartesian path needs axis 1 along z of the base, axes 2 and 3 parallel and level, "
             f"and the tool in the plane of the arm; '{arm.name}' is built differently"
         )
-    spans = [np.array([forward @ span, span[2]]) for span in (origins[2] - origins[1], tip - origins[2])]
-    (upper, upper_angle), (fore, fore_angle) = (
-        (float(np.hypot(*span)), float(np.arctan2(span[1], span[0]))) for span in spans
+    upper_length, upper_angle = _length_and_angle(origins[2] - origins[1], forward)
+    fore_length, fore_angle = _length_and_angle(tip - origins[2], forward)
+    return PlanarArm(
+        azimuth=float(np.arctan2(forward[1], forward[0])),
+        offset=float(forward @ origins[1]),
+        height=float(origins[1][2]),
+        upper_length=upper_length,
+        upper_angle=upper_angle,
+        fore_length=fore_length,
+        fore_angle=fore_angle,
     )
-    azimuth = float(np.arctan2(forward[1], forward[0]))
-    return PlanarArm(azimuth, float(forward @ origins[1]), float(origins[1][2]), upper, upper_angle, fore, fore_angle)
+
+
+def _length_and_angle(span: Array, forward: Array) -> tuple[float, float]:
+    """Length of a span (3,) and its angle above the direction `forward` (3,)."""
+    along, up = forward @ span, span[2]
+    return float(np.hypot(along, up)), float(np.arctan2(up, along))
 
 
 def _joint_axes(arm: Arm) -> tuple[list[Array], list[Array]]:

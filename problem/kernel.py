@@ -1,4 +1,4 @@
-"""The compiled kernel, and numpy arrays as it takes them."""
+"""The compiled kernel, and pointers to numpy arrays for it."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Limits of the arm and of its workspace, and by how much a motion breaks them."""
+"""Limits of the arm and of its workspace, and how far a motion exceeds them."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ class Workspace:
 
     @property
     def limited(self) -> bool:
-        """Whether there is anything to check."""
+        """Whether any limit is finite."""
         return np.isfinite(self.reach) or np.isfinite(self.floor) or self.keep_out is not None
 
     def excess(self, points: Array) -> Array:
@@ -97,6 +97,6 @@ def peaks(motion: Motion) -> Array:
     """
     points, samples, joints = motion.position.shape
     out = np.empty((points, joints, 4))
-    arrays = (motion.position, motion.velocity, motion.acceleration, out)
-    lib.peaks(points, samples, joints, *(pointer(array) for array in arrays))
+    position, velocity, acceleration = pointer(motion.position), pointer(motion.velocity), pointer(motion.acceleration)
+    lib.peaks(points, samples, joints, position, velocity, acceleration, pointer(out))
     return out

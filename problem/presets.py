@@ -1,6 +1,6 @@
-"""Typed settings of the problems, one class a preset; each choice that the paper leaves open has its key here.
+"""Typed settings of the problems, one class a preset, with a key for each choice that the paper leaves open.
 
-Limits are those of the robot file, or others in their place.
+Limits are those of the robot file, unless the settings replace them.
 """
 
 from collections.abc import Sized
@@ -44,8 +44,12 @@ class LimitSettings(Settings):
 
     def of(self, arm: Arm) -> tuple[Limits, ...]:
         """The limits in force, one a joint. Raises InputError for a wrong number of entries or order."""
-        rates = [self._rates(arm, name) for name in ("velocity", "acceleration", "torque")]
-        return tuple(Limits(*entries) for entries in zip(self._positions(arm), *rates, strict=True))
+        positions = self._positions(arm)
+        velocities = self._rates(arm, "velocity")
+        accelerations = self._rates(arm, "acceleration")
+        torques = self._rates(arm, "torque")
+        joints = range(len(arm))
+        return tuple(Limits(positions[i], velocities[i], accelerations[i], torques[i]) for i in joints)
 
     def _positions(self, arm: Arm) -> list[Range]:
         if self.position == "robot":
@@ -109,7 +113,7 @@ class CriterionSettings(Settings):
 
 
 class PenaltySettings(Settings):
-    """What a broken limit costs: step + weight * violation; the step makes it worse than any gain in cond."""
+    """Penalty of a broken limit: step + weight * violation; the step outweighs any gain in the condition number."""
 
     step: NotNegative = 100.0
     weight: Positive = 1000.0
@@ -290,7 +294,7 @@ class JointFourierSettings(ExcitationSettings):
 
 
 class RandomFrameSettings(JointFourierSettings):
-    """`joint-fourier` in randomly shifted coordinates: the fair ground for algorithms drawn to the origin."""
+    """`joint-fourier` in randomly shifted coordinates: a fair test of algorithms that are drawn to the origin."""
 
     preset: Literal["random-frame"] = "random-frame"  # type: ignore[assignment]
     frame_seed: Annotated[int, Ge(0)] | None = 1

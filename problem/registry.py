@@ -1,6 +1,6 @@
 """Problems by the name of their preset: built-in ones, and third parties' of the entry-point group `armlab.problems`.
 
-Names are found without importing anything, so a broken plug-in troubles only those who ask for it.
+Names are found without importing anything, so a broken plug-in affects only those who use it.
 """
 
 from collections.abc import Mapping

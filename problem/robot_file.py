@@ -18,7 +18,7 @@ Vector = tuple[float, float, float]
 
 
 class JointEntry(Settings):
-    """One row of the D-H table with its limits; m and rad, `d` is added to the variable of a prismatic joint."""
+    """One row of the D-H table with its limits; m and rad; `d` is added to the variable of a prismatic joint."""
 
     name: str
     type: Literal["revolute", "prismatic"]
@@ -39,7 +39,7 @@ class JointEntry(Settings):
         return self
 
     def limits(self) -> Limits:
-        """The limits given; the others are infinite."""
+        """The limits that are given; the others are infinite."""
         given = {
             "position": self.position_limits,
             "velocity": self.velocity_limit,

@@ -1,4 +1,4 @@
-"""Suites of named problems: `suite-1/irb120-joint-h5-t10-origin` is the same problem for everyone, for good."""
+"""Suites of named problems: a name like `suite-1/irb120-joint-h5-t10-origin` always means the same problem."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -24,7 +24,7 @@ class SuiteFile(Settings):
 
 
 class InstanceSettings(Settings):
-    """A problem of a suite by its full name; all that may be chosen is what a broken limit costs."""
+    """A problem of a suite by its full name; only its penalty can be chosen."""
 
     preset: str
     penalty: PenaltyOrRules | None = None

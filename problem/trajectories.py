@@ -85,7 +85,7 @@ def fourier_terms(times: Array, duration: float, harmonics: int) -> Array:
 def multiply_by_window(terms: Array, window: Array) -> Array:
     """Product of terms (3, samples, n) with a window (3, samples), derivatives by Leibniz' rule."""
     f, df, ddf = terms
-    w, dw, ddw = (part[:, None] for part in window)
+    w, dw, ddw = window[0, :, None], window[1, :, None], window[2, :, None]
     return np.stack([f * w, df * w + f * dw, ddf * w + 2 * df * dw + f * ddw])
 
 
@@ -132,7 +132,11 @@ class JointFourier:
         """Motions (points, samples, joints) of points (points, dimension) at `times` (samples,), s."""
         basis = _joint_basis(self.duration, self.harmonics, self.rest, times.tobytes())
         coefficients = points.reshape(len(points), len(self.centre), basis.shape[-1])
-        motion = Motion(*(series(derivative, coefficients) for derivative in basis))
+        motion = Motion(
+            position=series(basis[0], coefficients),
+            velocity=series(basis[1], coefficients),
+            acceleration=series(basis[2], coefficients),
+        )
         return Excitation(motion, np.zeros(len(points)))
 
     def _box(self, sign: float) -> Array:
@@ -205,14 +209,22 @@ class CartesianFourier:
         sines, cosines = np.split(points[:, self.harmonics :], [self.harmonics], axis=1)
         cosines = np.broadcast_to(cosines, sines.shape)
         coefficients = np.concatenate([sines, cosines], axis=1)[:, None, :]
-        fourier = [series(derivative, coefficients)[..., 0] for derivative in terms]
-        centres = (self.centre, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        waves = [series(terms[order], coefficients) for order in range(3)]
+        x, y, z = _add_circle_and_series(radius, circle[0], waves[0])
         return Path(
-            *(
-                (radius * cosine + wave + centre[0], radius * sine + wave + centre[1], wave + centre[2])
-                for (cosine, sine), wave, centre in zip(circle, fourier, centres, strict=True)
-            )
+            position=(x + self.centre[0], y + self.centre[1], z + self.centre[2]),
+            velocity=_add_circle_and_series(radius, circle[1], waves[1]),
+            acceleration=_add_circle_and_series(radius, circle[2], waves[2]),
         )
+
+
+def _add_circle_and_series(radius: Array, circle: Array, wave: Array) -> tuple[Array, Array, Array]:
+    """Coordinates x, y, z, (points, samples) each, of a circle in the plane and a series on all coordinates.
+
+    radius: (points, 1). circle: (2, samples), cosine and sine. wave: (points, samples, 1).
+    """
+    height = wave[..., 0]
+    return radius * circle[0] + height, radius * circle[1] + height, height
 
 
 @lru_cache(maxsize=16)

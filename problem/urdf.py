@@ -1,4 +1,4 @@
-"""URDF files: the serial chain of moving joints, with the links of fixed joints welded on."""
+"""URDF files: the serial chain of moving joints; links at fixed joints become part of the link that carries them."""
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, Joint, Limits, Link
-from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
+from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, roll_pitch_yaw, turn_z_to
 
 MOVING_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}

@@ -8,8 +8,8 @@ import pytest
 
 from armlab.common.arrays import Array
 from problem.arm import Arm, Joint, Link
-from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.motion import Motion
+from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 
 PINOCCHIO_ORDER = [0, 1, 2, 3, 4, 7, 5, 8, 9, 6]  # m, first moment, Ixx Ixy Iyy Ixz Iyz Izz
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from problem.arm import Arm, Joint, Link
-from problem.inertia import link_from_pseudo_inertia
 from problem.motion import Motion
+from problem.pseudo_inertia import link_from_pseudo_inertia
 from problem.transforms import roll_pitch_yaw
 
 

@@ -14,8 +14,10 @@ ASKED_SIGNALS = ("time", "position", "torque")
 OPTIONAL_SIGNALS = (
     "velocity",
     "temperature",
+    "voltage",
     "link_position",
     "reference_position",
+    "reference_velocity",
     "simulated_torque",
     "simulated_position",
 )
@@ -23,16 +25,16 @@ OPTIONAL_SIGNALS = (
 
 @click.group()
 def recording() -> None:
-    """Bring in, check and fetch recordings of robot arms."""
+    """Import, check and fetch recordings of robot arms."""
 
 
 @recording.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="The page [default: NAME-check.html, here].")
+@click.option("--out", type=click.Path(path_type=Path), help="HTML file to write [default: NAME-check.html].")
 def check(folder: Path, out: Path | None) -> None:
-    """Check a recording and draw it on one HTML page.
+    """Check and draw a recording.
 
-    Says what is wrong with it and what was repaired.
+    Lists errors, repairs and suspicious channels, and draws the signals on one HTML page.
     """
     from armlab.recordings.check import check_recording
     from armlab.recordings.check_report import write_check_page
@@ -43,16 +45,16 @@ def check(folder: Path, out: Path | None) -> None:
         click.echo(line)
     click.echo(f"page: {page}")
     if found.refused:
-        raise InputError(f"{len(found.refused)} of the runs of {folder} cannot be used (see above)")
+        raise InputError(f"{len(found.refused)} of the run files of {folder} cannot be used; the lines above say why")
 
 
 @recording.command()
 @click.argument("name", type=click.Choice(PUBLIC_RECORDING_NAMES))
-@click.option("--out", type=click.Path(path_type=Path), help="New folder [default: NAME, here].")
+@click.option("--out", type=click.Path(path_type=Path), help="New folder for the recording [default: NAME].")
 def fetch(name: str, out: Path | None) -> None:
     """Fetch a public recording of a real arm.
 
-    Writes it as a recording folder.
+    The recording is written as a recording folder.
     """
     from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
 
@@ -73,16 +75,16 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="New folder for the recording.")
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
-@click.option("--gains", metavar="NUMBERS", help="N.m per A or V of each channel, where torque is a current.")
-@click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="A file that validates.")
-@click.option("--separator", help="Between the cells of a text file: , ; or a word (tab, blank).")
+@click.option("--gains", metavar="NUMBERS", help="Gain of each channel, N.m per A or V.")
+@click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
+@click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
 @click.option("--topic", help="Topic of the joint states in a bag.")
-@click.option("--ask/--no-ask", default=None, help="Ask for what is missing [default: at a terminal].")
+@click.option("--ask/--no-ask", default=None, help="Ask for missing options [default: ask if the input is a terminal].")
 def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
-    """Import files of another format: .mat, ROS bags, MCAP, CSV.
+    """Convert files of other formats.
 
-    Writes a new recording folder.
+    Reads .mat, ROS bags, MCAP, Parquet and CSV of any layout, and writes a new recording folder.
 
     NAMES are column names with commas between them; * and ? stand for any characters.
     """

@@ -8,7 +8,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, validate
 from problem.arm import Arm, Joint, Link
-from problem.inertia import (
+from problem.pseudo_inertia import (
     link_from_centre_of_mass,
     link_from_pseudo_inertia,
     pseudo_inertia_of,

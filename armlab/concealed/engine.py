@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from armlab.common.arrays import Array
 from problem.arm import Arm, Joint, Link
-from problem.inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.motion import Motion
+from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from armlab.diagnosis.diagnose import conclude, diagnose, prepare
 from armlab.diagnosis.fitted_model import FittedModel, fit_background, search_effects
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import GUARDS, Settings, guards_without
-from armlab.diagnosis.verdict_files import verdict_content
+from armlab.diagnosis.verdict_files import make_verdict
 from armlab.effects.library import library
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
@@ -21,7 +21,7 @@ GUARDS_IN_SEARCH = ("prewhitening", "backward_elimination", "background_start")
 
 def verdicts_without_each(folder: Path) -> dict[str, dict[str, Any]]:
     """The verdict on a recording folder with all guards on, and with each off, by its name."""
-    return {guard: verdict_content(told) for guard, told in diagnose_without_each(load_recording(folder))}
+    return {guard: make_verdict(told).content() for guard, told in diagnose_without_each(load_recording(folder))}
 
 
 def diagnose_without_each(recording: Recording) -> Iterator[tuple[str, Diagnosis]]:

@@ -23,10 +23,11 @@ from armlab.diagnosis.fitted_model import (
     inertial_parameters,
     search_effects,
 )
+from armlab.diagnosis.formats import Status
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
-from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Status, Unexplained
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State

@@ -1,18 +1,16 @@
 """What a diagnosis says: plain data for the verdict, the model file and the report."""
 
 from dataclasses import dataclass, field
-from typing import Literal
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.formats import Status
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import Candidate
 from armlab.effects.parameters import ParameterValue
 from armlab.recordings.recording import Recording
-
-Status = Literal["mismatch", "none", "inconclusive"]
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from collections.abc import Sequence
 
-from armlab.diagnosis.result import Claim, JointFit, Status
+from armlab.diagnosis.formats import Status
+from armlab.diagnosis.result import Claim, JointFit
 
 MAX_FINDINGS_TOLD = 6  # findings that are told; the others are counted
 

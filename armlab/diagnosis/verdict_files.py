@@ -1,11 +1,9 @@
 """The files of a verdict: verdict.json, model.yaml and the predicted torque, all written or none."""
 
-import json
 import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -13,8 +11,21 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.diagnosis.formats import (
+    VERDICT_SCHEMA,
+    FindingEntry,
+    FitEntry,
+    LocatedEntry,
+    ParameterEntry,
+    RivalEntry,
+    UnexplainedEntry,
+    VerdictFile,
+    WhereEntry,
+    kind_of_effect,
+)
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
+from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.model_file import model_text
 from armlab.recordings.differentiate import Signals
@@ -25,7 +36,7 @@ MODEL = "model.yaml"
 
 def verdict_texts(diagnosis: Diagnosis, folder: Path) -> dict[str, str]:
     """verdict.json and, where something was fitted, model.yaml, as they are to stand in a folder."""
-    texts = {"verdict.json": json.dumps(verdict_content(diagnosis), indent=1, allow_nan=False) + "\n"}
+    texts = {"verdict.json": make_verdict(diagnosis).to_json()}
     if diagnosis.inertial is not None:
         texts[MODEL] = model_text(model_found(diagnosis), folder)
     return texts
@@ -47,66 +58,62 @@ def check_output_folder(folder: Path, recording: Recording) -> None:
         raise InputError(f"cannot write into {nearest}: give --out a folder that can be written")
 
 
-VERDICT_SCHEMA = "verdict/1"
+def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
+    """The content of `verdict.json`."""
+    return VerdictFile(
+        schema=VERDICT_SCHEMA,
+        status=diagnosis.status,
+        summary=diagnosis.summary,
+        located=tuple(_located_entry(each) for each in diagnosis.located),
+        findings=tuple(_finding_entry(each) for each in diagnosis.claims),
+        unexplained=tuple(_unexplained_entry(each) for each in diagnosis.unexplained),
+        fit=tuple(_fit_entry(each) for each in diagnosis.fit),
+    )
 
 
-def verdict_content(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The verdict of a diagnosis."""
-    return {
-        "schema": VERDICT_SCHEMA,
-        "status": diagnosis.status,
-        "summary": diagnosis.summary,
-        "located": [_located_entry(each) for each in diagnosis.located],
-        "findings": [_finding_entry(each) for each in diagnosis.claims],
-        "unexplained": [_unexplained_entry(each) for each in diagnosis.unexplained],
-        "fit": [_fit_entry(each) for each in diagnosis.fit],
-    }
+def _located_entry(each: Located) -> LocatedEntry:
+    where = WhereEntry(variable=each.variable, regime=each.regime, runs=each.runs, time=each.time)
+    return LocatedEntry(joint=each.joint, share=each.share, where=where)
 
 
-def _located_entry(each: Located) -> dict[str, Any]:
-    where: dict[str, Any] = {"variable": each.variable, "regime": each.regime, "runs": list(each.runs)}
-    where["time"] = None if each.time is None else list(each.time)
-    return {"joint": each.joint, "share": each.share, "where": where}
+def _finding_entry(claim: Claim) -> FindingEntry:
+    effect = effect_named(claim.effect) if claim.candidate is None else claim.candidate.facts
+    return FindingEntry(
+        effect=claim.effect,
+        kind=kind_of_effect(effect),
+        joint=claim.joint,
+        joints=claim.joints,
+        parameters={each.name: _finding_parameter(each) for each in claim.parameters},
+        equation=claim.equation,
+        heldout_rms_before=claim.evidence.rms_before,
+        heldout_rms_after=claim.evidence.rms_after,
+        p_value=claim.evidence.corrected,
+        rivals=tuple(RivalEntry(effect=each.effect, joint=each.joint) for each in claim.rivals),
+        next_experiment=claim.next_experiment,
+    )
 
 
-def _finding_entry(claim: Claim) -> dict[str, Any]:
-    rivals = [{"effect": each.effect, "joint": each.joint} for each in claim.rivals]
-    return {
-        "effect": claim.effect,
-        "joint": claim.joint,
-        "joints": list(claim.joints),
-        "parameters": {each.name: _parameter(each) for each in claim.parameters},
-        "equation": claim.equation,
-        "heldout_rms_before": claim.evidence.rms_before,
-        "heldout_rms_after": claim.evidence.rms_after,
-        "p_value": claim.evidence.corrected,
-        "rivals": rivals,
-        "next_experiment": claim.next_experiment,
-    }
-
-
-def _parameter(each: ParameterValue) -> dict[str, Any]:
-    value = list(each.value) if isinstance(each.value, tuple) else _finite(each.value)
-    interval = None if each.interval is None else [list(x) if isinstance(x, tuple) else x for x in each.interval]
-    return {"value": value, "ci95": interval, "unit": each.unit}
+def _finding_parameter(each: ParameterValue) -> ParameterEntry:
+    value = each.value if isinstance(each.value, tuple) else _finite(each.value)
+    return ParameterEntry(value=value, ci95=each.interval, unit=each.unit)
 
 
 def _finite(value: float) -> float:
     return value if math.isfinite(value) else math.copysign(1e300, value)  # JSON has no infinity
 
 
-def _unexplained_entry(each: Unexplained) -> dict[str, Any]:
-    return {"joint": each.joint, "share": each.share, "depends_on": list(each.depends_on)}
+def _unexplained_entry(each: Unexplained) -> UnexplainedEntry:
+    return UnexplainedEntry(joint=each.joint, share=each.share, depends_on=each.depends_on)
 
 
-def _fit_entry(each: JointFit) -> dict[str, Any]:
-    return {
-        "joint": each.joint,
-        "heldout_rms_before": each.before,
-        "heldout_rms_after": each.after,
-        "noise_floor": each.noise_floor,
-        "gap_closed": each.gap_closed,
-    }
+def _fit_entry(each: JointFit) -> FitEntry:
+    return FitEntry(
+        joint=each.joint,
+        heldout_rms_before=each.before,
+        heldout_rms_after=each.after,
+        noise_floor=each.noise_floor,
+        gap_closed=each.gap_closed,
+    )
 
 
 PREDICTED_FOLDER = "predicted"

@@ -23,8 +23,15 @@ from armlab.identification.model_file import read_model
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel, joint_fields
 from problem.arm import Arm
-from problem.inertia import pseudo_inertia_of, transform_pseudo_inertia
-from problem.pseudo_inertia import link_of, links_of, parameters_of, pseudo_inertias, regular_nominal
+from problem.pseudo_inertia import (
+    link_of,
+    links_of,
+    parameters_of,
+    pseudo_inertia_of,
+    pseudo_inertias,
+    regular_nominal,
+    transform_pseudo_inertia,
+)
 from problem.transforms import inverse, turn_z_to
 
 MIN_EXTENT_SHARE = 1e-12  # of a body's size: simulators refuse points, rods and plates

@@ -28,9 +28,8 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording, Run
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
-from problem.inertia import link_from_centre_of_mass
 from problem.motion import Motion
-from problem.pseudo_inertia import link_of, pseudo_inertias
+from problem.pseudo_inertia import link_from_centre_of_mass, link_of, pseudo_inertias
 from problem.regressor import observation_matrix, rigid_body_torque
 
 EIGENVALUE_TOLERANCE = 1e-12  # of a body: a point mass has eigenvalues of zero

@@ -11,8 +11,11 @@ from armlab.common.settings import suggest_name
 from armlab.recordings.recording import Finding, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry
 from armlab.recordings.table import Table
-from armlab.recordings.units import SI_UNITS, UNITS_BY_SIGNAL, Unit, resolve_units
+from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, Unit, resolve_units
 from problem.arm import Arm
+
+DRIVE_SIGNALS = ("torque", "current")
+MOTOR_SIDE_SIGNALS = ("position", "velocity", "reference_position", "reference_velocity")
 
 
 def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]) -> Run:
@@ -37,8 +40,8 @@ def channel_units(file: RecordingFile, arm: Arm, folder: Path) -> dict[str, tupl
     where = str(folder / FILE_NAME)
     signals = file.columns.signals()
     for name in file.units:
-        if name not in UNITS_BY_SIGNAL:
-            raise InputError(f"units.{name} in {where}: unknown signal: {suggest_name(name, list(UNITS_BY_SIGNAL))}")
+        if name not in SIGNAL_QUANTITIES:
+            raise InputError(f"units.{name} in {where}: unknown signal: {suggest_name(name, list(SIGNAL_QUANTITIES))}")
     units = {}
     for name, columns in signals.items():
         names = file.units.get(name) or _si_units(name, arm, len(columns))
@@ -55,19 +58,18 @@ def report_assumed_units(file: RecordingFile) -> tuple[Finding, ...]:
 
 def _si_units(name: str, arm: Arm, channels: int) -> str | tuple[str, ...]:
     """SI units of a signal: those of its joints where there is one channel a joint."""
-    turning, sliding = SI_UNITS[name]
-    if len(arm) != channels or name == "temperature":
+    turning, sliding = SIGNAL_QUANTITIES[name].si
+    if len(arm) != channels or name in SENSOR_SIGNALS:
         return turning
     return tuple(turning if joint.kind == "revolute" else sliding for joint in arm.joints)
 
 
 def _check_joints(name: str, units: tuple[Unit, ...], file: RecordingFile, arm: Arm, where: str) -> None:
-    drive = name in ("torque", "current")
-    if drive and any(unit.quantity in ("A", "V") for unit in units):
+    if name in DRIVE_SIGNALS and any(unit.quantity in ("A", "V") for unit in units):
         if file.gains is None:
             raise InputError(f"units.{name} in {where} is A or V: `gains` (N.m per A or V) are missing")
         return
-    if name in ("time", "temperature") or (drive and file.transmission.torque) or _is_mixed_by_transmission(name, file):
+    if name in ("time", *SENSOR_SIGNALS) or _is_mixed_by_transmission(name, file):
         return
     if len(units) != len(arm):
         raise InputError(f"columns.{name} in {where} names {len(units)} columns, but the robot has {len(arm)} joints")
@@ -80,7 +82,9 @@ def _check_joints(name: str, units: tuple[Unit, ...], file: RecordingFile, arm: 
 
 
 def _is_mixed_by_transmission(name: str, file: RecordingFile) -> bool:
-    return file.transmission.position is not None and name in ("position", "velocity", "reference_position")
+    """Whether a matrix makes joint signals of the channels, so that a channel belongs to no joint of its own."""
+    matrix = file.transmission.torque if name in DRIVE_SIGNALS else file.transmission.position
+    return matrix is not None and name in (*DRIVE_SIGNALS, *MOTOR_SIDE_SIGNALS)
 
 
 def _is_linear(unit: Unit) -> bool:
@@ -129,8 +133,8 @@ def _make_vector(values: tuple[float, ...] | None, default: float, length: int, 
 def to_joint_side(run: Run, transmission: Transmission) -> Run:
     """The run with motor signals carried over to the joints.
 
-    position, velocity and reference_position go through the position matrix; link_position and the simulated
-    signals are on the joint side already.
+    Positions, velocities and references go through the position matrix. link_position and the simulated signals are on
+    the joint side already.
     """
     to_joints = transmission.position.T
     signals = {
@@ -141,6 +145,8 @@ def to_joint_side(run: Run, transmission: Transmission) -> Run:
         signals["velocity"] = run.velocity @ to_joints
     if run.reference_position is not None:
         signals["reference_position"] = run.reference_position @ to_joints + transmission.offset
+    if run.reference_velocity is not None:
+        signals["reference_velocity"] = run.reference_velocity @ to_joints
     return run.with_signals(run.time, signals)
 
 

@@ -19,7 +19,7 @@ MIN_SLOPE_CORRELATION = 0.9  # correlation of a velocity channel with the slope 
 
 
 def check_channels(run: Run, arm: Arm) -> tuple[Finding, ...]:
-    """What is suspicious in the channels of a run, joint by joint."""
+    """Warnings about the channels of a run, joint by joint."""
     findings: list[Finding] = []
     for joint in range(run.joints):
         findings += (
@@ -84,7 +84,7 @@ def _find_limit_violations(run: Run, arm: Arm, joint: int) -> list[Finding]:
 
 
 def _check_velocity(run: Run, joint: int) -> list[Finding]:
-    """Compares a velocity channel with the slope of the positions; steps of the encoder are averaged away."""
+    """Compares a velocity channel with the slope of the position; averages remove the steps of the encoder."""
     if run.velocity is None or np.ptp(run.velocity[:, joint]) == 0:
         return []
     slopes = _block_means(np.gradient(run.position, run.time, axis=0))
@@ -162,10 +162,10 @@ def check_recording(folder: Path) -> CheckResult:
 
 
 def _collect_findings(recording: Recording) -> Iterator[tuple[str, Finding]]:
-    said: set[tuple[str, Finding]] = set()  # what was found before a file was cut stands at each of its parts
+    reported: set[tuple[str, Finding]] = set()  # a file that is split has the findings of the whole at each part
     for run in recording.runs:
-        yield from ((run.name, finding) for finding in run.findings if (run.file, finding) not in said)
-        said.update((run.file, finding) for finding in run.findings)
+        yield from ((run.name, finding) for finding in run.findings if (run.file, finding) not in reported)
+        reported.update((run.file, finding) for finding in run.findings)
         yield from ((run.name, finding) for finding in check_channels(run, recording.arm))
     whole = recording.findings
     if recording.runs:
@@ -174,7 +174,7 @@ def _collect_findings(recording: Recording) -> Iterator[tuple[str, Finding]]:
 
 
 def _check_geometry(recording: Recording) -> tuple[Finding, ...]:
-    """What the torques say of channels, robot and zeros."""
+    """Warnings about channels, robot and zeros that the torques give."""
     found = check_torque_fit(recording.runs, recording.arm)
     if any(finding.kind == "swapped_channels" for finding in found):
         return found

@@ -1,7 +1,7 @@
-"""Choice of the cut-off from the data: the signal that the acceleration loses against the noise that it keeps.
+"""Choice of the cut-off frequency from the data: less signal lost against more noise kept in the acceleration.
 
-Real arms also vibrate above the band in which they are moved. This is true motion, but a rigid model does not
-explain it. The choice therefore stops at ten times the bandwidth of the motion, the rule of thumb for rigid models.
+Real arms also vibrate above the frequency band of their motion. A rigid model does not explain these vibrations.
+The cut-off is therefore at most ten times the bandwidth of the motion, a rule of thumb for rigid models.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ NOISE_BAND_START = 0.3  # of the sampling rate: above it a well sampled motion h
 
 @dataclass(frozen=True, eq=False)
 class CutoffChoice:
-    """A cut-off and why: estimated error of the acceleration at each candidate.
+    """A cut-off and the reason for it: the estimated error of the acceleration at each candidate.
 
     motion_hz: bandwidth of the motion; the choice is the candidate of least risk up to ten times that.
     candidates_hz, risk: (candidates,), risk as a share of the acceleration's power, summed over the joints.
@@ -41,8 +41,8 @@ class CutoffChoice:
 def choose_cutoff(position: Array, rate_hz: float, low_pass: type[LowPass]) -> CutoffChoice:
     """The cut-off with the least estimated mean-square error of the acceleration (Mallows 1973, eq. C_p).
 
-    position: (samples, joints), at an even rate. Position noise is taken as white, with the level that is
-    seen at the highest frequencies. A candidate's error: the signal that it removes and the noise it passes.
+    position: (samples, joints), at an even rate. Position noise is assumed to be white; its level is
+    measured at the highest frequencies. The error of a candidate is the signal it removes plus the noise it passes.
     """
     frequency, spectrum, shape = acceleration_spectrum(position, rate_hz)
     noise = shape[:, None] * noise_level(frequency, spectrum, shape, rate_hz)

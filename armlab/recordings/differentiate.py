@@ -1,4 +1,4 @@
-"""From a run to the motion that a regressor needs: even samples, smoothed positions, derivatives, filtered torque."""
+"""Makes a run ready for a regressor: even samples, smoothed positions, their derivatives, and filtered torque."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ MIN_STEP_SHARE = 0.2  # of a step: a spline through two noisy samples this close
 def resample_evenly(run: Run) -> Run:
     """The run at even stamps, by cubic splines through its samples; the same run if they are even already.
 
-    Lost samples (the reader has cut the run at long gaps) are bridged by the same splines.
+    Lost samples (the reader splits a run at long gaps) are bridged by the same splines.
     """
     if run.even:
         return run
@@ -86,7 +86,7 @@ def differentiate(
     """Smoothed positions, their derivatives, and the filtered torque of a run.
 
     cutoff_hz: of the positions; chosen from the data if left out. torque_cutoff_hz: of the filter that torque
-    and columns share; that of the positions if left out. step: keeps each so-manyth row of those.
+    and columns share; that of the positions if left out. step: every step-th row of torque and columns is kept.
     Raises ValueError for a cut-off above half the sampling rate.
     """
     run = resample_evenly(run)

@@ -1,7 +1,8 @@
-"""Filters without phase shift that treat the torque and the columns of a regressor alike.
+"""Filters without phase shift, the same for the torque and for the columns of a regressor.
 
-A low-pass rounds the jump of sign(velocity) at a reversal. A column that did not pass the filter of the torque
-differs from it there, and a fit takes the difference for physics. Therefore one object filters both.
+A low-pass rounds the jump of sign(velocity) at a reversal. A column that does not pass the filter of the torque
+differs from the torque there, and a fit explains the difference by effects that do not exist. So one object filters
+both.
 """
 
 from abc import ABC, abstractmethod
@@ -18,7 +19,7 @@ BUTTERWORTH_ORDER = 4  # of the Butterworth filter each way
 
 
 class Filter(ABC):
-    """Smooths along the first axis, then keeps the rows that are worth keeping."""
+    """Smooths along the first axis, then selects rows: not those near the ends, and not more than needed."""
 
     @property
     @abstractmethod
@@ -73,12 +74,10 @@ class Butterworth(LowPass):
         sections, settled = _butterworth_sections(self.cutoff_hz, self.rate_hz)
         padding = min(int(np.ceil(3 * self.rate_hz / self.cutoff_hz)), len(signal) - 1)
         columns = signal.reshape(len(signal), -1).T
-        before, after = (
-            2 * columns[:, :1] - columns[:, padding:0:-1],
-            2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1],
-        )
+        before = 2 * columns[:, :1] - columns[:, padding:0:-1]
+        after = 2 * columns[:, -1:] - columns[:, -2 : -padding - 2 : -1]
         passed = np.concatenate([before, columns, after], axis=1)
-        for _ in range(2):  # scipy's sosfiltfilt, which finds the settled state anew at each call
+        for _ in range(2):  # as scipy's sosfiltfilt, which computes the settled state at each call
             passed = sosfilt(sections, passed, zi=settled[:, None] * passed[:, :1])[0][:, ::-1]
         return passed[:, padding : passed.shape[1] - padding].T.reshape(signal.shape)
 
@@ -90,7 +89,7 @@ class Butterworth(LowPass):
 
 @lru_cache(maxsize=64)
 def _butterworth_sections(cutoff_hz: float, rate_hz: float) -> tuple[Array, Array]:
-    """Second-order sections and their settled state; kept, for a diagnosis filters thousands of columns alike."""
+    """Second-order sections and their settled state; cached, because thousands of columns pass one filter."""
     sections = np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"))
     return sections, np.asarray(sosfilt_zi(sections))
 

@@ -1,8 +1,8 @@
-"""Does the geometry of the arm explain the torques? If not: swapped channels, turned zeros, or another arm.
+"""Tests whether the geometry of the arm explains the torques: swapped channels, wrong zeros, another arm.
 
 All torques of a recording are fitted by least squares with the base parameters and the friction of each joint free,
-on every second block of time, and judged on the other blocks. No nominal parameters are needed. The zero of a last
-joint cannot be seen: its link absorbs the turn.
+on every second block of time, and judged on the other blocks. No nominal parameters are needed. The zero of the
+last joint cannot be tested: the parameters of its link absorb an offset.
 """
 
 from collections.abc import Sequence
@@ -47,34 +47,36 @@ def check_torque_fit(runs: Sequence[Run], arm: Arm) -> tuple[Finding, ...]:
     if swap:
         return (swap,)
     if _overall_error(own) > MAX_UNEXPLAINED_SHARE:
-        return (_unexplained_warning(f"the geometry of {arm.name}", own),)
+        return (_unexplained_warning(f"the geometry of {arm.name} does not explain", own),)
     if arm.links is not None:
         nominal = nominal_errors(arm, thinned)
         if _overall_error(nominal) > MAX_UNEXPLAINED_SHARE:
-            return (_unexplained_warning(f"the `links` of {arm.name}, friction fitted,", nominal),)
+            return (_unexplained_warning(f"the `links` of {arm.name} with fitted friction do not explain", nominal),)
     return ()
 
 
 def _unexplained_warning(what: str, errors: Array) -> Finding:
     bad = [f"{joint + 1} ({error:.0%})" for joint, error in enumerate(errors) if error > MAX_UNEXPLAINED_SHARE]
-    text = f"{what} leave(s) much of the torque unexplained on joint {', '.join(bad)}: another robot or units?"
+    text = f"{what} much of the torque of joint {', '.join(bad)}: another robot or units?"
     return Finding("another_arm", "warning", text)
 
 
 def thin_runs(runs: Sequence[Run]) -> ThinnedSignals:
-    """A few filtered instants of each run; blocks of time are held out in turn."""
-    parts = []
+    """A few filtered instants of each run; every second block of time is held out."""
+    motions, torques, held_out = [], [], []
     step = max(sum(run.samples for run in runs) // MAX_FIT_ROWS, 1)
     for signals in (differentiate(run, step=step) for run in runs):
-        rows = signals.filter.rows
+        rows, motion = signals.filter.rows, signals.motion
+        motions.append(Motion(motion.position[rows], motion.velocity[rows], motion.acceleration[rows]))
+        torques.append(signals.torque)
         count = len(signals.torque)
-        held_out = (np.arange(count) * BLOCKS_PER_RUN // count) % 2 == 1
-        motion = signals.motion
-        parts.append(
-            (motion.position[rows], motion.velocity[rows], motion.acceleration[rows], signals.torque, held_out)
-        )
-    position, velocity, acceleration, torque, held_out = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return ThinnedSignals(Motion(position, velocity, acceleration), torque, held_out)
+        held_out.append((np.arange(count) * BLOCKS_PER_RUN // count) % 2 == 1)
+    motion = Motion(
+        position=np.concatenate([each.position for each in motions]),
+        velocity=np.concatenate([each.velocity for each in motions]),
+        acceleration=np.concatenate([each.acceleration for each in motions]),
+    )
+    return ThinnedSignals(motion, np.concatenate(torques), np.concatenate(held_out))
 
 
 def fit_columns(arm: Arm, base: BaseParameters, motion: Motion) -> Array:

@@ -22,7 +22,7 @@ from problem.robot_file import load_arm
 
 
 def load_recording(folder: str | Path) -> Recording:
-    """The recording in a folder, SI units on the joint side; what was repaired is noted at each run.
+    """The recording in a folder, in SI units on the joint side; each run holds findings about its repairs.
 
     Raises InputError, in one line, for what is missing, wrong, or not safe to repair.
     """
@@ -32,8 +32,16 @@ def load_recording(folder: str | Path) -> Recording:
 
 
 def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
-    """The recording without its runs, and the file that lists them; InputError where the file is wrong."""
+    """The recording without its runs, and the file that lists them.
+
+    Raises InputError where the file is wrong, and for a recording of motion only.
+    """
     file = read_recording_file(folder)
+    if not file.has_torque:
+        raise InputError(
+            f"columns in {folder / FILE_NAME} has neither torque nor current with `gains`: "
+            "motion-only recordings cannot be diagnosed yet"
+        )
     arm = load_arm(file.robot, folder)
     transmission = make_transmission(file, arm, folder)
     simulation = folder / file.simulation if file.simulation else None
@@ -43,7 +51,7 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
 
 
 def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tuple[Run, ...]:
-    """The run of one file: several where its clock steps back or pauses."""
+    """The runs of one file: several if its clock steps back or pauses."""
     units = channel_units(file, recording.arm, recording.folder)
     table = read_table(recording.folder / entry.file)
     names = file.columns.signals()
@@ -62,9 +70,9 @@ def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
     rates = {run.name: run.rate_hz for run in runs}
     if rates and max(rates.values()) > 1.02 * min(rates.values()):
         listed = ", ".join(f"{name} {rate:.5g} Hz" for name, rate in rates.items())
-        text = f"runs of different rate ({listed}); each is filtered at its own"
+        text = f"runs have different rates ({listed}); each is filtered at its own rate"
         findings.append(Finding("different_rates", "note", text))
     if not any(run.role == "validate" for run in runs):
-        text = "no run validates: blocks of time will have to be held out of the runs that identify"
+        text = "no run has the role validate: blocks of time are held out of the runs that identify"
         findings.append(Finding("no_validation", "note", text))
     return replace(recording, runs=tuple(runs), findings=tuple(findings))

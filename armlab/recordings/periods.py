@@ -37,7 +37,7 @@ class Harmonics(Filter):
 
 
 def find_period(run: Run) -> float | None:
-    """The shortest time, s, after which the motion repeats itself; None where it does not in half the run."""
+    """The shortest time, s, after which the motion repeats itself; None if that is more than half the run."""
     run = resample_evenly(run)
     mismatch = _lag_mismatch(run.position)
     inner = mismatch[1:-1]
@@ -74,9 +74,8 @@ def _parabola_vertex(values: Array) -> float:
 def average_periods(run: Run, period_s: float | None = None, harmonics: int | None = None) -> Signals:
     """The average period of a run with its exact derivatives, and the covariance of the averaged torque.
 
-    period_s: found in the data if left out. harmonics: how many are kept, chosen from the scatter if left
-    out.
-    The last whole periods are used: a transient stands at the start. Raises ValueError for a run that is not
+    period_s: found in the data if left out. harmonics: how many are kept; chosen from the scatter if left out.
+    The last whole periods are used, because a run starts with a transient. Raises ValueError for a run that is not
     periodic or shorter than two periods.
     """
     period = period_s or find_period(run)
@@ -131,8 +130,9 @@ def _series_motion(position: Array, period: float, harmonics: int) -> Motion:
     series[harmonics + 1 :] = 0
     omega = 2j * np.pi * np.arange(len(series))[:, None] / period
     samples = len(position)
-    derivatives = (np.fft.irfft(series * omega**order, n=samples, axis=0) for order in range(3))
-    return Motion(*derivatives)
+    velocity = np.fft.irfft(series * omega, n=samples, axis=0)
+    acceleration = np.fft.irfft(series * omega**2, n=samples, axis=0)
+    return Motion(np.fft.irfft(series, n=samples, axis=0), velocity, acceleration)
 
 
 def _covariance_of_mean(residuals: Array) -> Array:

@@ -1,4 +1,4 @@
-"""A recording: an arm, its runs in SI units on the joint side, and the findings about them."""
+"""A recording: an arm, its runs in SI units on the joint side, and remarks about them."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,8 +17,10 @@ SIGNALS = (
     "torque",
     "velocity",
     "temperature",
+    "voltage",
     "link_position",
     "reference_position",
+    "reference_velocity",
     "simulated_torque",
     "simulated_position",
 )
@@ -27,10 +29,10 @@ EVEN_TOLERANCE = 1e-6  # of a sample: stamps this close to an even grid count as
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that a person should know about a recording, in one line.
+    """A remark about a recording for its user, in one line.
 
-    kind: a short name like `time_jitter`. severity: `repaired` where the data were changed, `warning` where
-    they were left as they are, `note` where there is nothing to do. joint: from 1, if it concerns one.
+    kind: a short name like `time_jitter`. severity: `repaired` if the data were changed, `warning` if they look wrong
+    and were not changed, `note` if nothing is wrong. joint: from 1, if the remark concerns one joint.
     """
 
     kind: str
@@ -45,7 +47,7 @@ class Run:
 
     time: (samples,), s, strictly increasing. position, torque: (samples, joints), rad and N m (m and N for
     prismatic joints). The other signals are None where they were not recorded; a column of NaN in one of them
-    is a joint without that sensor. temperature: (samples, sensors), degrees Celsius.
+    is a joint without that sensor. temperature, voltage: (samples, sensors), degrees Celsius and V.
     file: name of its file; part: from 1 where one file was cut into several runs, else 0.
     """
 
@@ -56,8 +58,10 @@ class Run:
     torque: Array
     velocity: Array | None = None
     temperature: Array | None = None
+    voltage: Array | None = None
     link_position: Array | None = None
     reference_position: Array | None = None
+    reference_velocity: Array | None = None
     simulated_torque: Array | None = None
     simulated_position: Array | None = None
     part: int = 0
@@ -122,7 +126,7 @@ class Transmission:
     """How raw channels become joint signals: q = position @ raw + offset, tau = torque @ (gains * raw).
 
     position, torque: (joints, channels). offset: (joints,), rad (m). gains: (channels,), N m (N) per A or V,
-    ones where the torque itself was recorded. Every run has passed it already: kept to know, not to use.
+    ones where the torque itself was recorded. Kept for information: the runs are on the joint side already.
     """
 
     position: Array

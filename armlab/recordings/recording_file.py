@@ -1,4 +1,4 @@
-"""The folder of a recording: the keys of `recording.yaml`, how the file is read, and how a new folder is written."""
+"""The folder of a recording: the keys of `recording.yaml`, the reader of the file, and the writer of a new folder."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 import pandas as pd
 import yaml
-from annotated_types import Gt, Len
-from pydantic import Field, model_validator
+from annotated_types import Ge, Gt, Len
+from pydantic import ConfigDict, Field, model_validator
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -17,10 +17,23 @@ from armlab.recordings.recording import Role
 FILE_NAME = "recording.yaml"
 Names = Annotated[tuple[str, ...], Len(min_length=1)]
 Matrix = tuple[tuple[float, ...], ...]
+Positive = Annotated[float, Gt(0)]
+NotNegative = Annotated[float, Ge(0)]
+PerJoint = Annotated[tuple[float | None, ...], Len(min_length=1)]
 
 
 class Columns(Settings):
-    """Names of the columns of the run files, one a joint in the order of the robot."""
+    """Names of the columns in the run files, one a joint in the order of the robot.
+
+    A recording has `torque`, or `current` with `gains`. A recording of motion only has `reference_position` instead;
+    a `current` beside it has an unknown scale and sign. `voltage` and `temperature`: one a sensor.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "anyOf": [{"required": ["torque"]}, {"required": ["current"]}, {"required": ["reference_position"]}]
+        }
+    )
 
     time: str
     position: Names
@@ -28,15 +41,21 @@ class Columns(Settings):
     current: Names | None = None
     velocity: Names | None = None
     temperature: Names | None = None
+    voltage: Names | None = None
     link_position: Names | None = None
     reference_position: Names | None = None
+    reference_velocity: Names | None = None
     simulated_torque: Names | None = None
     simulated_position: Names | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> "Columns":
-        if (self.torque is None) == (self.current is None):
-            raise ValueError("columns should name either torque or current")
+        if self.torque is not None and self.current is not None:
+            raise ValueError("columns should name either torque or current, not both")
+        if self.torque is None and self.current is None and self.reference_position is None:
+            raise ValueError(
+                "columns should name either torque or current; a recording of motion only names reference_position"
+            )
         names = [name for signal in self.signals().values() for name in signal]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
@@ -44,7 +63,7 @@ class Columns(Settings):
         return self
 
     def signals(self) -> dict[str, tuple[str, ...]]:
-        """Column names of each signal that is there, time first."""
+        """Column names of each signal that the file names, time first."""
         given = {name: getattr(self, name) for name in type(self).model_fields if name != "time"}
         return {"time": (self.time,), **{name: names for name, names in given.items() if names is not None}}
 
@@ -57,6 +76,33 @@ class TransmissionEntry(Settings):
     torque: Matrix | None = None
 
 
+class ControllerEntry(Settings):
+    """The drive as the simulation has it: tau = kp (reference - position) + kd (reference velocity - velocity).
+
+    kp: N m/rad; kd: N m s/rad; ki: N m/(rad s); torque_limit, integral_limit: N m; one a joint, null where unknown.
+    reference_velocity: zero, or the derivative of the reference. feedforward: what the drive adds, from the simulation.
+    delay: s, of the command. read_delay: s, one a joint, where joints are read one after another. rate_hz: how often
+    the command is taken over and held. velocity_filter_hz: cut-off of the velocity that the drive feeds back.
+    supply, kt, resistance: V, N m/A, ohm, of a drive that commands a voltage.
+    """
+
+    type: Literal["pd"]
+    kp: PerJoint
+    kd: PerJoint
+    ki: PerJoint | None = None
+    reference_velocity: Literal["zero", "derivative"] = "zero"
+    feedforward: Literal["none", "gravity", "model"] = "none"
+    torque_limit: PerJoint | None = None
+    integral_limit: PerJoint | None = None
+    delay: NotNegative = 0.0
+    read_delay: tuple[NotNegative, ...] | None = None
+    rate_hz: Positive | None = None
+    velocity_filter_hz: Positive | None = None
+    supply: Positive | None = None
+    kt: PerJoint | None = None
+    resistance: PerJoint | None = None
+
+
 class RunEntry(Settings):
     """One run file and what it is for."""
 
@@ -65,17 +111,30 @@ class RunEntry(Settings):
 
 
 class RecordingFile(Settings):
-    """The content of `recording.yaml` (schema recording/1)."""
+    """The content of `recording.yaml` (schema recording/1).
+
+    robot: a path beside the file or the name of a built-in robot. simulation: the model to compare with, a path.
+    units: of each signal, one for all its columns or one a column. gains: N m (N) per A or V, one a channel.
+    controller: of the simulation; null where it is unknown.
+    """
 
     schema_: Literal["recording/1"] = Field(alias="schema")
     robot: str
     simulation: str | None = None
-    sample_rate_hz: Annotated[float, Gt(0)] | None = None
+    sample_rate_hz: Positive | None = None
     columns: Columns
     units: dict[str, str | tuple[str, ...]]
     transmission: TransmissionEntry = TransmissionEntry()
     gains: tuple[float, ...] | None = None
+    controller: ControllerEntry | None = None
     runs: Annotated[tuple[RunEntry, ...], Len(min_length=1)]
+
+    @property
+    def has_torque(self) -> bool:
+        """False for a recording of motion only: commands and positions, and no torque."""
+        if self.columns.torque is not None:
+            return True
+        return self.columns.current is not None and (self.gains is not None or self.columns.reference_position is None)
 
     @model_validator(mode="after")
     def _runs_once(self) -> "RecordingFile":

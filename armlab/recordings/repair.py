@@ -1,6 +1,6 @@
 """Safe repairs of a run: bad rows, missing cells, the order of rows, gaps of the clock, and encoders that wrap around.
 
-Each repair reports what it changed. What cannot be repaired safely raises InputError.
+Each repair reports what it changed. Data that cannot be repaired safely raise InputError.
 """
 
 from dataclasses import replace
@@ -15,14 +15,12 @@ from armlab.recordings.recording import Finding, Run
 MAX_PLAUSIBLE_VALUE = 1e9  # no arm moves, pulls or lasts this much in SI units
 MAX_BAD_ROW_SHARE = 0.05  # more bad rows than this, and the file is broken rather than a few rows
 REQUIRED_SIGNALS = ("position", "torque")
-MAX_SHORT_GAP = 5.0  # samples: over a shorter gap of a well sampled motion, interpolation is safe
-MIN_RUN_SAMPLES = 50  # samples: a shorter part tells nothing
 
 
 def drop_bad_rows(run: Run, rows: NDArray[np.intp], names: dict[str, tuple[str, ...]]) -> Run:
-    """Leaves out rows whose time, position or torque is no number, infinite or absurdly large.
+    """Leaves out rows whose time, position or torque is not a number, infinite, or larger than any arm can give.
 
-    rows: (samples,), where each stands in the file. names: of the columns of each signal, for the message.
+    rows: (samples,), number of each row in the file. names: of the columns of each signal, for the message.
     Raises InputError where more than a few rows are bad.
     """
     wrong = {name: ~_is_plausible(signal) for name, signal in _required_signals(run).items()}
@@ -33,7 +31,7 @@ def drop_bad_rows(run: Run, rows: NDArray[np.intp], names: dict[str, tuple[str, 
     signal, column = next((name, int(np.argmax(wrong[name][row]))) for name in wrong if wrong[name][row].any())
     value = _required_signals(run)[signal][row, column]
     example = f"line {rows[row]}: {names[signal][column]} = {value:g}"
-    text = f"{bad.sum()} of {len(bad)} rows hold what is no measurement ({example})"
+    text = f"{bad.sum()} of {len(bad)} rows hold a value that is not a measurement ({example})"
     if bad.sum() > max(1, MAX_BAD_ROW_SHARE * len(bad)):
         raise InputError(f"{run.file}: {text}: too many to repair; export the run again")
     return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
@@ -49,7 +47,7 @@ def _is_plausible(values: Array) -> NDArray[np.bool_]:
 
 
 def fill_optional_signals(run: Run) -> Run:
-    """Bridges cells that are missing in the optional signals by straight lines; empty columns stay empty."""
+    """Fills missing cells of the optional signals by linear interpolation; empty columns stay empty."""
     for name, signal in run.signals.items():
         if name in REQUIRED_SIGNALS:
             continue
@@ -62,13 +60,13 @@ def fill_optional_signals(run: Run) -> Run:
         for column in np.flatnonzero(torn):
             there = good[:, column]
             filled[:, column] = np.interp(run.time, run.time[there], signal[there, column])
-        text = f"{(~good[:, torn | empty]).sum()} cells of {name} hold no number; filled by straight lines"
+        text = f"{(~good[:, torn | empty]).sum()} cells of {name} hold no number; filled by linear interpolation"
         run = run.with_signals(run.time, {name: filled}).with_findings(Finding("bad_value", "repaired", text))
     return run
 
 
 def drop_duplicate_rows(run: Run) -> Run:
-    """Leaves out rows that repeat the row before to the last digit."""
+    """Leaves out rows that are equal to the row before."""
     table = np.column_stack([run.time, *run.signals.values()])
     same = np.append(False, np.all((table[1:] == table[:-1]) | np.isnan(table[1:]), axis=1))
     if not same.any():
@@ -78,9 +76,9 @@ def drop_duplicate_rows(run: Run) -> Run:
 
 
 def sort_rows(run: Run) -> Run:
-    """Sorts rows that stand in the wrong order, where the sorted stamps leave no doubt.
+    """Sorts rows that are in the wrong order, if the sorted stamps are evenly spaced.
 
-    A clock that stepped back overlaps with what was before: then the rows stay, and the run is cut there.
+    If the clock stepped back, sorted stamps would overlap: then the rows stay, and the run is split there.
     """
     backwards = int(np.sum(np.diff(run.time) < 0))
     if not backwards:
@@ -89,7 +87,7 @@ def sort_rows(run: Run) -> Run:
     steps = np.diff(run.time[order])
     if steps.min() < 0.5 * np.median(steps):
         return run
-    text = f"{backwards} rows stand before an earlier one; put in the order of their stamps"
+    text = f"{backwards} rows come after a later one; sorted by their stamps"
     return run.rows(order).with_findings(Finding("time_order", "repaired", text))
 
 
@@ -98,7 +96,7 @@ MIN_PART_SAMPLES = 50  # samples: a shorter part tells nothing
 
 
 def split_at_gaps(run: Run) -> tuple[Run, ...]:
-    """The parts of a run between gaps of the clock and steps back; parts that are too short are left out.
+    """The parts of a run between gaps and backward steps of the clock; parts that are too short are left out.
 
     Raises InputError if nothing is left.
     """
@@ -114,7 +112,7 @@ def split_at_gaps(run: Run) -> tuple[Run, ...]:
 
 
 def _split_rows_at_breaks(time: Array, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Rows between breaks, looked for again in each piece: a long pause hides shorter ones."""
+    """Rows between breaks. Each piece is searched again, because a long pause hides shorter ones."""
     steps = np.diff(time[rows])
     forward = steps[steps > 0]
     if not len(forward):

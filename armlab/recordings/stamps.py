@@ -1,6 +1,7 @@
-"""Repair of time stamps that jitter: were the samples taken at uneven times, or only stamped late?
+"""Repair of time stamps that jitter.
 
-Both happen, and the data decide: a sample that was taken late has moved on by velocity times lateness.
+Either the samples were taken at uneven times, or even samples were stamped late. The data decide: in a sample that was
+taken late, the position is ahead by velocity times lateness.
 """
 
 from dataclasses import dataclass
@@ -57,7 +58,7 @@ def repair_stamps(run: Run) -> Run:
     if worst > MAX_ROUNDING_LATENESS:
         text = (
             f"stamps stray from an even {1 / grid.step:.6g} Hz by up to {1e3 * worst * grid.step:.3g} ms, "
-            "and the motion shows that the samples do not; stamps made even"
+            "but the motion shows that the samples are even; stamps made even"
         )
         run = run.with_findings(Finding("time_jitter", "repaired", text))
     elif worst > 1e-4:
@@ -74,7 +75,8 @@ def fit_even_grid(time: Array) -> Grid:
     steps = np.diff(time)
     usual = float(np.median(steps)) or float(np.mean(steps))
     counted = np.append(0, np.cumsum(np.maximum(1, np.rint(steps / usual)))).astype(np.intp)
-    complete, with_gaps = (_fit_grid(time, count) for count in (np.arange(len(time)), counted))
+    complete = _fit_grid(time, np.arange(len(time)))
+    with_gaps = _fit_grid(time, counted)
     return with_gaps if with_gaps.scatter < MAX_GAP_SCATTER_RATIO * complete.scatter else complete
 
 
@@ -106,7 +108,7 @@ def _fourth_difference(signal: Array) -> Array:
 
 
 def _keep_stamps(run: Run, grid: Grid, worst: float) -> Run:
-    """Keeps the stamps; of rows with one stamp only the first stays, if they hold about the same."""
+    """Keeps the stamps. Of rows with equal stamps and similar values only the first stays."""
     later = np.append(False, np.diff(run.time) <= 0)
     if later.any():
         run = _drop_equal_stamps(run, later)

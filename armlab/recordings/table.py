@@ -21,8 +21,8 @@ HEADER_LINES = 1
 class Table:
     """Columns of one file.
 
-    values: (rows, columns), NaN where a cell holds no number. row_numbers: (rows,), where each row stands in
-    the file, counted from 1 with the header.
+    values: (rows, columns), NaN where a cell holds no number. row_numbers: (rows,), number of each row in the
+    file; the header is row 1.
     """
 
     file: str
@@ -43,7 +43,7 @@ class Table:
 def read_table(path: Path) -> Table:
     """The columns of a .csv or .parquet file.
 
-    A last row that is cut short is left out, and said so. Raises InputError for a file that cannot be read,
+    A last row that is cut short is left out, and a finding says so. Raises InputError for a file that cannot be read,
     has no rows, a column twice, or a row of the wrong length before the last.
     """
     readers = {".csv": _read_csv, ".parquet": _read_parquet}
@@ -52,7 +52,7 @@ def read_table(path: Path) -> Table:
     table = readers[path.suffix.lower()](path)
     twice = sorted({name for name in table.names if table.names.count(name) > 1})
     if twice:
-        raise InputError(f"{path}: column '{twice[0]}' stands there twice")
+        raise InputError(f"{path}: column '{twice[0]}' appears twice")
     if not len(table.values):
         raise InputError(f"{path} holds no rows")
     return table
@@ -71,13 +71,13 @@ def _read_csv(path: Path) -> Table:
 
 
 def read_text(path: Path) -> str:
-    """The text of a file, line ends as they stand; InputError where it is missing or no UTF-8 text."""
+    """The text of a file with its own line ends; InputError if it is missing or not UTF-8 text."""
     try:
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is no UTF-8 text (byte {error.start}): is it a CSV file?") from None
+        raise InputError(f"{path} is not UTF-8 text (byte {error.start}): is it a CSV file?") from None
 
 
 def split_rows(text: str, separator: str, where: str) -> list[tuple[int, list[str]]]:
@@ -92,7 +92,7 @@ def split_rows(text: str, separator: str, where: str) -> list[tuple[int, list[st
 def drop_broken_last_row(
     body: list[tuple[int, list[str]]], width: int, text: str, where: str
 ) -> tuple[list[tuple[int, list[str]]], tuple[Finding, ...]]:
-    """The rows without a last one that was cut off while it was written.
+    """The rows without a last row that was cut off while it was written.
 
     Raises InputError for a row of the wrong length anywhere else.
     """
@@ -111,7 +111,7 @@ def drop_broken_last_row(
 
 
 def parse_numbers(cells: Sequence[str]) -> list[float]:
-    """The cells as numbers, NaN where a cell is none."""
+    """The cells as numbers, NaN for a cell that is not a number."""
     try:
         return [float(cell) for cell in cells] if "_" not in "".join(cells) else [_parse_number(cell) for cell in cells]
     except ValueError:

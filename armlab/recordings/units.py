@@ -1,6 +1,6 @@
-"""Units of the signals: the one place where the numbers of a recording become SI numbers."""
+"""The signals of a recording and their units: here the numbers of a file become SI numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -30,48 +30,51 @@ VELOCITY_UNITS = {
     "rpm": Unit("rad/s", pi / 30),
 }
 TORQUE_UNITS = {"N.m": Unit("N.m", 1.0), "mN.m": Unit("N.m", 1e-3), "N": Unit("N", 1.0), "kN": Unit("N", 1e3)}
-DRIVE_UNITS = {"A": Unit("A", 1.0), "mA": Unit("A", 1e-3), "V": Unit("V", 1.0), "mV": Unit("V", 1e-3)}
+VOLTAGE_UNITS = {"V": Unit("V", 1.0), "mV": Unit("V", 1e-3)}
+DRIVE_UNITS = {"A": Unit("A", 1.0), "mA": Unit("A", 1e-3), **VOLTAGE_UNITS}
 TEMPERATURE_UNITS = {"degC": Unit("degC", 1.0), "K": Unit("degC", 1.0, -273.15)}
 
-UNITS_BY_SIGNAL = {
-    "time": TIME_UNITS,
-    "position": POSITION_UNITS,
-    "velocity": VELOCITY_UNITS,
-    "torque": {**TORQUE_UNITS, **DRIVE_UNITS},
-    "current": DRIVE_UNITS,
-    "temperature": TEMPERATURE_UNITS,
-    "link_position": POSITION_UNITS,
-    "reference_position": POSITION_UNITS,
-    "simulated_torque": TORQUE_UNITS,
-    "simulated_position": POSITION_UNITS,
-}
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a signal measures. units: those that a file may name. si: the SI unit of a joint that turns or slides."""
+
+    units: Mapping[str, Unit]
+    si: tuple[str, str]
 
 
-ANGLE_OR_LENGTH, MOMENT_OR_FORCE = ("rad", "m"), ("N.m", "N")
-SI_UNITS = {
-    "time": ("s", "s"),
-    "position": ANGLE_OR_LENGTH,
-    "velocity": ("rad/s", "m/s"),
-    "torque": MOMENT_OR_FORCE,
-    "current": ("A", "A"),
-    "temperature": ("degC", "degC"),
-    "link_position": ANGLE_OR_LENGTH,
-    "reference_position": ANGLE_OR_LENGTH,
-    "simulated_torque": MOMENT_OR_FORCE,
-    "simulated_position": ANGLE_OR_LENGTH,
+POSITION = Quantity(POSITION_UNITS, ("rad", "m"))
+VELOCITY = Quantity(VELOCITY_UNITS, ("rad/s", "m/s"))
+TORQUE = Quantity(TORQUE_UNITS, ("N.m", "N"))
+SIGNAL_QUANTITIES: Mapping[str, Quantity] = {
+    "time": Quantity(TIME_UNITS, ("s", "s")),
+    "position": POSITION,
+    "velocity": VELOCITY,
+    "torque": Quantity({**TORQUE_UNITS, **DRIVE_UNITS}, TORQUE.si),
+    "current": Quantity(DRIVE_UNITS, ("A", "A")),
+    "temperature": Quantity(TEMPERATURE_UNITS, ("degC", "degC")),
+    "voltage": Quantity(VOLTAGE_UNITS, ("V", "V")),
+    "link_position": POSITION,
+    "reference_position": POSITION,
+    "reference_velocity": VELOCITY,
+    "simulated_torque": TORQUE,
+    "simulated_position": POSITION,
 }
+SENSOR_SIGNALS = ("temperature", "voltage")  # one channel a sensor, not one a joint
 
 
 def resolve_units(signal: str, names: str | Sequence[str], channels: int, where: str) -> tuple[Unit, ...]:
     """One unit a channel of a signal like `position`.
 
-    names: one for all channels, or one a channel. Raises InputError for an unknown unit and a wrong number.
+    names: one for all channels, or one a channel.
+    Raises InputError for an unknown unit and for a wrong number of units.
     """
+    known = SIGNAL_QUANTITIES[signal].units
     listed = [names] * channels if isinstance(names, str) else list(names)
     if len(listed) != channels:
         raise InputError(f"units.{signal} in {where} should hold one unit or {channels}, not {len(listed)}")
     for name in listed:
-        if name not in UNITS_BY_SIGNAL[signal]:
-            hint = suggest_name(name, list(UNITS_BY_SIGNAL[signal]))
+        if name not in known:
+            hint = suggest_name(name, list(known))
             raise InputError(f"unknown unit '{name}' of {signal} in {where}: {hint}")
-    return tuple(UNITS_BY_SIGNAL[signal][name] for name in listed)
+    return tuple(known[name] for name in listed)

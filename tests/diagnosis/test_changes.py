@@ -10,13 +10,14 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from refusals import refusal
+from shipped_schemas import check_against_schema
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
 from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.report import comparison_content, comparison_lines, comparison_sentences
-from armlab.diagnosis.compare.structure import Change, predict_torque
+from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
+from armlab.diagnosis.compare.structure import Change
 from armlab.effects.contract import Scene
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
@@ -85,7 +86,7 @@ def test_the_old_model_predicts_its_own_robot() -> None:
     time = np.arange(800) / 200
     motion = motion_at(time, 77)
     zero = np.zeros(motion.position.shape)
-    torque = predict_torque(old, Scene("run", time, motion, ARM, ARM.parameters, zero))
+    torque = model_found(old).torque_in(Scene("run", time, motion, ARM, ARM.parameters, zero))
     truth = rigid_body_torque(ARM, motion) + np.array(VISCOUS) * motion.velocity
     truth += np.array([1.0, 1.5, 0.7]) * np.sign(motion.velocity)
     assert np.all(np.sqrt(np.mean((torque - truth) ** 2, axis=0)) < 0.1)
@@ -107,8 +108,8 @@ def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path)
 
 
 def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
-    content = json.loads(json.dumps(comparison_content(comparison("warm")), allow_nan=False))
-    assert content["schema"] == "comparison/1"
+    content = json.loads(make_comparison_file(comparison("warm")).to_json())
+    check_against_schema(content, "comparison")
     assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient"]
     assert content["against"]["status"] == "mismatch"
     text = " ".join(comparison_lines(comparison("warm")))

@@ -12,7 +12,7 @@ from random_arms import random_arm
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
 from problem.arm import Arm, Link
-from problem.inertia import link_from_centre_of_mass
+from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.transforms import rotation_x, translation
 
 MUJOCO = 1e-5  # N m: MuJoCo's text and its own arithmetic

@@ -7,7 +7,7 @@ import pytest
 from effect_scenes import candidate, scene
 
 from armlab.common.arrays import Array
-from problem.inertia import link_from_centre_of_mass
+from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
 
 WRONG: list[tuple[str, str, int | None, list[float], str]] = [

@@ -5,21 +5,20 @@ from dataclasses import replace
 from pathlib import Path
 
 import engine_cases as cases
-import jsonschema
 import numpy as np
 import pytest
 import yaml
+from shipped_schemas import check_against_schema
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.verdict_files import verdict_content, write_verdict
+from armlab.diagnosis.verdict_files import make_verdict, write_verdict
 from armlab.identification.identifier import Identifier
 from problem.motion import Motion
 from problem.robot_file import load_arm
 
 SLIGHT = 0.006  # N m s/rad: some ten standard errors of noise
-SCHEMAS = Path(__file__).parents[1] / "schemas"
 
 
 def viscous(motion: Motion, time: Array) -> Array:
@@ -70,21 +69,19 @@ def test_excess_error_is_located_at_the_guilty_joint(viscous_found: Diagnosis) -
 
 
 def test_verdict_is_valid_json_of_its_schema(viscous_found: Diagnosis) -> None:
-    schema = json.loads((SCHEMAS / "verdict.schema.json").read_text())
-    content = json.loads(json.dumps(verdict_content(viscous_found), allow_nan=False))
-    jsonschema.validate(content, schema)
+    check_against_schema(json.loads(make_verdict(viscous_found).to_json()), "verdict")
 
 
 def test_files_are_written_whole_and_the_model_follows_its_schema(viscous_found: Diagnosis, tmp_path: Path) -> None:
     write_verdict(viscous_found, tmp_path / "out")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["model.yaml", "verdict.json"]
     model = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())
-    jsonschema.validate(model, json.loads((SCHEMAS / "model.schema.json").read_text()))
+    check_against_schema(model, "model")
     assert [part["effect"] for part in model["components"]] == ["viscous_friction"]
 
 
 def test_the_same_seed_gives_the_same_verdict(viscous_found: Diagnosis) -> None:
-    assert verdict_content(diagnose(cases.recording(viscous))) == verdict_content(viscous_found)
+    assert make_verdict(diagnose(cases.recording(viscous))) == make_verdict(viscous_found)
 
 
 def test_friction_on_every_joint_of_an_arm_with_wrong_links_is_named_as_such() -> None:

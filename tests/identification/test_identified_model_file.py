@@ -1,12 +1,11 @@
-import json
 from functools import lru_cache
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 import yaml
 from numpy.testing import assert_allclose
+from shipped_schemas import check_against_schema
 from simulated_arm import arm, motion, run, structure, truth
 
 from armlab.common.errors import InputError
@@ -87,9 +86,8 @@ def test_the_filters_of_the_identification_are_kept_in_the_file(tmp_path: Path) 
 
 
 def test_a_model_file_follows_the_schema(tmp_path: Path) -> None:
-    schema = json.loads((Path(__file__).parents[1] / "schemas" / "model.schema.json").read_text())
     content = yaml.safe_load(model().save(tmp_path / "model.yaml").read_text())
-    jsonschema.validate(content, schema)
+    check_against_schema(content, "model")
     viscous = content["components"][0]
     assert viscous["effect"] == "viscous_friction"
     low, high = viscous["parameters"]["coefficient"]["ci95"]

@@ -1,17 +1,14 @@
 """The built-in arms against their sources, and the arithmetic of inertias that brought them into their frames."""
 
-import json
-from pathlib import Path
-
-import jsonschema
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from shipped_schemas import check_against_schema
 
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml
 from problem.arm import Link, link_poses
-from problem.inertia import (
+from problem.pseudo_inertia import (
     link_from_centre_of_mass,
     link_from_pseudo_inertia,
     pseudo_inertia_of,
@@ -20,7 +17,6 @@ from problem.inertia import (
 from problem.robot_file import BUILT_IN_FOLDER, built_in_arms, load_arm
 from problem.transforms import inverse, translation
 
-SCHEMA = Path(__file__).parents[1] / "schemas" / "robot.schema.json"
 BY_HAND = ("irb120-arm", "irb120-arm-eq49", "irb120")
 
 Row = tuple[float, tuple[float, float, float], tuple[float, float, float]]
@@ -109,7 +105,7 @@ def test_link_2_of_table_4_could_not_exist_if_its_inertia_were_about_the_frame()
 @pytest.mark.parametrize("name", built_in_arms())
 def test_every_built_in_arm_loads_and_keeps_the_schema(name: str) -> None:
     data = read_yaml(BUILT_IN_FOLDER / f"{name}.yaml")
-    jsonschema.validate(data, json.loads(SCHEMA.read_text()))
+    check_against_schema(data, "robot")
     assert load_arm(name).name == name
 
 

@@ -3,16 +3,15 @@
 The raw files are looked for in the folder that ARMLAB_RECORDINGS names and in the download cache.
 """
 
-import json
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 import yaml
 from numpy.testing import assert_allclose
 from public_copies import needs_copies
 from refusals import refusal
+from shipped_schemas import check_against_schema
 
 from armlab.cli.recordings import PUBLIC_RECORDING_NAMES
 from armlab.common.arrays import Array
@@ -88,8 +87,7 @@ def test_runs_that_validate_take_no_part_in_identification(recording: Recording)
 
 @NEEDS_COPIES
 def test_fetched_recordings_follow_the_schema(recording: Recording) -> None:
-    schema = json.loads((Path(__file__).parents[1] / "schemas" / "recording.schema.json").read_text())
-    jsonschema.validate(yaml.safe_load((recording.folder / FILE_NAME).read_text()), schema)
+    check_against_schema(yaml.safe_load((recording.folder / FILE_NAME).read_text()), "recording")
 
 
 @NEEDS_COPIES

@@ -1,20 +1,19 @@
 """Recording folders: what is read, in which unit, through which gears, and how mistakes are told."""
 
-import json
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
-import yaml
 from numpy.testing import assert_allclose, assert_array_equal
 from recording_folders import SETTINGS, folder_with, frame
 from refusals import refusal
+from shipped_schemas import check_against_schema
 
+from armlab.cli.recordings import ASKED_SIGNALS, OPTIONAL_SIGNALS
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording_file import FILE_NAME
-
-SCHEMA = json.loads((Path(__file__).parents[1] / "schemas" / "recording.schema.json").read_text())
+from armlab.recordings.recording import SIGNALS
+from armlab.recordings.recording_file import FILE_NAME, Columns
+from armlab.recordings.units import SIGNAL_QUANTITIES
 
 
 def test_a_sound_run_is_read_to_the_last_digit_without_a_word(tmp_path: Path) -> None:
@@ -128,11 +127,11 @@ def test_each_mistake_in_recording_yaml_is_told_in_one_line(tmp_path: Path, chan
     [
         ("", "empty"),
         ("t,q1,q2,q3,tau1,tau2,tau3\n", "holds no rows"),
-        ("t,q1,q1,q3,tau1,tau2,tau3\n1,2,3,4,5,6,7\n", "'q1' stands there twice"),
+        ("t,q1,q1,q3,tau1,tau2,tau3\n1,2,3,4,5,6,7\n", "'q1' appears twice"),
         ("t,q1,q2,q3,tau1,tau2,tau3\n1,2,3\n1,2,3,4,5,6,7\n", "line 2: 3 cells where the header has 7"),
         ("t,q1,q2,q3,tau1,tau2,tau3\n1,2,3,4,5,6,7,8\n", "line 2: 8 cells"),
         ("t,q1,q2,q3,tau1,tau2,tau3\n1,2,3,4,5,6,7\n", "at least 50 are needed"),
-        (b"\xff\xfe\x00\x01", "no UTF-8 text"),
+        (b"\xff\xfe\x00\x01", "not UTF-8 text"),
     ],
 )
 def test_each_mistake_in_a_run_file_is_told_in_one_line(tmp_path: Path, text: str | bytes, message: str) -> None:
@@ -143,5 +142,23 @@ def test_a_folder_without_recording_yaml_is_told_what_a_recording_is(tmp_path: P
     assert FILE_NAME in refusal(load_recording, tmp_path)
 
 
+def test_file_run_units_and_flags_know_the_same_signals() -> None:
+    named = set(Columns.model_fields)
+    assert named == set(SIGNAL_QUANTITIES) == {"time", "current", *SIGNALS}
+    assert named - {"current"} == {*ASKED_SIGNALS, *OPTIONAL_SIGNALS}
+
+
+def test_a_reference_velocity_passes_the_gears_and_a_voltage_belongs_to_no_joint(tmp_path: Path) -> None:
+    table = frame().assign(w1=1.0, w2=2.0, w3=3.0, supply=12000.0)
+    columns = {**SETTINGS["columns"], "reference_velocity": ["w1", "w2", "w3"], "voltage": ["supply"]}
+    units = {**SETTINGS["units"], "reference_velocity": "rad/s", "voltage": "mV"}
+    gears = {"transmission": {"position": np.diag([1.0, 0.5, 0.1]).tolist()}}
+    change = {"columns": columns, "units": units, "runs": SETTINGS["runs"][:1], **gears}
+    run = load_recording(folder_with(tmp_path, table, change)).runs[0]
+    assert run.reference_velocity is not None
+    assert_allclose(run.reference_velocity[0], [1.0, 1.0, 0.3])
+    assert_allclose(run.voltage, 12.0)
+
+
 def test_the_settings_that_the_tests_start_from_follow_the_schema() -> None:
-    jsonschema.validate(yaml.safe_load(yaml.safe_dump(SETTINGS)), SCHEMA)
+    check_against_schema(SETTINGS, "recording")

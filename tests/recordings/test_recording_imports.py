@@ -133,15 +133,15 @@ def test_a_truncated_mcap_file_is_refused_in_one_line(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"robot": None}, "which robot? Give --robot"),
+        ({"robot": None}, "the robot is missing: give --robot"),
         ({"robot": "irb130"}, "unknown robot"),
-        ({"position": None}, "which columns are position? Give --position; the file holds t, q1"),
+        ({"position": None}, "the columns of position are missing: give --position; the file holds t, q1"),
         ({"position": "q1,q2,q4"}, "no column 'q4' for position: known: t, q1, q2"),
         ({"units": ("time=s", "torque=Nm")}, "no unit is known for position: give --unit position=UNIT"),
         ({"units": ("position=degre",)}, "unknown unit 'degre' of position: did you mean 'deg'?"),
         ({"units": ("deg",)}, "should be SIGNAL=UNIT"),
         ({"gains": "1,x"}, "--gains 1,x should be numbers"),
-        ({"validate": ("b.csv",)}, "--validate b.csv is none of the imported files"),
+        ({"validate": ("b.csv",)}, "--validate b.csv should be one of the imported files"),
         ({"separator": ";", "decimal": ","}, "holds no rows of numbers"),
     ],
 )

@@ -9,7 +9,7 @@ import numpy as np
 from armlab.concealed.arms import Machine, with_body, with_longer_link, with_stretched_link, with_tilt
 from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues
 from problem.arm import Arm
-from problem.inertia import link_from_centre_of_mass
+from problem.pseudo_inertia import link_from_centre_of_mass
 
 
 class Payload(HiddenEffect):

@@ -4,13 +4,13 @@ against the model of the old one.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from armlab.common.errors import InputError
 from armlab.diagnosis.compare.structure import Change, changes_between
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.formats import ComparisonStatus
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Guards, Settings
@@ -21,7 +21,6 @@ from problem.arm import Arm
 from problem.pseudo_inertia import links_of
 
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
-ComparisonStatus = Literal["changed", "same", "inconclusive"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,11 @@
 these files.
 """
 
-import json
 import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from textwrap import wrap
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.structure import SIGNIFICANCE_LEVEL, Change
+from armlab.diagnosis.formats import COMPARISON_SCHEMA, ChangeEntry, ComparisonFile
 from armlab.diagnosis.report import sections
 from armlab.diagnosis.report.charts import (
     FOUND_LOOK,
@@ -41,10 +41,9 @@ from armlab.diagnosis.report.words import (
     place_in_words,
 )
 from armlab.diagnosis.settings import Baseline
-from armlab.diagnosis.verdict_files import check_output_folder, verdict_content
+from armlab.diagnosis.verdict_files import check_output_folder, make_verdict
 from armlab.recordings.load import load_recording
 
-COMPARISON_SCHEMA = "comparison/1"
 LINE_WIDTH = 110
 MAX_NAMED_CHANGES = 3
 
@@ -100,33 +99,33 @@ def comparison_lines(found: Comparison) -> Iterator[str]:
         yield f"  {len(found.changes) - len(changed)} of {len(found.changes)} parameters show no change (1 %, Holm)"
 
 
-def comparison_content(found: Comparison) -> dict[str, Any]:
-    """comparison/1; `against` is the verdict on the new recording with the old one's model as its simulation."""
-    return {
-        "schema": COMPARISON_SCHEMA,
-        "status": found.status,
-        "summary": " ".join(comparison_sentences(found)).strip(),
-        "old": found.old.recording.name,
-        "new": found.new.recording.name,
-        "level": SIGNIFICANCE_LEVEL,
-        "changes": [_change_content(each) for each in found.changes],
-        "against": None if found.against is None else verdict_content(found.against),
-    }
+def make_comparison_file(found: Comparison) -> ComparisonFile:
+    """The content of `comparison.json`."""
+    return ComparisonFile(
+        schema=COMPARISON_SCHEMA,
+        status=found.status,
+        summary=" ".join(comparison_sentences(found)).strip(),
+        old=found.old.recording.name,
+        new=found.new.recording.name,
+        level=SIGNIFICANCE_LEVEL,
+        changes=tuple(_change_entry(each) for each in found.changes),
+        against=None if found.against is None else make_verdict(found.against),
+    )
 
 
-def _change_content(each: Change) -> dict[str, Any]:
-    return {
-        "effect": each.effect,
-        "joint": each.joint,
-        "joints": list(each.joints),
-        "parameter": each.parameter,
-        "old": each.old,
-        "new": each.new,
-        "difference_ci95": list(each.interval),
-        "unit": each.unit,
-        "p_value": each.p_value,
-        "changed": each.changed,
-    }
+def _change_entry(each: Change) -> ChangeEntry:
+    return ChangeEntry(
+        effect=each.effect,
+        joint=each.joint,
+        joints=each.joints,
+        parameter=each.parameter,
+        old=each.old,
+        new=each.new,
+        difference_ci95=each.interval,
+        unit=each.unit,
+        p_value=each.p_value,
+        changed=each.changed,
+    )
 
 
 TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p (Holm)")
@@ -265,8 +264,10 @@ def compare_recordings(
         raise InputError(f"{old} and {new}: {error}") from None
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     command = shlex.join(["armlab", "diagnose", "--compare", str(old), str(new), "--out", str(out), *options])
-    content = json.dumps(comparison_content(found), indent=1, allow_nan=False) + "\n"
-    texts = {"comparison.json": content, "comparison.html": comparison_page(found, command)}
+    texts = {
+        "comparison.json": make_comparison_file(found).to_json(),
+        "comparison.html": comparison_page(found, command),
+    }
     write_texts(texts, out)
     yield from comparison_lines(found)
     yield f"wrote {out}: {', '.join(texts)}"

@@ -23,7 +23,7 @@ from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, find
 from armlab.diagnosis.next.problem import TellApartProblem, tell_apart_problem
 from armlab.diagnosis.next.question import Question
 from armlab.diagnosis.next.remedies import Remedy, find_remedies
-from armlab.diagnosis.next.verdict_file import RivalGroup, VerdictFile, read_verdict, select_rival_groups
+from armlab.diagnosis.next.verdict_file import RivalGroup, VerdictWithModel, read_verdict, select_rival_groups
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
@@ -103,7 +103,7 @@ def prepare_experiment(
     return prepare_questions(read, groups, arm, plain.trajectory, budget.duration, recording, kind, budget.seed), plain
 
 
-def infer_link_knowledge(verdict: VerdictFile, arm: Arm) -> LinkKnowledge:
+def infer_link_knowledge(verdict: VerdictWithModel, arm: Arm) -> LinkKnowledge:
     """How well links are known after a diagnosis: exactly where it left them as they were given."""
     if arm.links is None:
         return "free"
@@ -111,7 +111,7 @@ def infer_link_knowledge(verdict: VerdictFile, arm: Arm) -> LinkKnowledge:
 
 
 def choose_rival_groups(
-    verdict: VerdictFile,
+    verdict: VerdictWithModel,
     arm: Arm,
     plain: ExcitationProblem,
     recording: Recording | None,

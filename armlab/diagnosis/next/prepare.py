@@ -35,7 +35,7 @@ from armlab.diagnosis.next.rivals import (
     usual_friction,
 )
 from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_noise_sampling
-from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictFile
+from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictWithModel
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.library import effect_named, library
@@ -93,7 +93,7 @@ class PreparedQuestions:
 
 
 def prepare_questions(
-    verdict: VerdictFile,
+    verdict: VerdictWithModel,
     groups: tuple[RivalGroup, ...],
     arm: Arm,
     trajectory: Trajectory,
@@ -257,7 +257,7 @@ RESIDUAL_SEARCH_EFFECTS = (
 
 
 def find_nearby_names(
-    verdict: VerdictFile,
+    verdict: VerdictWithModel,
     arm: Arm,
     trajectory: Trajectory,
     duration: float,
@@ -287,7 +287,7 @@ def _search_lead(near: tuple[Name, float]) -> float:
     return near[1]
 
 
-def _candidate_names(finding: Finding, verdict: VerdictFile, arm: Arm) -> list[Name]:
+def _candidate_names(finding: Finding, verdict: VerdictWithModel, arm: Arm) -> list[Name]:
     """Everything of the library at the finding's joint, at its link, and of the whole robot."""
     joint = finding.name.joint
     joints: Sequence[int] = range(1, len(arm) + 1) if joint is None else (joint,)

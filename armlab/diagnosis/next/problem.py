@@ -4,7 +4,7 @@ a configuration.
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt
@@ -18,7 +18,7 @@ from armlab.diagnosis.next.moments import Moments
 from armlab.diagnosis.next.motion import Budget, build_excitation_problem
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
 from armlab.diagnosis.next.question import Name
-from armlab.diagnosis.next.verdict_file import Finding, VerdictFile
+from armlab.diagnosis.next.verdict_file import Finding, VerdictWithModel
 from armlab.effects.library import EFFECT_IDS
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
@@ -148,11 +148,10 @@ class TellApartSettings(Settings):
             raise InputError(f"tell-apart: {error}") from None
         return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
 
-    def _verdict(self, arm: Arm) -> VerdictFile:
+    def _verdict(self, arm: Arm) -> VerdictWithModel:
         """What a diagnosis would have said."""
         first, *others = (Name(each.effect, each.joint) for each in self.rivals)
-        parameters: dict[str, Any] = dict(self.rivals[0].parameters)
+        parameters = dict(self.rivals[0].parameters)
         finding = Finding(first, () if first.joint is None else (first.joint,), parameters, tuple(others))
         noise = np.array(per_joint_values("noise", self.noise, arm))
-        model = {"provenance": {"cutoff_hz": self.cutoff_hz}}
-        return VerdictFile(Path("tell-apart"), (finding,), noise, model)
+        return VerdictWithModel(Path("tell-apart"), (finding,), noise, self.cutoff_hz)

@@ -2,20 +2,18 @@
 names.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.common.settings import read_yaml
+from armlab.diagnosis.formats import FindingEntry, Value, read_verdict_file
 from armlab.diagnosis.next.question import Name
-from armlab.diagnosis.verdict_files import VERDICT_SCHEMA
 from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.identification.model_file import read_model_file
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 
@@ -26,74 +24,71 @@ class Finding:
 
     name: Name
     joints: tuple[int, ...]
-    parameters: dict[str, Any]
+    parameters: dict[str, Value]
     rivals: tuple[Name, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class VerdictFile:
-    """noise: (joints,), N m, of the filtered torque. cutoff_hz: of the filter, None where the model does not say."""
+class VerdictWithModel:
+    """A verdict with the model beside it. noise: (joints,), N m, of the filtered torque.
+
+    cutoff_hz: of the filter of the diagnosis. links: inertial parameters that were found, (10 * joints,).
+    base_values: base parameters that were found, (base,). Each is None where no model says it.
+    """
 
     path: Path
     findings: tuple[Finding, ...]
     noise: Array
-    model: dict[str, Any] | None
-
-    @property
-    def cutoff_hz(self) -> float | None:
-        """Of the filter, None where the model does not say."""
-        found = (self.model or {}).get("provenance", {}).get("cutoff_hz")
-        return None if found is None else float(found)
+    cutoff_hz: float | None = None
+    links: Array | None = None
+    base_values: Array | None = None
 
     def inertial(self, arm: Arm) -> Array:
         """Inertial parameters (10 * joints,) that were found, else those of the arm; InputError where none are."""
-        links = (self.model or {}).get("links")
-        if links and len(links) == len(arm):
-            return np.concatenate([[each["mass"], *each["first_moment"], *each["inertia"]] for each in links])
+        if self.links is not None and len(self.links) == 10 * len(arm):
+            return self.links
         base = base_parameters(arm)
-        values = (self.model or {}).get("base_parameters", {}).get("values")
-        if values and len(values) == len(base):
+        if self.base_values is not None and len(self.base_values) == len(base):
             out = np.zeros(10 * len(arm))
-            out[base.columns] = values
+            out[base.columns] = self.base_values
             return out
         if arm.links is None:
             raise InputError(f"{self.path}: neither model.yaml beside it nor the robot has inertial parameters")
         return arm.parameters
 
 
-def read_verdict(path: Path) -> VerdictFile:
-    """The verdict in a file or a folder; InputError, in one line, for what is no verdict."""
+def read_verdict(path: Path) -> VerdictWithModel:
+    """The verdict in a file or a folder, with the model.yaml beside it.
+
+    Raises InputError, in one line, for a file that is no verdict or no model.
+    """
     file = path / "verdict.json" if path.is_dir() else path
-    try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read the verdict {file}: {error}") from None
-    if not isinstance(content, dict) or content.get("schema") != VERDICT_SCHEMA:
-        raise InputError(f"{file} is no verdict: its 'schema' should be {VERDICT_SCHEMA}")
+    verdict = read_verdict_file(file)
+    findings = tuple(_read_finding(each) for each in verdict.findings)
+    noise = np.array([each.noise_floor for each in verdict.fit], dtype=np.float64)
     beside = file.with_name("model.yaml")
-    model = read_yaml(beside) if beside.is_file() else None
-    try:
-        findings = tuple(_parse_finding(each) for each in content["findings"])
-        noise = np.array([each["noise_floor"] for each in content["fit"]], dtype=np.float64)
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{file} is no whole verdict: {error} is missing or of another form") from None
-    return VerdictFile(file, findings, noise, model)
+    if not beside.is_file():
+        return VerdictWithModel(file, findings, noise)
+    model = read_model_file(beside)
+    cutoff_hz = model.provenance.get("cutoff_hz")
+    if not isinstance(cutoff_hz, float | int | None):
+        raise InputError(f"provenance.cutoff_hz in {beside} should be a number, not {cutoff_hz!r}")
+    tens = [[each.mass, *each.first_moment, *each.inertia] for each in model.links or ()]
+    links = np.concatenate(tens) if tens else None
+    base_values = None if model.base_parameters is None else np.array(model.base_parameters.values)
+    return VerdictWithModel(file, findings, noise, cutoff_hz, links, base_values)
 
 
-def _parse_finding(each: dict[str, Any]) -> Finding:
-    parameters = {name: _parse_value(entry["value"]) for name, entry in each["parameters"].items()}
-    rivals = tuple(Name(rival["effect"], rival["joint"]) for rival in each["rivals"])
-    return Finding(Name(each["effect"], each["joint"]), tuple(each["joints"]), parameters, rivals)
-
-
-def _parse_value(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def _read_finding(entry: FindingEntry) -> Finding:
+    parameters = {name: each.value for name, each in entry.parameters.items()}
+    rivals = tuple(Name(each.effect, each.joint) for each in entry.rivals)
+    return Finding(Name(entry.effect, entry.joint), entry.joints, parameters, rivals)
 
 
 RivalGroup = tuple[Name, ...]
 
 
-def select_rival_groups(verdict: VerdictFile, named: str | None) -> tuple[RivalGroup, ...]:
+def select_rival_groups(verdict: VerdictWithModel, named: str | None) -> tuple[RivalGroup, ...]:
     """Groups of names of which one is right, the finding first; InputError where there is nothing to decide.
 
     named: like `viscous_friction,time_delay` or `viscous_friction@2,coulomb_friction@2`.
@@ -114,7 +109,7 @@ def _names_of_finding(finding: Finding) -> RivalGroup:
     return tuple(dict.fromkeys((finding.name, *finding.rivals)))
 
 
-def _parse_rivals(verdict: VerdictFile, named: str) -> RivalGroup:
+def _parse_rivals(verdict: VerdictWithModel, named: str) -> RivalGroup:
     parts = [part.strip().partition("@") for part in named.split(",")]
     if len(parts) < 2:
         raise InputError(f"--rivals {named}: should be two names or more, like viscous_friction@2,time_delay")
@@ -122,7 +117,7 @@ def _parse_rivals(verdict: VerdictFile, named: str) -> RivalGroup:
     return tuple(dict.fromkeys(_parse_rival_name(effect, joint, place, verdict) for effect, _, joint in parts))
 
 
-def _parse_rival_name(effect: str, joint: str, place: int | None, verdict: VerdictFile) -> Name:
+def _parse_rival_name(effect: str, joint: str, place: int | None, verdict: VerdictWithModel) -> Name:
     if effect not in EFFECT_IDS or effect == "unknown":
         try:
             effect_named(effect)

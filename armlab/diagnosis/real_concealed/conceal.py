@@ -18,8 +18,8 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import differentiate, resample_evenly
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
-from problem.inertia import link_from_centre_of_mass
 from problem.motion import Motion
+from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
 
 MIXED_LAWS = ("direction", "cube root", "square", "load")

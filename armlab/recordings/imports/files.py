@@ -15,7 +15,7 @@ from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 from armlab.recordings.table import Table, read_table
-from armlab.recordings.units import SI_UNITS, UNITS_BY_SIGNAL
+from armlab.recordings.units import SIGNAL_QUANTITIES
 from problem.robot_file import built_in_arms, load_arm
 
 BAG_SUFFIXES = (".db3", ".mcap", ".bag")
@@ -25,7 +25,7 @@ BAG_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N.m"}
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """What a person may have to say about a file: layout of a text, topic of a bag."""
+    """How to read a file, where the file does not tell: layout of a text, topic of a bag."""
 
     separator: str | None = None
     decimal: str | None = None
@@ -34,7 +34,7 @@ class ReadOptions:
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """What a file holds: its columns, units where it names some, and a line on how it was read."""
+    """Content of a file: its columns, the units that it names, and a line on how it was read."""
 
     table: Table
     units: dict[str, str]
@@ -89,7 +89,7 @@ COLUMN_NAME_PATTERNS = {
 
 @dataclass(frozen=True)
 class Assignment:
-    """What a person says of the columns: names of each signal, units by signal, and the transmission's gains."""
+    """What the user gives: column names of each signal, units of signals, and the gains of the transmission."""
 
     columns: Mapping[str, Sequence[str]]
     units: Mapping[str, str] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class Assignment:
 
 
 def guess_columns(names: Sequence[str], signal: str) -> tuple[str, ...]:
-    """Columns that look like a signal by their name: offered as an answer, never taken silently."""
+    """Columns whose names look like a signal: the default answer to a question, not used without asking."""
     found = tuple(
         name for name in names if re.fullmatch(COLUMN_NAME_PATTERNS[signal], name.split(".")[-1], re.IGNORECASE)
     )
@@ -107,8 +107,8 @@ def guess_columns(names: Sequence[str], signal: str) -> tuple[str, ...]:
 def assemble_draft(sources: Mapping[str, Source], robot: str, assignment: Assignment, validate: Sequence[str]) -> Draft:
     """The draft of a recording from read files.
 
-    sources: by the path that was given. validate: those that validate. Raises InputError for a column that a
-    file does not have and for an unknown unit.
+    sources: by the path that was given. validate: paths of the runs with the role validate.
+    Raises InputError for a column that a file does not have and for an unknown unit.
     """
     columns: Keys = {
         signal: names[0] if signal == "time" else tuple(names) for signal, names in assignment.columns.items()
@@ -128,25 +128,29 @@ def assemble_draft(sources: Mapping[str, Source], robot: str, assignment: Assign
 
 
 def _choose_units(found: Mapping[str, str], assignment: Assignment) -> Keys:
-    """Units of each signal: as the person says, else as the file says of its columns."""
+    """Units of each signal: those that the user gives, else those that the file names."""
     units: Keys = {}
     for signal, names in assignment.columns.items():
-        said = assignment.units.get(signal)
-        listed = [parse_unit(signal, said)] * len(names) if said else [found.get(name) for name in names]
+        given = assignment.units.get(signal)
+        listed = [parse_unit(signal, given)] * len(names) if given else [found.get(name) for name in names]
         if any(unit is None for unit in listed):
-            raise InputError(
-                f"no unit is known for {signal}: give --unit {signal}=UNIT ({', '.join(UNITS_BY_SIGNAL[signal])})"
-            )
+            raise _missing_unit(signal)
         checked = tuple(parse_unit(signal, str(unit)) for unit in listed)
         units[signal] = checked[0] if len(set(checked)) == 1 else checked
     return units
 
 
+def _missing_unit(signal: str) -> InputError:
+    known = ", ".join(SIGNAL_QUANTITIES[signal].units)
+    return InputError(f"no unit is known for {signal}: give --unit {signal}=UNIT ({known})")
+
+
 def parse_unit(signal: str, name: str) -> str:
     """The unit as `recording.yaml` writes it; InputError for an unknown one."""
     unit = UNIT_ALIASES.get(name.strip(), name.strip())
-    if unit not in UNITS_BY_SIGNAL[signal]:
-        raise InputError(f"unknown unit '{name}' of {signal}: {suggest_name(unit, list(UNITS_BY_SIGNAL[signal]))}")
+    known = list(SIGNAL_QUANTITIES[signal].units)
+    if unit not in known:
+        raise InputError(f"unknown unit '{name}' of {signal}: {suggest_name(unit, known)}")
     return unit
 
 
@@ -156,11 +160,11 @@ SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semic
 
 
 def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], ask: Ask | None) -> list[str]:
-    """Writes the recording and returns lines that say how each file was read.
+    """Writes the recording and returns lines that tell how each file was read.
 
-    options: robot, the columns of each signal, units, gains, validate, separator, decimal, topic; None where
-    they were not given. ask: how to ask for what is missing. Raises InputError for what is missing where
-    nobody can be asked, and for what is wrong.
+    options: robot, the columns of each signal, units, gains, validate, separator, decimal, topic; None if not given.
+    ask: asks the user for a missing option.
+    Raises InputError for a wrong option, and for a missing one if `ask` is None.
     """
     separator = options["separator"]
     reading = ReadOptions(SEPARATOR_WORDS.get(separator, separator), options["decimal"], options["topic"])
@@ -171,12 +175,12 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     validate = [str(path) for path in options["validate"]]
     unknown = sorted(set(validate) - set(sources))
     if unknown:
-        raise InputError(f"--validate {unknown[0]} is none of the imported files")
+        raise InputError(f"--validate {unknown[0]} should be one of the imported files")
     draft = assemble_draft(sources, robot, assignment, validate)
     write_recording(draft, out)
     return [
         *(_describe_source(path, source) for path, source in sources.items()),
-        f"{out}: written; look at it with `check`",
+        f"{out}: written; `armlab recording check {out}` examines it",
     ]
 
 
@@ -188,7 +192,8 @@ def _describe_source(path: str, source: Source) -> str:
 def _choose_robot(given: str | None, ask: Ask | None) -> str:
     robot = given or (ask(f"robot ({', '.join(built_in_arms())}, or a file)", None) if ask else None)
     if robot is None:
-        raise InputError(f"which robot? Give --robot: one of {', '.join(built_in_arms())}, or the path of a file")
+        known = ", ".join(built_in_arms())
+        raise InputError(f"the robot is missing: give --robot with one of {known}, or with the path of a robot file")
     load_arm(robot)
     return robot if robot in built_in_arms() else str(Path(robot).resolve())
 
@@ -196,7 +201,7 @@ def _choose_robot(given: str | None, ask: Ask | None) -> str:
 def _make_assignment(source: Source, options: Mapping[str, Any], ask: Ask | None) -> Assignment:
     units = dict(_parse_unit_option(text) for text in options["units"])
     columns: dict[str, tuple[str, ...]] = {}
-    for signal in SI_UNITS:
+    for signal in SIGNAL_QUANTITIES:
         given = options.get(signal)
         if given is None and signal in ASKED_SIGNALS:
             given = _ask_columns(source, signal, ask)
@@ -212,17 +217,16 @@ def _ask_columns(source: Source, signal: str, ask: Ask | None) -> str:
     names = source.table.names
     if ask is None:
         shown = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
-        raise InputError(f"which columns are {signal}? Give --{signal}; the file holds {shown}")
+        raise InputError(f"the columns of {signal} are missing: give --{signal}; the file holds {shown}")
     guess = ",".join(guess_columns(names, signal)) or None
     return ask(f"column(s) of {signal}, of {', '.join(names)}", guess)
 
 
 def _ask_unit(signal: str, ask: Ask | None) -> str:
     if ask is None:
-        raise InputError(
-            f"no unit is known for {signal}: give --unit {signal}=UNIT ({', '.join(UNITS_BY_SIGNAL[signal])})"
-        )
-    return parse_unit(signal, ask(f"unit of {signal} ({', '.join(UNITS_BY_SIGNAL[signal])})", SI_UNITS[signal][0]))
+        raise _missing_unit(signal)
+    quantity = SIGNAL_QUANTITIES[signal]
+    return parse_unit(signal, ask(f"unit of {signal} ({', '.join(quantity.units)})", quantity.si[0]))
 
 
 def _expand_names(given: str, names: Sequence[str], signal: str) -> tuple[str, ...]:
@@ -238,8 +242,8 @@ def _expand_names(given: str, names: Sequence[str], signal: str) -> tuple[str, .
 
 def _parse_unit_option(text: str) -> tuple[str, str]:
     signal, sign, unit = text.partition("=")
-    if not sign or signal not in UNITS_BY_SIGNAL:
-        raise InputError(f"--unit {text} should be SIGNAL=UNIT: {suggest_name(signal, list(UNITS_BY_SIGNAL))}")
+    if not sign or signal not in SIGNAL_QUANTITIES:
+        raise InputError(f"--unit {text} should be SIGNAL=UNIT: {suggest_name(signal, list(SIGNAL_QUANTITIES))}")
     return signal, parse_unit(signal, unit)
 
 

@@ -23,14 +23,14 @@ from armlab.common.errors import InputError
 from armlab.recordings.table import Table
 
 READER_MODULE = "armlab.recordings.imports.matlab"
-MIN_SIGNAL_SAMPLES = 10  # samples; what is shorter is a setting, not a signal
+MIN_SIGNAL_SAMPLES = 10  # samples; a shorter array is a setting, not a signal
 
 
 def read_mat(path: Path) -> Table:
     """Columns named like `rec.act_pos_deg_1`: the variable, its fields, and the number of the channel.
 
     The signals are those whose length most variables share; a matrix may hold its samples in rows or columns.
-    Raises InputError for what is no .mat file, for version 7.3, and for a file without signals.
+    Raises InputError for a file that is not a .mat file, for version 7.3, and for a file without signals.
     """
     found = _read_arrays_in_process(path)
     lengths = [size for _, array in found for size in array.shape if size >= MIN_SIGNAL_SAMPLES]
@@ -45,7 +45,7 @@ def read_mat(path: Path) -> Table:
 
 
 def _read_arrays_in_process(path: Path) -> list[tuple[str, Array]]:
-    """Numeric arrays by name, read by a process that a broken file may take down."""
+    """Numeric arrays by name, read by a process of its own, which a broken file may crash."""
     with TemporaryDirectory() as folder:
         out = Path(folder) / "arrays.npz"
         command = [sys.executable, "-m", READER_MODULE, str(path), str(out)]
@@ -53,7 +53,7 @@ def _read_arrays_in_process(path: Path) -> list[tuple[str, Array]]:
         if done.returncode == REFUSED_EXIT_CODE:
             raise InputError(done.stderr.splitlines()[-1])
         if done.returncode:
-            raise InputError(f"cannot read {path} as a .mat file: its content takes the reader down; is it damaged?")
+            raise InputError(f"cannot read {path} as a .mat file: its content crashes the reader; is the file damaged?")
         with np.load(out) as content:
             return [(str(name), content[f"array{index}"]) for index, name in enumerate(content["names"])]
 
@@ -86,7 +86,7 @@ REFUSED_EXIT_CODE = 2  # exit code; the reason stands in the last line of the st
 def read_numeric_arrays(path: Path) -> list[tuple[str, Array]]:
     """Vectors and matrices of numbers, named by the path of field names that leads to each.
 
-    Raises InputError for what is no .mat file, and for version 7.3.
+    Raises InputError for a file that is not a .mat file, and for version 7.3.
     """
     return list(_iterate_arrays(_load_content(path)))
 

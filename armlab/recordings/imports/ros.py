@@ -41,9 +41,9 @@ class JointState:
 def read_bag(path: Path, topic: str | None = None) -> Table:
     """Columns `t` (s, from the first message) and `position_`, `velocity_`, `effort_` plus the joint's name.
 
-    path: a .db3, .mcap or .bag file, or the folder of a ROS 2 bag. topic: needed where several topics carry
+    path: a .db3, .mcap or .bag file, or the folder of a ROS 2 bag. topic: needed if several topics carry
     joint states. The stamps are those of the headers, or the times of recording where the headers have none.
-    What a message leaves out is NaN. Raises InputError for what is no bag or has no joint states.
+    Values that a message leaves out are NaN. Raises InputError for a file that is not a bag or has no joint states.
     """
     messages = _read_messages(path, topic)
     if not messages:

@@ -34,7 +34,7 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """A table with what else the file said: its layout, and the unit of each column where it names one."""
+    """A table with the layout of the file, and the units that the file names."""
 
     table: Table
     layout: Layout
@@ -92,12 +92,12 @@ def _split_lines(text: str, layout: Layout, where: str) -> NumberedRows:
     return [
         (line, _drop_empty_last_cell(cells))
         for line, cells in rows
-        if not (line in comments and _is_data(cells, layout))  # numbers in a comment are no measurement
+        if not (line in comments and _is_data(cells, layout))  # numbers in a comment are not measurements
     ]
 
 
 def _drop_empty_last_cell(cells: list[str]) -> list[str]:
-    """A separator at the end of a line opens no cell."""
+    """A separator at the end of a line does not start another cell."""
     return cells[:-1] if len(cells) > 1 and not cells[-1].strip() else cells
 
 
@@ -111,7 +111,7 @@ def _parse_cells(cells: list[str], layout: Layout) -> Array:
 
 
 def _to_decimal_point(cell: str) -> str:
-    """A number with a decimal comma; one with a point is none then (a thousands separator?)."""
+    """A number with a decimal comma; a cell with a point is refused: the point may separate thousands."""
     return cell.replace(",", ".") if "." not in cell else "not a number"
 
 
@@ -119,7 +119,9 @@ def _parse_header(lines: list[list[str]], width: int) -> tuple[tuple[str, ...], 
     """Names and units from the rows above the numbers: `q1 [deg]`, or a row of units below the names."""
     if not lines:
         return tuple(f"c{column + 1}" for column in range(width)), {}
-    names, units = zip(*(_split_unit(cell) for cell in lines[0]), strict=True)
+    cells = [_split_unit(cell) for cell in lines[0]]
+    names = tuple(name for name, _ in cells)
+    units = tuple(unit for _, unit in cells)
     below = [_strip_brackets(cell) for cell in lines[1]] if len(lines) > 1 else [""] * width
     unique = tuple(_make_unique(names))
     return unique, {

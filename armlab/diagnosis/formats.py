@@ -1,0 +1,238 @@
+"""What a diagnosis and a comparison write: verdict/1 (`verdict.json`) and comparison/1 (`comparison.json`).
+
+Each format is one model. Whoever writes the file builds the model; whoever reads the file gets it back. The JSON
+Schemas in `armlab/schemas` are generated from these models.
+"""
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+from annotated_types import Ge, Le
+from pydantic import BaseModel, ConfigDict, Field
+
+from armlab.common.errors import InputError
+from armlab.common.settings import validate
+from armlab.effects.contract import Effect
+from armlab.effects.library import EFFECT_IDS
+
+VERDICT_SCHEMA: Final = "verdict/1"
+COMPARISON_SCHEMA: Final = "comparison/1"
+
+Status = Literal["mismatch", "none", "inconclusive"]
+ComparisonStatus = Literal["changed", "same", "inconclusive"]
+FindingKind = Literal["physics", "setup", "link", "unknown"]
+EffectName = Annotated[
+    str,
+    Field(
+        description="An id of the vocabulary of effects, or the name of a user's own effect.", examples=list(EFFECT_IDS)
+    ),
+]
+JointNumber = Annotated[int, Ge(1)]
+Share = Annotated[float, Ge(0), Le(1)]
+Value = float | tuple[float, ...]
+
+
+def kind_of_effect(effect: Effect) -> FindingKind:
+    """The kind of a finding with this effect."""
+    if effect.id == "unknown":
+        return "unknown"
+    return "link" if effect.where == "link" else "physics"
+
+
+class Entry(BaseModel):
+    """Base of all parts of these formats: frozen, strict, finite numbers.
+
+    Keys of a later version are ignored when a file is read. Keys that were not set are not written.
+    """
+
+    model_config = ConfigDict(extra="ignore", frozen=True, strict=True, allow_inf_nan=False)
+
+    def content(self) -> dict[str, Any]:
+        """The entry as JSON holds it, with the keys that were set."""
+        return self.model_dump(mode="json", by_alias=True, exclude_unset=True)
+
+    def to_json(self) -> str:
+        """The text of the file."""
+        return json.dumps(self.content(), indent=1, allow_nan=False) + "\n"
+
+
+class ParameterEntry(Entry):
+    """A parameter in SI units with its 95 % interval: one pair, or one for each component of a vector."""
+
+    value: Value
+    ci95: tuple[Value, ...] | None
+    unit: str
+
+
+class WhereEntry(Entry):
+    """Where an error is large. variable: the one that orders it best. time: a stretch of the run, s."""
+
+    variable: str | None
+    regime: str
+    runs: tuple[str, ...] = ()
+    time: tuple[float, float] | None = None
+
+
+class LocatedEntry(Entry):
+    """A joint with excess error. share: of the excess error of all joints."""
+
+    joint: JointNumber | None
+    share: Share
+    where: WhereEntry
+
+
+class RivalEntry(Entry):
+    """Another effect that these data cannot tell from the finding; joint: null for an effect of the whole robot."""
+
+    effect: EffectName
+    joint: JointNumber | None
+
+
+class ClassMember(Entry):
+    """One member of a class of names that the data leave open."""
+
+    effect: EffectName
+    joint: JointNumber | None
+    probability: Share
+
+
+class FindingEntry(Entry):
+    """One named difference between simulation and robot.
+
+    kind: `physics` (an effect of the library), `setup` (the recording or the robot file is read wrongly), `link`
+    (payload, inertial parameters) or `unknown`; the first verdicts do not have this key.
+    joint: from 1, the link for kind `link`, null for the whole robot. joints: of a coupling, where the torque appears
+    and where the motion is. heldout_rms: N m (N), without and with the finding. p_value: corrected for all comparisons.
+    form: the law or the quantity. share_of_gap: of the held-out error above the noise. probability: of the name.
+    class: effects and joints with their probabilities.
+    """
+
+    effect: EffectName
+    kind: FindingKind | None = None
+    joint: JointNumber | None
+    joints: tuple[JointNumber, ...] = ()
+    form: str | None = None
+    parameters: dict[str, ParameterEntry]
+    equation: str
+    heldout_rms_before: float
+    heldout_rms_after: float
+    p_value: float | None = None
+    share_of_gap: float | None = None
+    probability: Share | None = None
+    class_: tuple[ClassMember, ...] | None = Field(default=None, alias="class")
+    rivals: tuple[RivalEntry, ...]
+    next_experiment: str | None = None
+
+
+class UnexplainedEntry(Entry):
+    """Structure of a joint that no effect explains. depends_on: variables such as `position_1`."""
+
+    joint: JointNumber | None
+    share: float
+    depends_on: tuple[str, ...]
+
+
+class FitEntry(Entry):
+    """Held-out error of a joint, N m (N): before, with the model found, and of the noise alone.
+
+    gap_closed: 1 where the model reaches the noise; null where there was no gap. named: with the named effects alone,
+    without a surrogate of an unknown. identify: of a plain identification of the same recording. replay: error of the
+    position, rad (m), when the commands are sent through the simulation.
+    """
+
+    joint: JointNumber
+    heldout_rms_before: float
+    heldout_rms_after: float
+    heldout_rms_named: float | None = None
+    heldout_rms_identify: float | None = None
+    noise_floor: float
+    gap_closed: float | None
+    replay_rms_before: float | None = None
+    replay_rms_after: float | None = None
+
+
+class StoryEntry(Entry):
+    """Findings with one cause. findings: their places in the list `findings`, from 0."""
+
+    cause: str
+    joints: tuple[JointNumber, ...]
+    share_of_gap: float
+    findings: tuple[Annotated[int, Ge(0)], ...]
+
+
+class VerdictFile(Entry):
+    """The content of `verdict.json` (schema verdict/1).
+
+    status: `none` where the simulation explains the recording down to the noise; the reason of `inconclusive` stands in
+    the summary. story: groups of findings, largest first.
+    """
+
+    schema_: Literal["verdict/1"] = Field(alias="schema")
+    status: Status
+    summary: str
+    story: tuple[StoryEntry, ...] | None = None
+    located: tuple[LocatedEntry, ...]
+    findings: tuple[FindingEntry, ...]
+    unexplained: tuple[UnexplainedEntry, ...]
+    fit: tuple[FitEntry, ...]
+
+
+class ChangeEntry(Entry):
+    """One parameter in both recordings. effect: `base_parameter` for one of the rigid body, named by its sum.
+
+    difference_ci95: 95 % interval of new minus old. p_value: of no difference, corrected for all parameters.
+    """
+
+    effect: str
+    joint: JointNumber | None
+    joints: tuple[JointNumber, ...]
+    parameter: str
+    old: float
+    new: float
+    difference_ci95: tuple[float, float]
+    unit: str
+    p_value: float
+    changed: bool
+
+
+class DetectableEntry(Entry):
+    """The smallest change of a parameter that the two recordings would show."""
+
+    effect: str
+    joint: JointNumber | None
+    parameter: str
+    change: float
+    unit: str
+
+
+class ComparisonFile(Entry):
+    """The content of `comparison.json` (schema comparison/1).
+
+    old, new: names of the recordings. level: a parameter changed where its p-value is below it. findings: what changed,
+    parameters as changes. against: the verdict on the new recording with the model of the old one as its simulation.
+    """
+
+    schema_: Literal["comparison/1"] = Field(alias="schema")
+    status: ComparisonStatus
+    summary: str
+    old: str
+    new: str
+    level: float
+    findings: tuple[FindingEntry, ...] | None = None
+    changes: tuple[ChangeEntry, ...]
+    smallest_detectable: tuple[DetectableEntry, ...] | None = None
+    against: VerdictFile | None
+
+
+def read_verdict_file(path: Path) -> VerdictFile:
+    """The checked content of a `verdict.json`; InputError, in one line, where it is wrong."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read the verdict {path}: {error.strerror}") from None
+    except ValueError as error:
+        raise InputError(f"cannot read the verdict {path}: it is not valid JSON: {error}") from None
+    if not isinstance(content, dict) or content.get("schema") != VERDICT_SCHEMA:
+        raise InputError(f"{path} is no verdict: its key 'schema' should be {VERDICT_SCHEMA}")
+    return validate(VerdictFile, content, str(path))
