@@ -18,6 +18,7 @@ from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.compare.structure import Change
+from armlab.diagnosis.found_model import model_found
 from armlab.effects.contract import Scene
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
