@@ -1,10 +1,10 @@
 # armlab. `make table3` and `make test` do everything on a machine with Python 3.11, git, make and gcc.
 PYTHON ?= python3
 BIN := .venv/bin
-KERNEL := problem/kernel.c problem/kernel_build.py
+COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real test lint speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real test lint structure speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -17,7 +17,7 @@ install-dev: .venv/dev ## what the tests need too
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
 
-.venv/run: requirements/run.lock pyproject.toml setup.py $(KERNEL) | .venv/bin/python
+.venv/run: requirements/run.lock pyproject.toml setup.py $(COMPILED) | .venv/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
@@ -76,6 +76,9 @@ lint: .venv/dev ## style, types and import contracts
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+structure: .venv/dev ## figures of the source tree: files, lines, modules that a diagnosis loads
+	$(BIN)/python tools/structure.py
+
 regression: .venv/dev ## the best condition numbers against the committed baseline
 	$(BIN)/armlab regression
 
@@ -84,5 +87,5 @@ fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in
 	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
 
 clean: ## everything that was made here, the environment included
-	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so
+	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

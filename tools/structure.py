@@ -1,0 +1,100 @@
+"""Figures of the structure of a source tree: `python tools/structure.py [TREE]`; TREE is this repository if left out.
+
+Files and lines without tests, modules that only one other module imports, modules that a diagnosis loads, functions
+that are named by a participle, and files outside the library of effects that name an effect.
+"""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from collections import defaultdict
+from pathlib import Path
+
+ROOTS = ("problem", "algorithms", "bench", "armlab", "recordings", "identification", "diagnosis", "concealed")
+IRREGULAR = set(
+    "begun bent bound broken built bought cast caught chosen cut dealt drawn driven fed felt fitted found given gone "
+    "grown held hidden kept known laid led left lent let lost made meant met paid put read risen run said seen sent set "
+    "shown shut spent split spoken stood sunk taken taught thrown told understood withdrawn won worn written".split()
+)
+NOT_PARTICIPLES = {"cut", "put", "read", "run", "set", "split", "let", "left", "bound", "seed", "speed", "need", "feed"}
+LIBRARIES = ("armlab/effects/", "diagnosis/effects/", "recordings/vocabulary", "armlab/concealed/", "concealed/")
+
+
+def main() -> None:
+    """Prints the figures."""
+    tree = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).resolve().parents[1])
+    files = sorted(path for root in ROOTS for path in (tree / root).rglob("*.py"))
+    sources = {path.relative_to(tree): path.read_text(encoding="utf-8") for path in files}
+    trees = {path: ast.parse(text) for path, text in sources.items()}
+    print(f"files: {len(files)}")
+    print(f"lines: {sum(text.count(chr(10)) for text in sources.values())}")
+    importers = importers_of(trees)
+    print(f"modules with one importer: {sum(len(each) == 1 for each in importers.values())}")
+    print(f"functions named by a participle: {sum(count_participles(each) for each in trees.values())}")
+    naming = files_naming_an_effect(sources)
+    print(f"files outside the library (and the truth machine) that name an effect: {len(naming)}")
+    print(f"modules that a diagnosis loads: {modules_of_a_diagnosis(tree)}")
+
+
+def module_name(path: Path) -> str:
+    """The dotted name of a source file."""
+    return ".".join(path.with_suffix("").parts).removesuffix(".__init__")
+
+
+def importers_of(trees: dict[Path, ast.Module]) -> dict[str, set[str]]:
+    """The modules that import each module, package files left out."""
+    names = {module_name(path) for path in trees if path.name != "__init__.py"}
+    found: dict[str, set[str]] = defaultdict(set)
+    for path, tree in trees.items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ImportFrom) and node.module:
+                targets = {f"{node.module}.{alias.name}" for alias in node.names} | {node.module}
+                for target in targets & names:
+                    found[target].add(module_name(path))
+    return found
+
+
+def count_participles(tree: ast.Module) -> int:
+    """Functions and methods whose name is one word, a participle."""
+    names = [node.name.strip("_") for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    return sum(is_participle(name) for name in names)
+
+
+def is_participle(name: str) -> bool:
+    """Whether a name is one word that is a participle."""
+    if "_" in name or name in NOT_PARTICIPLES:
+        return False
+    return name in IRREGULAR or name.endswith("ed")
+
+
+def files_naming_an_effect(sources: dict[Path, str]) -> list[Path]:
+    """Files that hold the id of an effect as text."""
+    ids = effect_ids(sources)
+    pattern = re.compile(r"[\"'](" + "|".join(ids) + r")[\"']")
+    outside = [path for path in sources if not str(path).startswith(LIBRARIES)]
+    return [path for path in outside if pattern.search(sources[path])]
+
+
+def effect_ids(sources: dict[Path, str]) -> list[str]:
+    """Ids of two words and more: those of one word are words of other things, too."""
+    text = "\n".join(text for path, text in sources.items() if str(path).startswith(LIBRARIES))
+    return sorted({name for name in re.findall(r"Effect\(\s*\"(\w+_\w+)\"", text)})
+
+
+def modules_of_a_diagnosis(tree: Path) -> int:
+    """Modules of the project that `diagnose` needs, its report and command line left out."""
+    place = "armlab.diagnosis.diagnose" if (tree / "armlab").is_dir() else "diagnosis.run"
+    code = (
+        f"import sys, {place}; from collections import Counter; "
+        f"print(sum(name.split('.')[0] in {ROOTS!r} and hasattr(module, '__file__') "
+        "and not str(module.__file__).endswith('__init__.py') for name, module in sys.modules.items()))"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(tree)}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tree, env=environment, capture_output=True, text=True)
+    return int(done.stdout) if done.returncode == 0 else -1
+
+
+if __name__ == "__main__":
+    main()
