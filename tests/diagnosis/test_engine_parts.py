@@ -12,7 +12,7 @@ from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.noise import fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import read_simulation
-from armlab.diagnosis.solver import USUAL_EFFECTS, Solver, State
+from armlab.diagnosis.solver import Solver, State
 from armlab.diagnosis.surrogate import feature_banks, find_structure, flexible_features
 from armlab.effects.library import library
 from problem.base_parameters import base_parameters
@@ -26,7 +26,7 @@ def bench() -> DesignMatrix:
     base = base_parameters(simulation.arm)
     prior = link_prior(simulation.arm, base, recording.arm.parameters)
     plain = build_design_matrix(observed, simulation, base, prior, Settings())
-    return plain.with_candidates([family for family in library() if family.effect in USUAL_EFFECTS])
+    return plain.with_candidates([family for family in library() if family.facts.usual])
 
 
 @pytest.fixture(scope="module")
