@@ -33,6 +33,7 @@ from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.summary import summarise
 from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.tuning import changed_numbers
 from armlab.diagnosis.unknown import (
     is_form_error,
     is_structured,
@@ -159,8 +160,15 @@ def _assemble(
         fit=fits,
         steps=model.steps,
         looks=count_looks(model),
-        settings={**asdict(design.settings.guards), "cutoff_hz": tuning.data.cutoff_hz},
+        settings=_settings_used(design.settings),
     )
+
+
+def _settings_used(settings: Settings) -> dict[str, float | str | bool]:
+    """Guards, cut-off, and the tuning numbers that are not as usual."""
+    changed = changed_numbers(settings.tuning)
+    shown = {name: str(list(each)) if isinstance(each, tuple) else each for name, each in changed.items()}
+    return {**asdict(settings.guards), "cutoff_hz": settings.tuning.data.cutoff_hz, **shown}
 
 
 def _joint_fits(refit: Array, final: Array, floor: Array, observed: Observed, min_gap: float) -> tuple[JointFit, ...]:

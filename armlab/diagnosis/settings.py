@@ -6,7 +6,7 @@ from typing import Literal
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.diagnosis.tuning import Tuning
+from armlab.diagnosis.tuning import Tuning, change_tuning
 
 Baseline = Literal["nominal", "refit", "simulated"]
 
@@ -51,3 +51,11 @@ class Settings:
 
     guards: Guards = Guards()
     tuning: Tuning = field(default_factory=Tuning)
+
+
+def vary(settings: Settings, name: str, value: object) -> Settings:
+    """The settings with another value of one tuning number, as in `vary(settings, "noise.max_order", 8)`.
+
+    Raises InputError, in one line, for an unknown name, a value of a wrong type, or one that cannot be computed with.
+    """
+    return replace(settings, tuning=change_tuning(settings.tuning, name, value))

@@ -4,12 +4,19 @@ One frozen dataclass holds the numbers of one stage, `Tuning` holds the stages. 
 `noise.max_order`. Mathematical constants, guards against rounding and steps of derivatives stand beside their code.
 """
 
-from dataclasses import dataclass, field
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
 from typing import TypeVar
+
+from armlab.common.errors import InputError
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.settings import suggest_name
 
 BY_EYE = "chosen by eye"
 EVIDENCE_SOURCE = "fourth judged set: a quarter of the names below it were wrong in the clean tier"
 REFUTE_SOURCE = "development sets: wrong names left 0.2 to 9 times what they explained, right ones 0.53 at most"
+TuningValue = int | float | tuple[float, ...]
 V = TypeVar("V", int, float, tuple[float, ...])
 
 
@@ -20,10 +27,14 @@ def tuned(
     meaning: str,
     source: str = BY_EYE,
     least: float = 0.0,
-    most: float = float("inf"),
+    most: float = math.inf,
+    count: int = 1,
 ) -> V:
-    """The field of a tuning number. unit: empty for a pure number. least, most: bounds of what can be computed."""
-    note = {"unit": unit, "meaning": meaning, "source": source, "least": least, "most": most}
+    """The field of a tuning number. unit: empty for a pure number.
+
+    least, most: bounds of what can be computed, of each value of a list. count: least length of a list.
+    """
+    note = {"unit": unit, "meaning": meaning, "source": source, "least": least, "most": most, "count": count}
     return field(default=value, metadata=note)
 
 
@@ -371,6 +382,7 @@ class SurrogateTuning:
         unit="of the top speed",
         meaning="widths of smooth signs of the velocity",
         least=1e-6,
+        count=3,
     )
     memories_s: tuple[float, ...] = tuned(
         (0.02, 0.1, 0.5),
@@ -504,3 +516,113 @@ class Tuning:
     unknown: UnknownTuning = UnknownTuning()
     claims: ClaimTuning = ClaimTuning()
     intervals: IntervalTuning = IntervalTuning()
+
+
+@dataclass(frozen=True)
+class TuningNumber:
+    """One tuning number. name: `stage.number`; least, most: bounds of each value; count: least length of a list."""
+
+    name: str
+    value: TuningValue
+    unit: str
+    meaning: str
+    source: str
+    least: float
+    most: float
+    count: int
+
+
+def tuning_numbers(tuning: Tuning) -> Iterator[TuningNumber]:
+    """All numbers, stage by stage."""
+    for stage in fields(tuning):
+        own = getattr(tuning, stage.name)
+        for each in fields(own):
+            yield TuningNumber(f"{stage.name}.{each.name}", getattr(own, each.name), **each.metadata)
+
+
+def changed_numbers(tuning: Tuning) -> dict[str, TuningValue]:
+    """Numbers that differ from their default, by name."""
+    usual = {each.name: each.value for each in tuning_numbers(Tuning())}
+    return {each.name: each.value for each in tuning_numbers(tuning) if each.value != usual[each.name]}
+
+
+def find_number(name: str) -> TuningNumber:
+    """A number by its name; InputError, with the nearest name, for one that there is not."""
+    known = {each.name: each for each in tuning_numbers(Tuning())}
+    if name not in known:
+        close = suggest_name(name, list(known))
+        hint = close if close.startswith("did") else "`armlab tuning` lists them all"
+        raise InputError(f"{name}: no such tuning number, {hint}")
+    return known[name]
+
+
+def change_tuning(tuning: Tuning, name: str, value: object) -> Tuning:
+    """The tuning with another value of one number.
+
+    Raises InputError, in one line, for an unknown name, a value of a wrong type, or one that cannot be computed with.
+    """
+    number = find_number(name)
+    checked = _checked_value(number, value)
+    stage, own = name.split(".")
+    return replace(tuning, **{stage: replace(getattr(tuning, stage), **{own: checked})})
+
+
+def _checked_value(number: TuningNumber, value: object) -> TuningValue:
+    """The value as the number's type: a whole number may stand for a real one, a single value for a list."""
+    wanted = number.value
+    kind = {int: "a whole number", float: "a number", tuple: "numbers"}[type(wanted)]
+    whole = isinstance(wanted, int)
+    values = value if isinstance(value, tuple) else (value,)
+    right = len(values) == 1 if not isinstance(wanted, tuple) else len(values) >= number.count
+    right = right and all(isinstance(each, int if whole else int | float) for each in values)
+    if not right or any(isinstance(each, bool) for each in values):
+        some = f" ({number.count} at least)" if number.count > 1 else ""
+        raise InputError(f"{number.name}: {_value_text(value)} should be {kind}{some}, like {_value_text(wanted)}")
+    if not all(number.least <= each <= number.most and math.isfinite(each) for each in values):
+        bounds = f"{number.least:g} at least" + (f", {number.most:g} at most" if number.most < math.inf else "")
+        raise InputError(f"{number.name}: {_value_text(value)} should be {bounds}")
+    if isinstance(wanted, tuple):
+        return tuple(float(each) for each in values)
+    return values[0] if whole else float(values[0])
+
+
+def parse_change(text: str) -> tuple[str, TuningValue]:
+    """Name and value of `stage.number=value`; a list is written with commas. InputError where it is not so written."""
+    name, equals, written = text.partition("=")
+    try:
+        values = tuple(_parse_value(part) for part in written.split(","))
+    except ValueError:
+        values = ()
+    if not equals or not values:
+        raise InputError(f"{text}: should be like noise.max_order=8, and a list like surrogate.memories_s=0.1,0.5")
+    return name.strip(), values if len(values) > 1 else values[0]
+
+
+def _parse_value(text: str) -> int | float:
+    try:
+        return int(text)
+    except ValueError:
+        return float(text)
+
+
+def _value_text(value: object) -> str:
+    """A value as it is written in `stage.number=value`."""
+    if isinstance(value, tuple):
+        return ",".join(_value_text(each) for each in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def tuning_page() -> str:
+    """`docs/tuning.md`: all numbers with value, unit, meaning and source."""
+    intro = (
+        "Each number that was chosen, by stage of the diagnosis (`armlab/diagnosis/tuning.py`). `armlab tuning --out "
+        "docs/tuning.md` writes this page. `armlab diagnose --set noise.max_order=8` takes another value, and "
+        "`armlab ablate --vary noise.max_order=8` measures what that changes."
+    )
+    parts = []
+    for stage in fields(Tuning):
+        own = [each for each in tuning_numbers(Tuning()) if each.name.startswith(f"{stage.name}.")]
+        rows = [(f"`{each.name}`", _value_text(each.value), each.unit, each.meaning, each.source) for each in own]
+        about = str(type(getattr(Tuning(), stage.name)).__doc__)
+        parts += [f"## {stage.name}", about, markdown_table(("name", "value", "unit", "meaning", "source"), rows)]
+    return markdown_page("Tuning numbers of the diagnosis", intro, *parts)
