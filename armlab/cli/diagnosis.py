@@ -68,25 +68,55 @@ def next_experiment(
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of random waves in surrogates.")
 @click.option("--compare", "old", type=click.Path(path_type=Path), help="An older recording: say what changed since.")
 @click.option("--without", multiple=True, metavar="GUARD", help="Switch a guard off, to see what it is worth.")
+@click.option(
+    "--set", "changes", multiple=True, metavar="NUMBER=VALUE", help="Another tuning number, like noise.max_order=8."
+)
 def diagnose(
-    recording: Path, out: Path, baseline: str | None, seed: int, old: Path | None, without: tuple[str, ...]
+    recording: Path,
+    out: Path,
+    baseline: str | None,
+    seed: int,
+    old: Path | None,
+    without: tuple[str, ...],
+    changes: tuple[str, ...],
 ) -> None:
     """Find the physics that the simulation of RECORDING lacks.
 
     Says where the simulation is wrong, which effects are missing, and how much better it predicts with them.
     """
+    from armlab.common.errors import InputError
     from armlab.diagnosis.compare.report import compare_recordings
     from armlab.diagnosis.report.write import diagnose_recording
 
+    if old is not None and changes:
+        raise InputError("--set: a comparison takes the usual tuning numbers, leave out --set or --compare")
     with ProgressLine() as progress:
         lines = (
-            diagnose_recording(recording, out, baseline, seed, without, progress.tell)
+            diagnose_recording(recording, out, baseline, seed, without, changes, progress.tell)
             if old is None
             else compare_recordings(old, recording, out, baseline, seed, progress.tell)
         )
         for line in lines:
             progress.clear()
             click.echo(line)
+
+
+@click.command()
+@click.option("--out", type=_FILE, help="File for the page [default: the terminal].")
+def tuning(out: Path | None) -> None:
+    """List the tuning numbers of the diagnosis.
+
+    Each with its value, unit, meaning and source, as Markdown. Their names are those of `diagnose --set` and
+    `ablate --vary`.
+    """
+    from armlab.common.files import write_texts
+    from armlab.diagnosis.tuning import tuning_page
+
+    if out is None:
+        click.echo(tuning_page(), nl=False)
+    else:
+        write_texts({out.name: tuning_page()}, out.parent)
+        click.echo(f"wrote {out}")
 
 
 @click.command("export-model")

@@ -15,16 +15,32 @@ _FOLDER = click.Path(path_type=Path)
 @click.option("--work", type=_FOLDER, default=Path(".armlab/ablation"), show_default=True)
 @click.option("--results", type=_FOLDER, default=Path("results/proof"), show_default=True)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
-def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int) -> None:
+@click.option(
+    "--vary",
+    "changes",
+    multiple=True,
+    metavar="NUMBER=VALUE",
+    help="A tuning number with another value too, like noise.max_order=8.",
+)
+def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int, changes: tuple[str, ...]) -> None:
     """Measure what each guard of the diagnosis is worth.
 
-    Diagnoses concealed cases with one guard off at a time (extra `engines`).
+    Diagnoses concealed cases with one guard off at a time, and with one tuning number changed at a time (extra
+    `engines`).
     """
+    from functools import partial
+
     from armlab.concealed.ablation import AblationSettings
     from armlab.concealed.ablation import ablate as run_ablation
     from armlab.diagnosis.ablation import verdicts_without_each
+    from armlab.diagnosis.settings import Settings, vary
+    from armlab.diagnosis.tuning import parse_change
 
-    for line in run_ablation(AblationSettings(seed, cases, nulls), verdicts_without_each, work, results, jobs):
+    for change in changes:  # refused before hours of work
+        vary(Settings(), *parse_change(change))
+    settings = AblationSettings(seed, cases, nulls, changes)
+    diagnose = partial(verdicts_without_each, changes=changes)
+    for line in run_ablation(settings, diagnose, work, results, jobs):
         click.echo(line)
 
 

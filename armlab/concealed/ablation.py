@@ -1,4 +1,4 @@
-"""The value of each guard of the diagnosis: the same concealed cases with one guard off at a time."""
+"""The value of each guard of the diagnosis: the same concealed cases with one guard off, or one number changed."""
 
 import json
 import shutil
@@ -29,11 +29,12 @@ DiagnoseWithGuards = Callable[[Path], dict[str, dict[str, Any]]]
 
 @dataclass(frozen=True)
 class AblationSettings:
-    """A development seed, and the number of its mixed cases and of its nulls."""
+    """A development seed, the number of its mixed cases and of its nulls, and changes like `noise.max_order=8`."""
 
     seed: int
     cases: int
     nulls: int
+    changes: tuple[str, ...] = ()
 
 
 def ablate(
@@ -42,7 +43,8 @@ def ablate(
     """Diagnoses development sets with each guard off, and writes guards.md and guards.json into `results`.
 
     Yields lines that report the progress. diagnose: from a recording folder, verdicts by the name of the guard that is
-    off; the verdict with all guards on comes first. An interrupted ablation continues; a finished one starts again.
+    off, then by the change; the verdict with all guards on comes first. An interrupted ablation continues; a finished
+    one starts again.
     """
     if (work / FINISHED_MARK).is_file():
         shutil.rmtree(work)
@@ -52,7 +54,7 @@ def ablate(
         folder, verdicts = work / name, work / "verdicts" / name
         list(conceal_cases(each, folder, jobs))
         cases, sealed = seal_set(each, folder)
-        missing = [case for case in cases if not (verdicts / DONE_FOLDER / case).is_file()]
+        missing = [case for case in cases if not _is_done(case, settings.changes, verdicts)]
         todo = (delayed(_write_verdicts)(diagnose, folder / "observations" / case, verdicts) for case in missing)
         for number, _ in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(todo), 1):
             if number % REPORT_INTERVAL == 0:
@@ -65,6 +67,12 @@ def ablate(
     (results / "guards.md").write_text(render_page(settings, found), encoding="utf-8")
     (work / FINISHED_MARK).touch()
     yield f"wrote {results / 'guards.md'}"
+
+
+def _is_done(case: str, changes: Sequence[str], verdicts: Path) -> bool:
+    """Whether a case has its verdicts, those of all changes too, which may differ from an interrupted ablation's."""
+    changed = (verdicts / change / case / "verdict.json" for change in changes)
+    return (verdicts / DONE_FOLDER / case).is_file() and all(each.is_file() for each in changed)
 
 
 def _write_verdicts(diagnose: DiagnoseWithGuards, observation: Path, verdicts: Path) -> None:
@@ -87,13 +95,15 @@ def render_page(settings: AblationSettings, found: dict[str, dict[str, Any]]) ->
     for tier in tiers:
         rows = [_table_row(guard, found[guard], tier) for guard in found]
         titles = " | ".join(MEASURE_TEXTS[id].title for id in SHOWN_MEASURES)
-        head = f"| guard off | {titles} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
+        column = "guard off, or number changed" if settings.changes else "guard off"
+        head = f"| {column} | {titles} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
         parts += [f"## {tier} tier", "\n".join([head, *rows])]
     return "\n\n".join(parts) + "\n"
 
 
 def _table_row(guard: str, sets: dict[str, Any], tier: str) -> str:
-    return f"| {guard.replace('_', ' ')} | {' | '.join(_table_cell(id, sets, tier) for id in SHOWN_MEASURES)} |"
+    name = f"`{guard}`" if "=" in guard else guard.replace("_", " ")
+    return f"| {name} | {' | '.join(_table_cell(id, sets, tier) for id in SHOWN_MEASURES)} |"
 
 
 def _table_cell(id: str, sets: dict[str, Any], tier: str) -> str:

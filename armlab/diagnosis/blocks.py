@@ -13,12 +13,10 @@ from armlab.diagnosis.columns import Columns
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.solver import Fit
+from armlab.diagnosis.tuning import BlockTuning
 from armlab.recordings.recording import ROLES
 
-MAX_VARIANCE_RATIO = 1e5  # times the least variance: directions that other columns hold as well are not tested
 ROUNDING = 1e-14  # of the largest variance: rounding
-MIN_BLOCKS = 60  # of the identification rows
-BLOCK_S = 0.5  # s: longer than what whitening leaves of any tie between errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,21 +35,30 @@ class BlockCovariance:
     covariance: Array
     degrees: float
 
-    def p_value(self, values: Array, place: Sequence[int]) -> float:
-        """Chance of values at these places at least as large, were they zero (Wald's test, F distribution)."""
+    def p_value(self, values: Array, place: Sequence[int], max_variance_ratio: float) -> float:
+        """Chance of values at these places at least as large, were they zero (Wald's test, F distribution).
+
+        Directions whose variance is larger than the ratio times the least one are left out.
+        """
         variances, vectors = np.linalg.eigh(self.covariance[np.ix_(place, place)])
-        told = (variances > 0) & (variances < MAX_VARIANCE_RATIO * max(variances[0], ROUNDING * variances[-1]))
+        told = (variances > 0) & (variances < max_variance_ratio * max(variances[0], ROUNDING * variances[-1]))
         wald = float(np.sum((vectors[:, told].T @ values) ** 2 / variances[told]))
         rank = max(int(np.sum(told)), 1)
         return float(fisher.sf(wald / rank, rank, max(self.degrees - rank, 1)))
 
 
 def whitened_rows(
-    columns: Columns, extra: dict[int, Array], fit: Fit, lengths: Array, noise: Noise, observed: Observed
+    columns: Columns,
+    extra: dict[int, Array],
+    fit: Fit,
+    lengths: Array,
+    noise: Noise,
+    observed: Observed,
+    tuning: BlockTuning,
 ) -> WhitenedRows:
     """Design and errors of a fit: links, effects in their order, then the extra columns (rows, count) by joint."""
     designs, errors, blocks = [], [], []
-    base, stretches = len(fit.links), block_numbers(observed, BLOCK_S, MIN_BLOCKS)
+    base, stretches = len(fit.links), block_numbers(observed, tuning.block_s, tuning.min_blocks)
     for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
         scaled = matrix[:, :-1] / lengths[index[:-1]]
         loading = index[:-1] < base
@@ -69,7 +76,7 @@ def whitened_rows(
     return WhitenedRows(tuple(designs), tuple(errors), tuple(blocks))
 
 
-def block_numbers(observed: Observed, length_s: float, least: int = 12) -> NDArray[np.intp]:
+def block_numbers(observed: Observed, length_s: float, least: int) -> NDArray[np.intp]:
     """Number of the stretch of time of each row, (rows,); none reaches over the end of a segment.
 
     Stretches are shorter in a short recording, so that each role has some `least` of them.
@@ -105,9 +112,6 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
     return BlockCovariance(np.asarray(spread * np.outer(scale, scale)), degrees)
 
 
-FOLDS = 5
-
-
 @dataclass(frozen=True, eq=False)
 class Folds:
     """Whitened rows of a wide fit, cut into folds of whole stretches of time. precision: of the parameters' prior."""
@@ -120,26 +124,27 @@ class Folds:
 
     def errors(self, chosen: Sequence[int]) -> list[Array]:
         """Held-out errors of a fit with the chosen parameters only, (rows,) for each joint."""
-        place, values = np.ix_(chosen, chosen), np.zeros((len(self.precision), FOLDS))
+        count = len(self.grams)
+        place, values = np.ix_(chosen, chosen), np.zeros((len(self.precision), count))
         whole, towards = np.sum(self.grams, axis=0), np.sum(self.products, axis=0)
-        for fold in range(FOLDS):
+        for fold in range(count):
             gram = (whole - self.grams[fold] + self.precision)[place]
             inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
             values[chosen, fold] = inverse @ (towards - self.products[fold])[chosen]
         return [
-            target - (design @ values)[np.arange(len(block)), block % FOLDS]
+            target - (design @ values)[np.arange(len(block)), block % count]
             for target, design, block in zip(self.targets, self.rows.designs, self.rows.blocks, strict=True)
         ]
 
 
-def split_folds(rows: WhitenedRows, values: Array, precision: Array) -> Folds:
-    """The folds of a fit's rows; values: its parameters, to give the errors back what they explain."""
+def split_folds(rows: WhitenedRows, values: Array, precision: Array, count: int) -> Folds:
+    """Some folds of a fit's rows; values: its parameters, to give the errors back what they explain."""
     targets = tuple(error + design @ values for error, design in zip(rows.errors, rows.designs, strict=True))
     grams, products = [], []
-    for fold in range(FOLDS):
+    for fold in range(count):
         gram, product = np.zeros(precision.shape), np.zeros(len(values))
         for target, design, block in zip(targets, rows.designs, rows.blocks, strict=True):
-            own = block % FOLDS == fold
+            own = block % count == fold
             gram += design[own].T @ design[own]
             product += design[own].T @ target[own]
         grams.append(gram)

@@ -17,11 +17,6 @@ from armlab.effects.contract import Candidate, Effect
 from armlab.effects.links import LinkLaw, felt_values, link_law
 from armlab.effects.parameters import parameter_values
 
-MAX_DEFICIT = 2.0  # units of log likelihood: a difference that may be chance
-HELD_OUT_TOLERANCE = 0.01  # of the held-out error
-MAX_RIVALS = 3
-OUTLYING_FACTOR = 4.0  # times the median width of the other links
-
 
 def make_claims(model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence]) -> tuple[Claim, ...]:
     """All claims of a model, the strongest first."""
@@ -31,7 +26,8 @@ def make_claims(model: FittedModel, effects: dict[int, Evidence], links: dict[in
     claims = [_effect_claim(model, wide, group, evidence) for group, evidence in effects.items()]
     claims += _link_claims(model, wide, links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
-    claims = [_with_equal_sums(claim, claims, known) for claim in claims]
+    most = model.design.settings.tuning.claims.max_rivals
+    claims = [_with_equal_sums(claim, claims, known, most) for claim in claims]
     return tuple(sorted(claims, key=lambda claim: -claim.evidence.score))
 
 
@@ -40,10 +36,10 @@ def next_experiment(effect: Effect, rivals: Sequence[Rival]) -> str | None:
     return effect.experiment or None if rivals else None
 
 
-def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effect]) -> Claim:
+def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effect], most: int) -> Claim:
     """The claim with effects as rivals that equal its sum with another claim at its joint, for any motion.
 
-    What not every arm has keeps its name: the rival stands beside the usual part of the sum.
+    What not every arm has keeps its name: the rival stands beside the usual part of the sum. most: rivals of a claim.
     """
     here = {other.effect for other in claims if other.joint == claim.joint}
     equal = [each for each in known if any(claim.effect in pair and set(pair) <= here for pair in each.equal_sums)]
@@ -51,7 +47,7 @@ def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effe
         return claim
     names = {each.id for each in equal}
     sums = [Rival(each.id, claim.joint, claim.joints, True) for each in equal]
-    rivals = (*sums, *(each for each in claim.rivals if each.effect not in names))[:MAX_RIVALS]
+    rivals = (*sums, *(each for each in claim.rivals if each.effect not in names))[:most]
     return replace(claim, rivals=rivals, next_experiment=next_experiment(claim.candidate.facts, rivals))
 
 
@@ -81,16 +77,16 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, evidence: Evi
 
 def find_rivals(model: FittedModel, group: int, own: Candidate) -> tuple[Rival, ...]:
     """What these data cannot tell from a group of a model; the best first. own: its candidate, first name."""
-    solver, state = model.solver, model.state
+    solver, state, tuning = model.solver, model.state, model.design.settings.tuning.claims
     out = [Rival(name, own.joint, own.joints, True) for name in own.identical]
-    search = Search(solver, model.design.settings.guards, True, 0)
+    search = Search(solver, model.design.settings, True, 0)
     without = state.minus(group)
     scores = search.gains(without)
     full = model.moments.heldout_error(model.fit.coefficients)
     for number in np.argsort(-scores):
         rival = int(number)
         deficit = float(scores[group] - scores[rival])
-        if deficit > MAX_DEFICIT or len(out) >= MAX_RIVALS:
+        if deficit > tuning.max_deficit or len(out) >= tuning.max_rivals:
             break
         candidate = solver.groups[rival].candidate
         same = candidate.effect == own.effect and candidate.joint == own.joint
@@ -105,7 +101,7 @@ def find_rivals(model: FittedModel, group: int, own: Candidate) -> tuple[Rival, 
 
 def _predicts_as_well(model: FittedModel, other: State, full: Array) -> bool:
     error = model.moments.heldout_error(model.solver.fit(other).coefficients)
-    return bool(np.all(error <= (1 + HELD_OUT_TOLERANCE) * full))
+    return bool(np.all(error <= (1 + model.design.settings.tuning.claims.held_out_tolerance) * full))
 
 
 def _link_claims(model: FittedModel, wide: ShapedFit, links: dict[int, Evidence]) -> list[Claim]:
@@ -118,9 +114,8 @@ def _link_claims(model: FittedModel, wide: ShapedFit, links: dict[int, Evidence]
     claims = []
     for link, evidence in links.items():
         place = slice(10 * link, 10 * link + 10)
-        law = link_law(
-            bench.simulation.arm, link + 1, mean[place], spread[place, place], added=is_outlying(widths, link)
-        )
+        added = is_outlying(widths, link, bench.settings.tuning.claims.outlying_factor)
+        law = link_law(bench.simulation.arm, link + 1, mean[place], spread[place, place], added=added)
         claims.append(_link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence))
     return claims
 
@@ -154,7 +149,7 @@ def _link_claim(
     )
 
 
-def is_outlying(widths: Widths, link: int) -> bool:
-    """Whether a link (from 0) is off far more than the others: something was added to it."""
+def is_outlying(widths: Widths, link: int, factor: float) -> bool:
+    """Whether a link (from 0) is off `factor` times more than the others: something was added to it."""
     others = [width for other, width in enumerate(widths) if other != link]
-    return not others or widths[link] >= OUTLYING_FACTOR * float(np.median(others))
+    return not others or widths[link] >= factor * float(np.median(others))

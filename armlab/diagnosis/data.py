@@ -10,6 +10,7 @@ from scipy.ndimage import binary_dilation, binary_opening, median_filter
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.tuning import DataTuning
 from armlab.recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
 from armlab.recordings.differentiate import Signals, differentiate, resample_at, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
@@ -17,14 +18,6 @@ from armlab.recordings.recording import Role, Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import inertia_column
-
-STANDSTILL_SIGMAS = 5.0  # standard deviations of the velocity's noise: slower is standing still
-CREEP_RATIO = 0.01  # of a joint's high speed: below it friction takes any value up to its level
-HIGH_SPEED_QUANTILE = 0.95  # quantile of the speed
-MIN_STANDSTILL_S = 0.004  # s that it takes to be more than a single sample
-STANDSTILL_MARGIN = 1.5  # periods of the cut-off around a standstill: how far the filter carries it
-MIN_SEGMENT_ROWS = 40  # rows: shorter parts tell too little of the noise
-MIN_MOVING_SHARE = 0.1  # of the rows have to be left; else a joint counts as moving all the time
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,36 +30,40 @@ class Segment:
     stop: int
 
 
-def moving_rows(signals: Sequence[Signals], segments: Sequence[Segment], cutoff_hz: float) -> NDArray[np.bool_]:
+def moving_rows(
+    signals: Sequence[Signals], segments: Sequence[Segment], cutoff_hz: float, tuning: DataTuning
+) -> NDArray[np.bool_]:
     """Rows (rows, joints) in which a joint moves. cutoff_hz: of the positions."""
-    speed = np.quantile(np.abs(np.concatenate([each.motion.velocity for each in signals])), HIGH_SPEED_QUANTILE, axis=0)
-    whole = np.concatenate([_moving_rows_of_run(each, cutoff_hz, CREEP_RATIO * speed) for each in signals])
+    velocity = np.concatenate([each.motion.velocity for each in signals])
+    creep = tuning.creep_ratio * np.quantile(np.abs(velocity), tuning.high_speed_quantile, axis=0)
+    whole = np.concatenate([_moving_rows_of_run(each, cutoff_hz, creep, tuning) for each in signals])
     for joint in range(whole.shape[1]):
         for role in ("identify", "validate"):
             own = [each for each in segments if each.role == role]
-            left = sum(part.stop - part.start for each in own for part in split_segment(each, whole[:, joint]))
-            if left < MIN_MOVING_SHARE * sum(each.stop - each.start for each in own):
+            parts = [part for each in own for part in split_segment(each, whole[:, joint], tuning.min_segment_rows)]
+            left = sum(part.stop - part.start for part in parts)
+            if left < tuning.min_moving_share * sum(each.stop - each.start for each in own):
                 for each in own:
                     whole[each.start : each.stop, joint] = True
     return whole
 
 
-def _moving_rows_of_run(signals: Signals, cutoff_hz: float, creep: Array) -> NDArray[np.bool_]:
+def _moving_rows_of_run(signals: Signals, cutoff_hz: float, creep: Array, tuning: DataTuning) -> NDArray[np.bool_]:
     """Rows (kept, joints) in which a joint is faster than its noise and than creeping (joints,)."""
     run = signals.run
     frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
     density = noise_level(frequency, spectrum, shape, run.rate_hz)
     noise = 2 * np.pi * np.sqrt(density * cutoff_hz**3 / 3)  # of white noise, differentiated, up to the cut-off
-    slow = np.abs(signals.motion.velocity) < np.maximum(STANDSTILL_SIGMAS * noise, creep)
-    still = binary_opening(slow, structure=np.ones((max(round(MIN_STANDSTILL_S * run.rate_hz), 1), 1)))
+    slow = np.abs(signals.motion.velocity) < np.maximum(tuning.standstill_sigmas * noise, creep)
+    still = binary_opening(slow, structure=np.ones((max(round(tuning.min_standstill_s * run.rate_hz), 1), 1)))
     low_pass = signals.filter
-    reach = STANDSTILL_MARGIN / (low_pass.cutoff_hz if isinstance(low_pass, LowPass) else cutoff_hz)
+    reach = tuning.standstill_margin / (low_pass.cutoff_hz if isinstance(low_pass, LowPass) else cutoff_hz)
     near = binary_dilation(still, structure=np.ones((2 * round(reach * run.rate_hz) + 1, 1)))
     return np.asarray(~near[signals.filter.rows])
 
 
-def split_segment(segment: Segment, chosen: NDArray[np.bool_], shortest: int = MIN_SEGMENT_ROWS) -> list[Segment]:
-    """The stretches of a segment in which `chosen` (rows,) holds, short ones left out."""
+def split_segment(segment: Segment, chosen: NDArray[np.bool_], shortest: int) -> list[Segment]:
+    """The stretches of a segment in which `chosen` (rows,) holds, those with fewer than `shortest` rows left out."""
     inside = np.concatenate([[False], chosen[segment.start : segment.stop], [False]])
     edges = np.flatnonzero(np.diff(inside.astype(np.int8))) + segment.start
     found = [Segment(segment.run, segment.role, int(a), int(b)) for a, b in edges.reshape(-1, 2)]
@@ -81,37 +78,34 @@ def rows_in(segments: Sequence[Segment], rows: int) -> NDArray[np.bool_]:
     return chosen
 
 
-MAX_ENCODER_SHARE = 0.5  # of the torque's power density: more of it from the encoders is too much
-MIN_CUTOFF_HZ = 10.0
-MEDIAN_WIDTH = 41  # frequencies of a running median
-INERTIA_STATES = 50  # of a run, for the inertia
-
-
-def usable_cutoff(runs: Sequence[Run], arm: Arm, inertial: Array | None, highest_hz: float) -> float:
+def usable_cutoff(
+    runs: Sequence[Run], arm: Arm, inertial: Array | None, highest_hz: float, tuning: DataTuning
+) -> float:
     """The highest frequency, Hz, up to which the encoders' noise stays below the torque's power on every joint.
 
     inertial: (10 * joints,) of the links; without them the highest is taken.
     """
     if inertial is None:
         return highest_hz
-    return max(
-        min(_usable_cutoff_of_run(run, arm, inertial, highest_hz) for run in runs), min(MIN_CUTOFF_HZ, highest_hz)
-    )
+    usable = min(_usable_cutoff_of_run(run, arm, inertial, highest_hz, tuning) for run in runs)
+    return max(usable, min(tuning.min_cutoff_hz, highest_hz))
 
 
-def _usable_cutoff_of_run(run: Run, arm: Arm, inertial: Array, highest_hz: float) -> float:
+def _usable_cutoff_of_run(run: Run, arm: Arm, inertial: Array, highest_hz: float, tuning: DataTuning) -> float:
     frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
     noise = noise_level(frequency, spectrum, shape, run.rate_hz)
-    induced = np.outer(shape, np.square(_rms_inertia(run, arm, inertial)) @ noise)
-    power = _running_median(_power_density(run.torque, run.rate_hz, len(run.position) - 2))
-    allowed = np.all(induced <= MAX_ENCODER_SHARE * power[: len(induced)], axis=1)
-    too_much = np.flatnonzero(~allowed & (frequency >= MIN_CUTOFF_HZ))
+    inertia = _rms_inertia(run, arm, inertial, tuning.inertia_states)
+    induced = np.outer(shape, np.square(inertia) @ noise)
+    density = _power_density(run.torque, run.rate_hz, len(run.position) - 2)
+    power = _running_median(density, tuning.median_width)
+    allowed = np.all(induced <= tuning.max_encoder_share * power[: len(induced)], axis=1)
+    too_much = np.flatnonzero(~allowed & (frequency >= tuning.min_cutoff_hz))
     return float(min(frequency[too_much[0]] if len(too_much) else highest_hz, highest_hz))
 
 
-def _rms_inertia(run: Run, arm: Arm, inertial: Array) -> Array:
-    """Root mean square of the mass matrix over the run, (joints, joints)."""
-    position = run.position[:: max(run.samples // INERTIA_STATES, 1)]
+def _rms_inertia(run: Run, arm: Arm, inertial: Array, states: int) -> Array:
+    """Root mean square of the mass matrix over some states of the run, (joints, joints)."""
+    position = run.position[:: max(run.samples // states, 1)]
     columns = [inertia_column(arm, position, joint, inertial) for joint in range(len(arm))]
     rotors = np.diag(arm.rotor_inertia) if arm.rotor_inertia else 0.0
     return np.asarray(np.sqrt(np.mean(np.square(np.stack(columns, axis=-1) + rotors), axis=0)))
@@ -125,15 +119,8 @@ def _power_density(signal: Array, rate_hz: float, samples: int) -> Array:
     return np.asarray(scale * np.abs(np.fft.rfft((part - part.mean(axis=0)) * window, axis=0)) ** 2)
 
 
-def _running_median(power: Array) -> Array:
-    return np.asarray(median_filter(power, size=(MEDIAN_WIDTH, 1), mode="nearest") / np.log(2))
-
-
-MAX_CUTOFF_RATIO = 0.32  # of the sampling rate: the highest cut-off
-POSITION_CUTOFF_RATIO = (
-    2.0  # the positions' cut-off over that of the torque: what the torque holds, the motion has to hold too
-)
-HELD_OUT_BLOCKS = 6  # of a run, where no run validates; every third of them is held out
+def _running_median(power: Array, width: int) -> Array:
+    return np.asarray(median_filter(power, size=(width, 1), mode="nearest") / np.log(2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +131,7 @@ class Observed:
     it further: in those the noise of the encoders would explain itself.
     rate_hz: of the kept rows. held_out_blocks: whether blocks of time had to stand in for validation runs. moving:
     (rows, joints), False where a joint stands still: friction at rest takes any value, and no law of motion holds.
+    min_segment_rows: shorter stretches in motion are not used.
     """
 
     signals: tuple[Signals, ...]
@@ -152,6 +140,7 @@ class Observed:
     rate_hz: float
     held_out_blocks: bool
     moving: NDArray[np.bool_]
+    min_segment_rows: int
 
     @property
     def joints(self) -> int:
@@ -196,9 +185,10 @@ class Observed:
     def of_role(self, role: Role, joint: int | None = None) -> tuple[Segment, ...]:
         """The segments of a role; only the parts in which a joint (from 0) moves, if one is given."""
         own = tuple(segment for segment in self.segments if segment.role == role)
-        return (
-            own if joint is None else tuple(part for each in own for part in split_segment(each, self.moving[:, joint]))
-        )
+        if joint is None:
+            return own
+        moving = self.moving[:, joint]
+        return tuple(part for each in own for part in split_segment(each, moving, self.min_segment_rows))
 
     def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
         """Rows of a role near a standstill or a reversal of a joint (from 0)."""
@@ -217,16 +207,18 @@ class Observed:
 
 def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Settings) -> Observed:
     """Smooths, differentiates, filters and thins the runs. inertial: (10 * joints,) of the simulated links, if any."""
+    tuning = settings.tuning.data
     even = _to_common_rate([resample_evenly(run) for run in runs])
     rate = even[0].rate_hz
-    cutoff = usable_cutoff(even, arm, inertial, min(settings.cutoff_hz, MAX_CUTOFF_RATIO * rate))
-    step = max(round(rate / (settings.rows_per_cutoff * cutoff)), 1)
-    motion = min(POSITION_CUTOFF_RATIO * cutoff, 0.4 * rate)
+    cutoff = usable_cutoff(even, arm, inertial, min(tuning.cutoff_hz, tuning.max_cutoff_ratio * rate), tuning)
+    step = max(round(rate / (tuning.rows_per_cutoff * cutoff)), 1)
+    motion = min(tuning.position_cutoff_ratio * cutoff, tuning.max_position_cutoff_ratio * rate)
     signals = tuple(differentiate(run, cutoff_hz=motion, torque_cutoff_hz=cutoff, step=step) for run in even)
     calm = tuple(_smooth_motion(run, motion) for run in even)
     blocks = not any(run.role == "validate" for run in runs)
-    segments = _split_runs(signals, blocks)
-    return Observed(signals, calm, segments, rate / step, blocks, moving_rows(signals, segments, motion))
+    segments = _split_runs(signals, blocks, tuning)
+    moving = moving_rows(signals, segments, motion, tuning)
+    return Observed(signals, calm, segments, rate / step, blocks, moving, tuning.min_segment_rows)
 
 
 def _to_common_rate(runs: list[Run]) -> list[Run]:
@@ -245,7 +237,7 @@ def _smooth_motion(run: Run, highest_hz: float) -> Motion:
     return differentiate(run, cutoff_hz=min(choice, highest_hz)).motion
 
 
-def _split_runs(signals: Sequence[Signals], blocks: bool) -> tuple[Segment, ...]:
+def _split_runs(signals: Sequence[Signals], blocks: bool, tuning: DataTuning) -> tuple[Segment, ...]:
     out: list[Segment] = []
     start = 0
     for index, each in enumerate(signals):
@@ -253,9 +245,9 @@ def _split_runs(signals: Sequence[Signals], blocks: bool) -> tuple[Segment, ...]
         if not blocks:
             out.append(Segment(index, each.run.role, start, stop))
         else:
-            ends = np.linspace(start, stop, HELD_OUT_BLOCKS + 1).astype(int)
-            pairs = pairwise(ends.tolist())
-            roles: list[Role] = ["validate" if number % 3 == 2 else "identify" for number in range(HELD_OUT_BLOCKS)]
+            count, every = tuning.held_out_blocks, tuning.held_out_every
+            pairs = pairwise(np.linspace(start, stop, count + 1).astype(int).tolist())
+            roles: list[Role] = ["validate" if number % every == every - 1 else "identify" for number in range(count)]
             out += [Segment(index, role, a, b) for role, (a, b) in zip(roles, pairs, strict=True)]
         start = stop
     return tuple(out)

@@ -33,6 +33,7 @@ from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.summary import summarise
 from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.tuning import changed_numbers
 from armlab.diagnosis.unknown import (
     is_form_error,
     is_structured,
@@ -43,8 +44,6 @@ from armlab.diagnosis.unknown import (
 from armlab.effects.library import library
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
-
-MIN_GAP = 0.02  # of the noise floor: a smaller gap cannot be measured
 
 
 def diagnose(
@@ -72,12 +71,12 @@ def prepare(
 ) -> DesignMatrix | Diagnosis:
     """The runs filtered, and the columns of the links; a diagnosis where nothing can be said, and why."""
     simulation = read_simulation(recording, baseline)
-    reason = reason_unusable(recording)
+    reason = reason_unusable(recording, settings.tuning.soundness)
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason)
     progress("filtering")
     observed = observe(recording.runs, simulation.arm, simulation.inertial, settings)
-    reason = reason_misread(observed, simulation)
+    reason = reason_misread(observed, simulation, settings.tuning.soundness)
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason, observed)
     base = base_parameters(simulation.arm)
@@ -90,9 +89,9 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     """Tests what a search found, withdraws names that do not hold, and states the rest with numbers."""
     progress("testing claims")
     named = name_effects(prune(searched))
-    model = named.model
-    remains = [each for each in named.left if is_structured(each)]
-    unknowns = [each for each in remains if not is_form_error(each, named.effects)]
+    model, tuning = named.model, named.model.design.settings.tuning
+    remains = [each for each in named.left if is_structured(each, tuning)]
+    unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
     claims = make_claims(model, named.effects, named.links)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
@@ -112,13 +111,14 @@ class NamedEffects:
 def name_effects(pruned: Pruned) -> NamedEffects:
     """Withdraws names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
     model, effects, links = pruned
+    tuning = model.design.settings.tuning
     if not model.design.settings.guards.unknown:
         return NamedEffects(model, effects, links, ())
     left = predict_residual_structure(model, fit_coloured_noise(model))
-    while doubtful := names_contradicted_by_residual(effects, left):
+    while doubtful := names_contradicted_by_residual(effects, left, tuning):
         model, effects, links = withdraw(model, doubtful, "what is left at its joint is no less structured")
         left = predict_residual_structure(model, fit_coloured_noise(model))
-    wrong = names_contradicted_by_residual(links, left)
+    wrong = names_contradicted_by_residual(links, left, tuning)
     return NamedEffects(model, effects, {link: each for link, each in links.items() if link not in wrong}, left)
 
 
@@ -130,14 +130,14 @@ def _assemble(
     remains: Sequence[Structure],
 ) -> Diagnosis:
     """The diagnosis of a model. unknowns: structure that is a finding `unknown`; remains: all structure."""
-    design, observed = model.design, model.design.observed
+    design, observed, tuning = model.design, model.design.observed, model.design.settings.tuning
     final = model.residual(model.fit)
     for each in unknowns:
         final[:, each.joint] -= each.prediction
     refit = model.residual(model.solver.fit(State((), None)))
     start = refit if design.simulation.kind == "refit" else design.target
-    floor = noise_floor(final, design.features, observed)
-    fits = _joint_fits(refit, final, floor, observed)
+    floor = noise_floor(final, design.features, observed, tuning.surrogate)
+    fits = _joint_fits(refit, final, floor, observed, tuning.claims.min_gap)
     status: Status = "mismatch" if claims else "none"
     base, covariance = model.base_parameters()
     return Diagnosis(
@@ -153,22 +153,30 @@ def _assemble(
         base_values=base,
         base_covariance=covariance,
         claims=claims,
-        located=locate_excess(start, floor, observed) if claims else (),
+        located=locate_excess(start, floor, observed, tuning.location) if claims else (),
         unexplained=tuple(
             Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
         ),
         fit=fits,
         steps=model.steps,
         looks=count_looks(model),
-        settings={**asdict(design.settings.guards), "cutoff_hz": design.settings.cutoff_hz},
+        settings=_settings_used(design.settings),
     )
 
 
-def _joint_fits(refit: Array, final: Array, floor: Array, observed: Observed) -> tuple[JointFit, ...]:
+def _settings_used(settings: Settings) -> dict[str, float | str | bool]:
+    """Guards, cut-off, and the tuning numbers that are not as usual."""
+    changed = changed_numbers(settings.tuning)
+    shown = {name: str(list(each)) if isinstance(each, tuple) else each for name, each in changed.items()}
+    return {**asdict(settings.guards), "cutoff_hz": settings.tuning.data.cutoff_hz, **shown}
+
+
+def _joint_fits(refit: Array, final: Array, floor: Array, observed: Observed, min_gap: float) -> tuple[JointFit, ...]:
     out = []
     for joint, noise in enumerate(floor.tolist()):
         rows = rows_in(observed.of_role("validate", joint), observed.rows)
         before, after = (float(np.sqrt(np.mean(each[rows, joint] ** 2))) for each in (refit, final))
         gap = before - noise
-        out.append(JointFit(joint + 1, before, after, noise, (before - after) / gap if gap > MIN_GAP * noise else None))
+        closed = (before - after) / gap if gap > min_gap * noise else None
+        out.append(JointFit(joint + 1, before, after, noise, closed))
     return tuple(out)

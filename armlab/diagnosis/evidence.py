@@ -23,8 +23,7 @@ from armlab.diagnosis.links import Widths
 from armlab.diagnosis.refine import prior_precision
 from armlab.diagnosis.search import contained_groups
 from armlab.diagnosis.solver import Fit, State
-
-HELD_OUT_BLOCK_S = 1.0  # s: stretches of held-out time that are compared
+from armlab.diagnosis.tuning import EvidenceTuning
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +43,12 @@ class Comparison:
     def folds(self) -> Folds:
         """Whitened rows of the wide fit, in folds."""
         found, fit = self.model, self.wide
-        rows = whitened_rows(found.columns, {}, fit, found.moments.lengths, found.noise, found.design.observed)
+        lengths, tuning = found.moments.lengths, found.design.settings.tuning.blocks
+        rows = whitened_rows(found.columns, {}, fit, lengths, found.noise, found.design.observed, tuning)
         links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
         values = np.concatenate([links, fit.coefficients[fit.columns]])
-        return split_folds(rows, values, prior_precision(found.solver, fit, len(fit.inverse)))
+        precision = prior_precision(found.solver, fit, len(fit.inverse))
+        return split_folds(rows, values, precision, tuning.folds)
 
     def covariance_of(self, state: State) -> BlockCovariance:
         """Robust covariance of the parameters of a state within the wide fit."""
@@ -96,7 +97,9 @@ class Comparison:
         observed, noise = self.model.design.observed, self.model.noise
         left = np.column_stack([self.model.residual_at(joint, each) for each in (less, fit)])
         white = noise.white(left, joint, observed, "validate")
-        blocks = noise.numbers(block_numbers(observed, HELD_OUT_BLOCK_S), joint, observed, "validate")
+        tuning = self.model.design.settings.tuning.evidence
+        stretches = block_numbers(observed, tuning.block_s, tuning.min_blocks)
+        blocks = noise.numbers(stretches, joint, observed, "validate")
         return held_out_gain(white[:, 0], white[:, 1], blocks)
 
     def validation_rms(self, fit: Fit, joint: int) -> float:
@@ -106,40 +109,25 @@ class Comparison:
         return float(np.sqrt(np.mean(self.model.residual_at(joint, fit)[rows] ** 2)))
 
 
-PUSH_LEVEL = 0.3  # of a push's peak
-MIN_PUSH_S = 0.15  # s in motion: a shorter push is a reversal
-MAX_EXTREME_SHARE = 0.5  # of the push's samples
-
-
-def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array) -> str | None:
+def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array, tuning: EvidenceTuning) -> str | None:
     """What speaks against a push at a joint (from 0), in a few words.
 
     push: (rows,), its torque; torque: (rows,), what the model says of the joint without it, N m. A law that the library
     lacks, a spring that stiffens or a limit, shows where position, speed or torque is at an end of its range: where
     that end was reached but once, in this stretch, nothing tells the law from a push.
     """
-    pushed = np.abs(push) > PUSH_LEVEL * np.abs(push).max()
+    pushed = np.abs(push) > tuning.push_level * np.abs(push).max()
     moving = pushed & rows_in(observed.used(joint), len(push))
-    if float(np.sum(moving)) / observed.rate_hz <= MIN_PUSH_S or moving.sum() <= 0.5 * pushed.sum():
+    moving_s = float(np.sum(moving)) / observed.rate_hz
+    if moving_s <= tuning.min_push_s or moving.sum() <= tuning.min_push_moving_share * pushed.sum():
         return "the joint hardly moves during it"
     position, velocity = (observed.kept(name)[:, joint] for name in ("position", "velocity"))
     others = push == 0
     for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(torque))):
         low, high = values[others].min(), values[others].max()
-        if np.mean((values[pushed] < low) | (values[pushed] > high)) > MAX_EXTREME_SHARE:
+        if np.mean((values[pushed] < low) | (values[pushed] > high)) > tuning.max_extreme_share:
             return f"no other stretch has such a {name}"
     return None
-
-
-WIDER_LINKS_FACTOR = 3.0  # times the widest link
-MIN_EXCITATION = 0.25  # of the mean square in identification
-MAX_LOSS = 0.002  # of the validation error
-MAX_LOSS_UNEXCITED = 0.01  # of the same, where validation hardly excites an effect
-MAX_WHITENED_LOSS = 0.05  # of the gain in identification: a whitened loss in validation that is little beside it
-MIN_LOG_RATIO = float(
-    np.log(20)
-)  # units of log likelihood: of two laws with as many numbers, the one that is surely it
-WORSE_LEVEL = 0.99  # one-sided p-value of a gain, for a loss
 
 
 @dataclass(frozen=True)
@@ -173,6 +161,11 @@ class Judge:
 
     model: FittedModel
     state: State
+
+    @property
+    def tuning(self) -> EvidenceTuning:
+        """Bounds of the evidence."""
+        return self.model.design.settings.tuning.evidence
 
     @cached_property
     def compared(self) -> Comparison:
@@ -244,7 +237,8 @@ class Judge:
         solver, state = self.model.solver, self.state
         if not state.widths or not any(state.widths):
             return 0.0
-        wider = solver.fit(State(state.groups, tuple(WIDER_LINKS_FACTOR * max(state.widths) for _ in state.widths)))
+        width = self.tuning.wider_links_factor * max(state.widths)
+        wider = solver.fit(State(state.groups, (width,) * len(state.widths)))
         values = wider.coefficients[solver.groups[group].columns]
         place = self._place(wider, group)
         block = wider.inverse[np.ix_(place, place)]
@@ -256,9 +250,8 @@ class Judge:
         joint, column = candidate.rows[0], int(self.model.solver.groups[group].columns[0])
         own = found.columns.matrices[joint][:, int(np.flatnonzero(found.columns.index[joint] == column)[0])]
         push, observed = own * found.coefficients(found.fit)[column], found.design.observed
-        return reason_no_contact(
-            push, joint, observed, observed.torque[:, joint] - found.residual_at(joint, found.fit) - push
-        )
+        torque = observed.torque[:, joint] - found.residual_at(joint, found.fit) - push
+        return reason_no_contact(push, joint, observed, torque, self.tuning)
 
     def simpler(self, group: int) -> tuple[int, ...]:
         """See `simpler_than`."""
@@ -275,7 +268,7 @@ class Judge:
         if not candidate.shape or set(simpler) & set(state.groups) or numbers > solver.ranks[list(simpler)].sum():
             return False
         usual = State(tuple(sorted({*state.minus(group).groups, *simpler})), state.widths)
-        return solver.fit(state).score > solver.fit(usual).score + MIN_LOG_RATIO
+        return solver.fit(state).score > solver.fit(usual).score + float(np.log(self.tuning.min_likelihood_ratio))
 
     def _beyond_usual(self, group: int) -> Evidence:
         """The evidence against usual friction in the place of one special law, and of all at this joint."""
@@ -297,7 +290,8 @@ class Judge:
 
     def _tested(self, fit: Fit, spread: BlockCovariance, group: int) -> float:
         columns = self.model.solver.groups[group].columns
-        return spread.p_value(fit.coefficients[columns], self._place(fit, group))
+        largest = self.model.design.settings.tuning.blocks.max_variance_ratio
+        return spread.p_value(fit.coefficients[columns], self._place(fit, group), largest)
 
     def _beyond(self, group: int, simpler: tuple[int, ...]) -> float:
         """P-value of what a group explains that the simpler ones in it do not."""
@@ -327,7 +321,8 @@ class Judge:
         joint = max(gains, key=lambda each: max(gains[each], key=lambda gain: gain.share).share)
         validated, inside = gains[joint]
         best = validated if validated.share >= inside.share else inside
-        held_p = min(each.p_value for each in (validated, inside) if each.share >= min(0.5 * best.share, best.share))
+        certain = min(self.tuning.min_certain_share * best.share, best.share)
+        held_p = min(each.p_value for each in (validated, inside) if each.share >= certain)
         p_value, looks = tested
         corrected = min(1.0, p_value * (looks if self.model.design.settings.guards.correction else 1))
         before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
@@ -342,20 +337,20 @@ class Judge:
             after,
             score,
             None,
-            _validation_refutes(validated, inside, after / before - 1 if before > 0 else 0.0),
+            _validation_refutes(validated, inside, after / before - 1 if before > 0 else 0.0, self.tuning),
         )
 
 
-def _validation_refutes(validated: Gain, inside: Gain, growth: float) -> bool:
+def _validation_refutes(validated: Gain, inside: Gain, growth: float, tuning: EvidenceTuning) -> bool:
     """Whether validation data speak against an effect: by not profiting although they excite it, or surely.
 
     growth: of their error as it is, not whitened, as a share. A sure whitened loss that is little beside the gain in
     identification, where they hardly excite it, is an effect whose form is not exact there.
     """
-    if validated.change > MIN_EXCITATION * inside.change:
-        return validated.share < 0 or growth > MAX_LOSS
-    lost = validated.share < -MAX_WHITENED_LOSS * max(inside.share, 0.0) and validated.p_value > WORSE_LEVEL
-    return lost or growth > MAX_LOSS_UNEXCITED
+    if validated.change > tuning.min_excitation * inside.change:
+        return validated.share < 0 or growth > tuning.max_loss
+    large = validated.share < -tuning.max_whitened_loss * max(inside.share, 0.0)
+    return (large and validated.p_value > tuning.worse_level) or growth > tuning.max_loss_unexcited
 
 
 def count_looks(model: FittedModel) -> int:

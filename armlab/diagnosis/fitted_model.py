@@ -18,8 +18,6 @@ from armlab.effects.contract import Family, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from problem.regressor import rigid_body_torque
 
-INITIAL_LINK_WIDTH = 0.08  # of the links' errors, for the first look
-SEARCH_ROUNDS = 2
 Progress = Callable[[str], None]
 
 
@@ -68,7 +66,7 @@ def initial_link_widths(design: DesignMatrix) -> Widths | None:
     """Widths for a look at links that may be off: None without a nominal model or for a refit."""
     if design.prior is None or design.simulation.kind == "refit":
         return None
-    return (INITIAL_LINK_WIDTH,) * design.prior.links
+    return (design.settings.tuning.links.initial_width,) * design.prior.links
 
 
 def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, progress: Progress) -> FittedModel:
@@ -85,12 +83,14 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     progress("looking for candidates")
     left = first.residual(first.fit)
     rng = np.random.default_rng(seed)
-    made = tuple(flexible_features(moved.observed, joint, rng) for joint in range(moved.observed.joints))
+    tuning = design.settings.tuning.surrogate
+    made = tuple(flexible_features(moved.observed, joint, rng, tuning) for joint in range(moved.observed.joints))
     whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made)
     rough = _fit_model(
         whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
     )
-    forward = Search(rough.solver, replace(design.settings.guards, backward_elimination=False), True, 0)
+    guards = replace(design.settings.guards, backward_elimination=False)
+    forward = Search(rough.solver, replace(design.settings, guards=guards), True, 0)
     steps: list[Step] = []
     return replace(rough, state=forward.climb(rough.state, steps))
 
@@ -108,7 +108,7 @@ def _split_by_run(design: DesignMatrix, residual: Array) -> list[Array]:
 
 def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
     """Rounds of search, shapes and model from a first round, which is let go as the next one is made."""
-    for number in range(SEARCH_ROUNDS):
+    for number in range(model.design.settings.tuning.search.rounds):
         progress(f"searching, round {number + 1}")
         noise, known = fit_coloured_noise(model), model.state if number else None
         design, steps = _follow_model(model) if number else model.design, model.steps
@@ -130,30 +130,31 @@ def _search_state(
     design: DesignMatrix, noise: Noise, known: State | None, afresh: bool, steps: tuple[Step, ...]
 ) -> FittedModel:
     """The best state under a noise model, from what is known already, and `afresh` from the two starts."""
-    guards, links = design.settings.guards, len(design.simulation.arm)
+    settings, links = design.settings, len(design.simulation.arm)
     opened = initial_link_widths(design)
     at_rest = None if opened is None else (0.0,) * links
     base = _fit_model(design, noise, State((), at_rest))
     starts = [] if known is None else [known]
     if afresh:
         starts.append(State((), at_rest))
-    if afresh and guards.background_start:
+    if afresh and settings.guards.background_start:
         starts.append(background_state(base.solver, opened))
-    state, moves = Search(base.solver, guards, opened is None, links).best(starts)
+    state, moves = Search(base.solver, settings, opened is None, links).best(starts)
     return replace(base, state=state, steps=(*steps, *moves))
 
 
 def fit_coloured_noise(model: FittedModel) -> Noise:
     """Noise of what a round leaves and no surrogate predicts."""
-    observed, guards = model.design.observed, model.design.settings.guards
+    observed, settings = model.design.observed, model.design.settings
     left = model.residual(model.fit)
     for joint, each in enumerate(model.design.features):
-        left[:, joint] -= predict_structure(left[:, joint], joint, each, observed)
-    return fit_noise(left, observed, len(model.fit.inverse) / observed.joints, guards.prewhitening)
+        left[:, joint] -= predict_structure(left[:, joint], joint, each, observed, settings.tuning.surrogate)
+    fitted = len(model.fit.inverse) / observed.joints
+    return fit_noise(left, observed, fitted, settings.tuning.noise, settings.guards.prewhitening)
 
 
 def _white_noise(residual: Array, design: DesignMatrix) -> Noise:
-    return fit_noise(residual, design.observed, 0.0, colour=False)
+    return fit_noise(residual, design.observed, 0.0, design.settings.tuning.noise, colour=False)
 
 
 def _fit_model(

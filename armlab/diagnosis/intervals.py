@@ -10,10 +10,6 @@ from armlab.diagnosis.blocks import BlockCovariance, block_covariance, whitened_
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.refine import prior_precision
 
-CONFIDENCE = 0.95
-INTERVAL_FACTOR = (
-    1.45  # what no law of friction has at a reversal is no noise: measured on development sets, 0.81 held without
-)
 SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 
 
@@ -31,7 +27,8 @@ class ShapedFit:
     @property
     def factor(self) -> float:
         """From a standard error to half an interval."""
-        return INTERVAL_FACTOR * float(student.ppf((1 + CONFIDENCE) / 2, self.spread.degrees))
+        tuning = self.model.design.settings.tuning.intervals
+        return tuning.factor * float(student.ppf((1 + tuning.confidence) / 2, self.spread.degrees))
 
     def covariance(self, group: int) -> Array:
         """Of a group's coefficients and shapes, unscaled, (coefficients + shapes,) squared."""
@@ -73,8 +70,9 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
             extra[joint] = np.hstack([extra[joint], own])
         places[group] = slice(start, start + count)
         start += count
-    rows = whitened_rows(model.columns, extra, fit, model.moments.lengths, model.noise, bench.observed)
-    spread = block_covariance(rows, prior_precision(model.solver, fit, start), bench.settings.guards.robust_variance)
+    settings, lengths = bench.settings, model.moments.lengths
+    rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, bench.observed, settings.tuning.blocks)
+    spread = block_covariance(rows, prior_precision(model.solver, fit, start), settings.guards.robust_variance)
     return ShapedFit(model, spread, places)
 
 

@@ -14,8 +14,6 @@ from problem.base_parameters import BaseParameters
 from problem.pseudo_inertia import entropic_information, pseudo_inertias, regular_nominal
 
 Widths = tuple[float, ...]
-LINK_UNCERTAINTY_GRID = (0.01, 0.02, 0.04, 0.08, 0.16)  # of all links alike
-SINGLE_LINK_GRID = (*LINK_UNCERTAINTY_GRID, 0.5)  # of one link, which may carry what the simulation does not know
 MIN_VARIANCE_RATIO = 1e-12  # of the largest variance of a base parameter, in scaled columns
 
 

@@ -12,11 +12,8 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment
+from armlab.diagnosis.tuning import NoiseTuning
 from armlab.recordings.recording import Role
-
-FILTER_CORRELATION_ROWS = 1.5  # rows that the filter ties together
-MAX_ORDER = 12  # order at most
-WHITE_NOISE_SHARE = 1e-3  # of the variance, added as white noise: bounds how much a quiet band of frequencies is lifted
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +58,7 @@ def _prediction_errors(rows: Array, taps: Array) -> Array:
     return out
 
 
-def fit_noise(residuals: Array, observed: Observed, fitted: float, colour: bool = True) -> Noise:
+def fit_noise(residuals: Array, observed: Observed, fitted: float, tuning: NoiseTuning, colour: bool = True) -> Noise:
     """The noise of residuals (rows, joints) that `fitted` columns a joint have been taken out of.
 
     colour: False for errors that count as independent of each other.
@@ -69,12 +66,15 @@ def fit_noise(residuals: Array, observed: Observed, fitted: float, colour: bool 
     taps, scales, resting = [], [], []
     for joint in range(residuals.shape[1]):
         parts = [residuals[each.start : each.stop, joint] for each in observed.used(joint)]
-        found, variance = _fit_autoregression(parts) if colour else (np.ones(1), _mean_square(parts))
+        found, variance = _fit_autoregression(parts, tuning) if colour else (np.ones(1), _mean_square(parts))
         count = sum(map(len, parts))
-        spare = count / max(count - fitted, 0.2 * count)
+        spare = count / max(count - fitted, tuning.min_free_share * count)
         taps.append(found)
         scales.append(float(np.sqrt(variance * spare)))
-        resting.append(_rest_scales(residuals[:, joint], np.sqrt(_mean_square(parts) * spare), joint, observed))
+        moving = np.sqrt(_mean_square(parts) * spare)
+        resting.append(
+            np.sqrt(tuning.filter_correlation_rows) * _rest_scales(residuals[:, joint], moving, joint, observed)
+        )
     return Noise(tuple(taps), tuple(scales), tuple(resting))
 
 
@@ -83,19 +83,20 @@ def _rest_scales(residual: Array, moving: float, joint: int, observed: Observed)
     out = np.full(len(residual), moving)
     for each in observed.stretches_at_rest(joint):
         out[each.start : each.stop] = max(float(np.sqrt(np.mean(residual[each.start : each.stop] ** 2))), moving)
-    return np.asarray(out * np.sqrt(FILTER_CORRELATION_ROWS))
+    return out
 
 
 def _mean_square(parts: Sequence[Array]) -> float:
     return max(float(np.mean(np.concatenate(parts) ** 2)), 1e-300)
 
 
-def _fit_autoregression(parts: Sequence[Array]) -> tuple[Array, float]:
+def _fit_autoregression(parts: Sequence[Array], tuning: NoiseTuning) -> tuple[Array, float]:
     """Least squares on the rows before, with the order of the least BIC (Schwarz 1978)."""
-    longest = min(MAX_ORDER, min(map(len, parts)) // 4)
+    longest = min(tuning.max_order, min(map(len, parts)) // tuning.min_rows_per_order)
     lagged = np.concatenate([np.lib.stride_tricks.sliding_window_view(part, longest + 1) for part in parts])
     count, products = len(lagged), lagged.T @ lagged / len(lagged)
-    products = products[::-1, ::-1] + WHITE_NOISE_SHARE * np.trace(products) / (longest + 1) * np.eye(longest + 1)
+    white = tuning.white_noise_share * np.trace(products) / (longest + 1)
+    products = products[::-1, ::-1] + white * np.eye(longest + 1)
     if products[0, 0] <= 0:
         return np.ones(1), 1e-300
     best = (np.inf, np.ones(1), float(products[0, 0]))

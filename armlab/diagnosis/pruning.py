@@ -8,34 +8,26 @@ from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.solver import State
 
-SINGLE_EVENT_SHARE = 1 / 3  # of the least gain: what happened once acts in a small part of the time
-SELF_EVIDENT_GAIN = 0.25  # of the held-out error: a gain that needs no other evidence for its name
-MAX_CYCLES = 3  # of withdrawing and looking again
-HELD_OUT_LEVEL = 0.05  # of the one-sided test on held-out data
-LARGE_GAIN, LARGE_GAIN_LEVEL = 0.2, 0.2  # a gain that no chance makes, though a few stretches hold most of it
 Pruned = tuple[FittedModel, dict[int, Evidence], dict[int, Evidence]]
 _State = tuple[State, dict[int, Evidence], frozenset[int]]
 
 
 def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
     """Why an effect may not be claimed; None where it passes."""
-    guards = settings.guards
+    guards, tuning = settings.guards, settings.tuning.pruning
     if guards.physics_signs and evidence.objection is not None:
         return evidence.objection
-    if evidence.corrected > settings.level:
+    if evidence.corrected > tuning.level:
         return f"p = {evidence.corrected:.2g} after correction"
-    if not evidence.usual and evidence.score < settings.least_evidence and evidence.gain < SELF_EVIDENT_GAIN:
+    if not evidence.usual and evidence.score < tuning.least_evidence and evidence.gain < tuning.self_evident_gain:
         return f"log evidence {evidence.score:.0f}: too little for a name"
-    least = settings.least_gain * (1.0 if evidence.repeatable else SINGLE_EVENT_SHARE)
+    least = tuning.least_gain * (1.0 if evidence.repeatable else tuning.single_event_share)
     if guards.heldout_gain and evidence.gain < least:
         return f"held-out gain {100 * evidence.gain:.2g} %"
     if not evidence.repeatable:
         return None
-    if (
-        guards.heldout_gain
-        and not evidence.usual
-        and evidence.held_p > (LARGE_GAIN_LEVEL if evidence.gain > LARGE_GAIN else HELD_OUT_LEVEL)
-    ):
+    level = tuning.large_gain_level if evidence.gain > tuning.large_gain else tuning.held_out_level
+    if guards.heldout_gain and not evidence.usual and evidence.held_p > level:
         return f"held-out gain not sure (p = {evidence.held_p:.2g})"
     if guards.heldout_gain and evidence.worse:
         return f"validation gets worse by {-100 * evidence.validation_gain:.2g} %"
@@ -56,10 +48,10 @@ def _prune_and_search(
     model: FittedModel, state: State, banned: frozenset[int], steps: list[Step], fixed: bool = False
 ) -> _State:
     """What passes of a state, and of what the search finds once more. fixed: whether the links' widths stay."""
-    for _ in range(MAX_CYCLES):
+    for _ in range(model.design.settings.tuning.pruning.max_cycles):
         state, effects, banned = _remove_failing(model, state, banned, steps)
         known = fixed or state.widths is None
-        search = Search(model.solver, model.design.settings.guards, known, len(state.widths or ()), banned)
+        search = Search(model.solver, model.design.settings, known, len(state.widths or ()), banned)
         again = search.climb(state, steps)
         if again == state:
             return state, effects, banned

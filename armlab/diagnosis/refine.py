@@ -18,10 +18,6 @@ from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.solver import Fit, Solver, State
 from armlab.effects.contract import Candidate
 
-EVALUATIONS_PER_SHAPE = 18  # a shape parameter
-LOGARITHMIC_RATIO = 30.0  # bounds so far apart are searched by their logarithm
-FIRST_STEP = 0.08  # of the way between the bounds
-
 
 @dataclass(frozen=True, eq=False)
 class Profile:
@@ -61,7 +57,8 @@ def refine_shapes(design: DesignMatrix, noise: Noise, solver: Solver, state: Sta
 
 def _profile_without(design: DesignMatrix, noise: Noise, solver: Solver, rest: State) -> Profile:
     fit, columns = solver.fit(rest), design.columns
-    rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, design.observed)
+    blocks = design.settings.tuning.blocks
+    rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, design.observed, blocks)
     joints = range(columns.joints)
     return Profile(
         dict(zip(joints, rows.designs, strict=True)), dict(zip(joints, rows.errors, strict=True)), fit.inverse
@@ -73,7 +70,8 @@ def _search_shape(design: DesignMatrix, noise: Noise, profile: Profile, block: B
     def whiten(matrix: Array, joint: int) -> Array:
         return noise.white(matrix, joint, design.observed, "identify")
 
-    to_shape, to_unit = _unit_cube_maps(block.candidate)
+    tuning = design.settings.tuning.refine
+    to_shape, to_unit = _unit_cube_maps(block.candidate, tuning.logarithmic_ratio)
     best = (profile.gain(block, whiten), block)
 
     def loss(unit: Array) -> float:
@@ -88,19 +86,23 @@ def _search_shape(design: DesignMatrix, noise: Noise, profile: Profile, block: B
         return -gain
 
     start = to_unit(block.candidate.shape)
-    simplex = np.vstack([start, *(start + step for step in np.diag(np.where(start > 0.5, -FIRST_STEP, FIRST_STEP)))])
-    evaluations = EVALUATIONS_PER_SHAPE * len(start)
-    options = {"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-4, "fatol": 0.05}
+    steps = np.diag(np.where(start > 0.5, -tuning.first_step, tuning.first_step))
+    options = {
+        "maxfev": tuning.evaluations_per_shape * len(start),
+        "initial_simplex": np.vstack([start, *(start + step for step in steps)]),
+        "xatol": tuning.shape_tolerance,
+        "fatol": tuning.gain_tolerance,
+    }
     minimize(loss, start, method="Nelder-Mead", options=options)
     return best[1] if best[1] is not block else None
 
 
 def _unit_cube_maps(
-    candidate: Candidate,
+    candidate: Candidate, logarithmic_ratio: float
 ) -> tuple[Callable[[Array], tuple[float, ...]], Callable[[tuple[float, ...]], Array]]:
-    """Between the unit cube and shapes; by logarithm where the bounds are far apart."""
+    """Between the unit cube and shapes; by logarithm where the bounds are `logarithmic_ratio` apart."""
     low, high = np.array(candidate.bounds, dtype=float).T
-    logarithmic = (low > 0) & (high > LOGARITHMIC_RATIO * low)
+    logarithmic = (low > 0) & (high > logarithmic_ratio * low)
     a = np.where(logarithmic, np.log(np.where(low > 0, low, 1)), low)
     b = np.where(logarithmic, np.log(np.where(high > 0, high, 1)), high)
 

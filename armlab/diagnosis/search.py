@@ -8,9 +8,10 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Group
-from armlab.diagnosis.links import LINK_UNCERTAINTY_GRID, SINGLE_LINK_GRID, Widths
-from armlab.diagnosis.settings import Guards
-from armlab.diagnosis.solver import CROWD_PENALTY, Solver, State
+from armlab.diagnosis.links import Widths
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.solver import Solver, State
+from armlab.diagnosis.tuning import SearchTuning
 
 
 def contained_groups(groups: Sequence[Group], number: int) -> tuple[int, ...]:
@@ -27,12 +28,6 @@ def contained_groups(groups: Sequence[Group], number: int) -> tuple[int, ...]:
     )
 
 
-MAX_CANDIDATES_ASKED = 40  # best candidates of a step that are asked for their physics
-MAX_UNUSUAL_EFFECTS = 12  # effects beside friction and offsets: a start that asks for more has lost its way
-MIN_SCORE_STEP = 1e-6  # of a score: smaller steps are rounding
-MAX_MOVES = 200
-
-
 @dataclass(frozen=True)
 class Step:
     """One move of the search, for the log."""
@@ -47,10 +42,15 @@ class Search:
     banned: groups that were withdrawn."""
 
     solver: Solver
-    guards: Guards
+    settings: Settings
     fixed: bool
     links: int
     banned: frozenset[int] = frozenset()
+
+    @property
+    def tuning(self) -> SearchTuning:
+        """Bounds of the search."""
+        return self.settings.tuning.search
 
     def best(self, starts: Sequence[State]) -> tuple[State, tuple[Step, ...]]:
         """The best state that the starts lead to, and the moves of all."""
@@ -63,7 +63,7 @@ class Search:
 
     def climb(self, state: State, steps: list[Step]) -> State:
         """The state where no move raises the score any more."""
-        for _ in range(MAX_MOVES):
+        for _ in range(self.tuning.max_moves):
             better = self._step(state)
             if better is None:
                 break
@@ -78,12 +78,12 @@ class Search:
             if not found:
                 continue
             what, other = max(found, key=lambda move: self.solver.fit(move[1]).score)
-            if self.solver.fit(other).score > here + MIN_SCORE_STEP:
+            if self.solver.fit(other).score > here + self.tuning.min_score_step:
                 return what, other
         return None
 
     def _forward(self, state: State) -> Iterator[tuple[str, State]]:
-        crowded = self.solver.crowd(state.groups) >= MAX_UNUSUAL_EFFECTS
+        crowded = self.solver.crowd(state.groups) >= self.tuning.max_unusual_effects
         added = None if crowded else self._addition(state)
         if added is not None:
             yield f"+ {self._name(added)}", self.with_group(state, added)
@@ -136,7 +136,7 @@ class Search:
         asked = 0
         for group in np.argsort(-gains):
             number = int(group)
-            if gains[number] <= MIN_SCORE_STEP or asked >= MAX_CANDIDATES_ASKED:
+            if gains[number] <= self.tuning.min_score_step or asked >= self.tuning.max_candidates_asked:
                 return None
             if number == but or number in self.banned or self.excluded(state, number):
                 continue
@@ -151,7 +151,8 @@ class Search:
         for number in self._replacing:
             replaced = self._replaced(state, number)
             gains[number] += sum(self.solver.prices[other] for other in replaced)
-            gains[number] += CROWD_PENALTY * sum(bool(self.solver.unusual[other]) for other in replaced)
+            unusual = sum(bool(self.solver.unusual[other]) for other in replaced)
+            gains[number] += self.solver.tuning.crowd_penalty * unusual
         return gains
 
     @cached_property
@@ -160,7 +161,7 @@ class Search:
 
     def objection(self, state: State, group: int) -> str | None:
         """What physics says against a group as it is fitted in a state."""
-        if not self.guards.physics_signs:
+        if not self.settings.guards.physics_signs:
             return None
         fit = self.solver.fit(state)
         candidate = self.solver.groups[group].candidate
@@ -168,7 +169,7 @@ class Search:
         return candidate.absurdity(values) or candidate.objection(values, covariance)
 
     def _backward(self, state: State) -> Iterator[tuple[str, State]]:
-        if not self.guards.backward_elimination or not state.groups:
+        if not self.settings.guards.backward_elimination or not state.groups:
             return
         losses = self.solver.losses(self.solver.fit(state))
         group = max(losses, key=lambda each: losses[each])
@@ -176,7 +177,7 @@ class Search:
             yield f"- {self._name(group)}", state.minus(group)
 
     def _exchanges(self, state: State) -> Iterator[tuple[str, State]]:
-        if not self.guards.backward_elimination:
+        if not self.settings.guards.backward_elimination:
             return
         for group in state.groups:
             for without in self._without(state, group):
@@ -209,8 +210,9 @@ class Search:
 
     def _neighbours(self, widths: Widths) -> Iterator[Widths]:
         """All links alike, or one link changed."""
-        yield from ((size,) * self.links for size in (0.0, *LINK_UNCERTAINTY_GRID))
-        for size in (0.0, *SINGLE_LINK_GRID):
+        tried = self.settings.tuning.links
+        yield from ((size,) * self.links for size in (0.0, *tried.uncertainty_grid))
+        for size in (0.0, *tried.single_link_grid):
             for link in range(self.links):
                 yield tuple(size if other == link else width for other, width in enumerate(widths))
 

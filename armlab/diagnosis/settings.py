@@ -1,11 +1,12 @@
-"""What a diagnosis may be told: its level of doubt, its filters, and the guards that keep its claims honest."""
+"""Settings of a diagnosis: the guards that keep its claims honest, and its tuning numbers."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
+from armlab.diagnosis.tuning import Tuning, change_tuning
 
 Baseline = Literal["nominal", "refit", "simulated"]
 
@@ -46,17 +47,15 @@ def guards_without(names: Iterable[str]) -> Guards:
 
 @dataclass(frozen=True)
 class Settings:
-    """level: chance of any false claim on a recording with nothing missing. least_gain: share of the error variance
-    of its joints by which a claim has to lower the error on held-out data. least_evidence: what a name has to add to
-    the model's log evidence: about what an effect of twice the size shows that can be detected at all; below, laws
-    that resemble one another are still taken for one another. cutoff_hz: of the filter that torque
-    and columns share (lower where the sampling rate asks for it). rows_per_cutoff: rows kept in one period of it: so
-    few that hardly any frequency is kept which the filter has emptied, for whitening would lift it.
-    """
+    """The guards, and the tuning numbers of each stage."""
 
-    level: float = 0.01
-    least_gain: float = 0.03
-    least_evidence: float = 60.0
-    cutoff_hz: float = 40.0
-    rows_per_cutoff: float = 2.2
     guards: Guards = Guards()
+    tuning: Tuning = field(default_factory=Tuning)
+
+
+def vary(settings: Settings, name: str, value: object) -> Settings:
+    """The settings with another value of one tuning number, as in `vary(settings, "noise.max_order", 8)`.
+
+    Raises InputError, in one line, for an unknown name, a value of a wrong type, or one that cannot be computed with.
+    """
+    return replace(settings, tuning=change_tuning(settings.tuning, name, value))

@@ -8,6 +8,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.settings import Baseline
+from armlab.diagnosis.tuning import SoundnessTuning
 from armlab.effects.scene import Scene, scene_of
 from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
@@ -75,23 +76,14 @@ def _has_nominal(recording: Recording) -> bool:
     return recording.arm.links is not None or recording.simulation is not None
 
 
-MIN_DURATION_S = 2.0  # s of motion in all runs that identify
-MIN_TRAVEL = 1e-3  # rad (m): less is no motion
-UNIT_FACTOR = 3.0  # a torque that is so many times too large or too small on all joints is in another unit
-MIN_EXPLAINED_SHARE = (
-    0.3  # of the torque's scatter: a simulation that explains less on a joint says nothing about its unit
-)
-NO_EXPLAINED_SHARE = 0.02  # of it, on every joint: no simulation of this arm
-
-
-def reason_unusable(recording: Recording) -> str | None:
+def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None:
     """The reason in a sentence; None for a recording that can be used."""
     runs = recording.with_role("identify") or recording.runs
     seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
-    if seconds < MIN_DURATION_S:
+    if seconds < tuning.min_duration_s:
         return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
     travel = np.max([np.ptp(run.position, axis=0) for run in recording.runs], axis=0)
-    if not np.any(travel > MIN_TRAVEL):
+    if not np.any(travel > tuning.min_travel):
         return "No joint moves in any run: there is nothing that the torques could be compared with."
     silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
     if silent:
@@ -100,13 +92,13 @@ def reason_unusable(recording: Recording) -> str | None:
     return None if swapped is None else f"The {swapped.text}. Put the columns right before looking for physics."
 
 
-def reason_misread(observed: Observed, simulation: Simulation) -> str | None:
+def reason_misread(observed: Observed, simulation: Simulation, tuning: SoundnessTuning) -> str | None:
     """Torque in a wrong unit or of the wrong sign, or the robot of another arm: where all joints say so together."""
     if simulation.kind == "refit" or simulation.inertial is None:
         return None
     gains, shares = _torque_gains(observed, simulation)
-    told = shares > MIN_EXPLAINED_SHARE
-    if shares.max() < NO_EXPLAINED_SHARE:
+    told = shares > tuning.min_explained_share
+    if shares.max() < tuning.no_explained_share:
         return (
             "The simulation explains next to nothing of any joint's torque: the robot file of another arm, or torque "
             "columns that are none?"
@@ -114,7 +106,7 @@ def reason_misread(observed: Observed, simulation: Simulation) -> str | None:
     factor = float(np.median(gains[told])) if told.any() else 1.0
     if factor < 0:
         return "The measured torque has the opposite sign of the simulated one: turn its sign in `transmission`."
-    if factor > UNIT_FACTOR or factor < 1 / UNIT_FACTOR:
+    if factor > tuning.unit_factor or factor < 1 / tuning.unit_factor:
         return f"The measured torque is about {factor:.3g} times the simulated one: another unit, or gains missing?"
     return None
 

@@ -16,10 +16,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Group, Moments
 from armlab.diagnosis.links import LinkPrior, Widths
-
-RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
-MIN_UNABSORBED_SHARE = 1e-6  # of a column's squared length: what less of it is left is not seen
-CROWD_PENALTY = 4.0  # units of log likelihood that each unusual effect makes the next one dearer: many at once are rare
+from armlab.diagnosis.tuning import SolverTuning
 
 
 @dataclass(frozen=True)
@@ -69,15 +66,17 @@ class Solver:
         prior: LinkPrior | None,
         places: int,
         scales: Sequence[float],
+        tuning: SolverTuning,
     ) -> None:
         self.moments, self.groups, self.base, self.prior, self.places = moments, groups, base, prior, places
+        self.tuning = tuning
         self.precisions = self._precisions(scales)
         self._links: dict[Widths | None, tuple[Array, Array, float, float]] = {}
         self._fits: dict[State, Fit] = {}
 
     def _precisions(self, scales: Sequence[float]) -> Array:
         """Prior precision of each scaled column, (size,)."""
-        out = np.full(self.moments.size, RIDGE)
+        out = np.full(self.moments.size, self.tuning.ridge)
         for group, scale in zip(self.groups, scales, strict=True):
             out[group.columns] += 1 / (scale * self.moments.lengths[group.columns]) ** 2
         return out
@@ -90,10 +89,9 @@ class Solver:
     @cached_property
     def ranks(self) -> NDArray[np.intp]:
         """Independent columns of each group."""
-        gram = self.moments.gram
-        return np.array(
-            [_numerical_rank(gram[np.ix_(each.columns, each.columns)]) for each in self.groups], dtype=np.intp
-        )
+        blocks = [self.moments.gram[np.ix_(each.columns, each.columns)] for each in self.groups]
+        share = self.tuning.min_unabsorbed_share
+        return np.array([_numerical_rank(block, share) for block in blocks], dtype=np.intp)
 
     def _price(self, group: Group) -> float:
         number = next(index for index, each in enumerate(self.groups) if each is group)
@@ -120,7 +118,7 @@ class Solver:
     def _linked(self, widths: Widths | None) -> tuple[Array, Array, float, float]:
         gram, base = self.moments.gram, self.base
         if widths is None or self.prior is None:
-            factor, precision = np.eye(base), 10 * RIDGE
+            factor, precision = np.eye(base), 10 * self.tuning.ridge
             return factor, gram[:base], precision, 0.0
         if not any(widths):
             return np.empty((base, 0)), np.empty((0, len(gram))), 1.0, 0.0
@@ -168,7 +166,7 @@ class Solver:
             coefficients[: self.base] = factor @ solution[:rank]
             coefficients[columns] = solution[rank:]
         count = self.crowd(state.groups)
-        price += float(np.sum(self.prices[list(state.groups)])) + CROWD_PENALTY * count * (count - 1) / 2
+        price += float(np.sum(self.prices[list(state.groups)])) + self.tuning.crowd_penalty * count * (count - 1) / 2
         score = 0.5 * chi_square - price
         return Fit(state, coefficients, score, chi_square, columns, factor, inverse)
 
@@ -181,7 +179,7 @@ class Solver:
         out = np.empty(len(self.groups))
         for width, (numbers, columns) in self._by_width.items():
             out[numbers] = self._gains(whole, columns, width)
-        return out - self.prices - CROWD_PENALTY * self.crowd(state.groups) * self.unusual
+        return out - self.prices - self.tuning.crowd_penalty * self.crowd(state.groups) * self.unusual
 
     @cached_property
     def _by_width(self) -> dict[int, tuple[NDArray[np.intp], NDArray[np.intp]]]:
@@ -201,13 +199,14 @@ class Solver:
         rest = rest + self.precisions[columns][:, :, None] * np.eye(width)
         towards = gram[columns, -1] - np.einsum("rgi,r->gi", part, whole[:, -1])
         # what is absorbed counts for nothing: the ridge bounds it
-        solved = np.linalg.solve(rest + MIN_UNABSORBED_SHARE * np.eye(width), towards[:, :, None])[:, :, 0]
+        bounded = rest + self.tuning.min_unabsorbed_share * np.eye(width)
+        solved = np.linalg.solve(bounded, towards[:, :, None])[:, :, 0]
         return np.asarray(0.5 * np.sum(towards * solved, axis=1))
 
     def losses(self, fit: Fit) -> dict[int, float]:
         """How much the score changes where a group of the model is taken out."""
         rank, at = fit.links.shape[1], 0
-        crowd, out = CROWD_PENALTY * (self.crowd(fit.state.groups) - 1), {}
+        crowd, out = self.tuning.crowd_penalty * (self.crowd(fit.state.groups) - 1), {}
         for group in fit.state.groups:
             count = len(self.groups[group].columns)
             place = slice(rank + at, rank + at + count)
@@ -231,6 +230,6 @@ class Solver:
         return np.asarray(fit.coefficients[columns] / self.moments.lengths[columns])
 
 
-def _numerical_rank(gram: Array) -> int:
+def _numerical_rank(gram: Array, least_share: float) -> int:
     values = np.linalg.eigvalsh(gram)
-    return int(np.sum(values > MIN_UNABSORBED_SHARE * max(values[-1], 1e-300)))
+    return int(np.sum(values > least_share * max(values[-1], 1e-300)))

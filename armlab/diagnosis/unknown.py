@@ -12,11 +12,11 @@ from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.solver import State
-from armlab.diagnosis.surrogate import MIN_STRUCTURE_GAIN, Structure, feature_banks, find_structure
+from armlab.diagnosis.surrogate import Structure, feature_banks, find_structure
+from armlab.diagnosis.tuning import Tuning, UnknownTuning
 from armlab.effects.contract import UNKNOWN
 
 HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
-UNKNOWN_LEVEL = 0.03  # of the test between stretches of time, after all surrogates that were tried
 
 
 def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Structure, ...]:
@@ -29,16 +29,17 @@ def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Struct
 
 def _surest_structure(model: FittedModel, residual: Array, joint: int, noise: Noise) -> Structure:
     """What the surest surrogate predicts of a joint's residual (rows,), its p-value that of the best of all."""
-    observed = model.design.observed
-    few = feature_banks(observed, joint, observed.torque[:, joint] - residual)
-    tried = [find_structure(residual, joint, each, noise, observed) for each in (model.design.features[joint], *few)]
-    best = min(tried, key=lambda each: (each.gain <= MIN_STRUCTURE_GAIN, each.p_value))
+    observed, tuning = model.design.observed, model.design.settings.tuning.surrogate
+    few = feature_banks(observed, joint, observed.torque[:, joint] - residual, tuning)
+    features = (model.design.features[joint], *few)
+    tried = [find_structure(residual, joint, each, noise, observed, tuning) for each in features]
+    best = min(tried, key=lambda each: (each.gain <= tuning.min_structure_gain, each.p_value))
     return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
 
 
-def is_structured(each: Structure) -> bool:
+def is_structured(each: Structure, tuning: Tuning) -> bool:
     """Whether it is more than chance, and large enough to matter."""
-    return each.gain > MIN_STRUCTURE_GAIN and each.p_value < UNKNOWN_LEVEL
+    return each.gain > tuning.surrogate.min_structure_gain and each.p_value < tuning.unknown.level
 
 
 def make_unknown_claim(model: FittedModel, each: Structure, residual: Array) -> Claim:
@@ -75,24 +76,22 @@ def make_unknown_claim(model: FittedModel, each: Structure, residual: Array) -> 
     )
 
 
-MAX_RESIDUAL_RATIO = 1.0  # of the held-out error power that a law explains
-FORM_ERROR_SHARE = 0.25  # of the same: what the form of a law may be wrong by
-
-
-def names_contradicted_by_residual(claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> frozenset[int]:
+def names_contradicted_by_residual(
+    claimed: Mapping[int, Evidence], left: Sequence[Structure], tuning: Tuning
+) -> frozenset[int]:
     """The groups or links whose names do not hold; friction and offsets, which every arm has, keep theirs."""
-    over = {each.joint: _predicted_share(each) for each in left if is_structured(each)}
+    over = {each.joint: _predicted_share(each) for each in left if is_structured(each, tuning)}
     return frozenset(
         number
         for number, each in claimed.items()
-        if not each.usual and over.get(each.joint, 0.0) > MAX_RESIDUAL_RATIO * each.gain
+        if not each.usual and over.get(each.joint, 0.0) > tuning.unknown.max_residual_ratio * each.gain
     )
 
 
-def is_form_error(each: Structure, effects: Mapping[int, Evidence]) -> bool:
+def is_form_error(each: Structure, effects: Mapping[int, Evidence], tuning: UnknownTuning) -> bool:
     """Whether structure is what the form of a law that is named at this joint leaves."""
     explained = [own.gain for own in effects.values() if own.joint == each.joint and not own.usual]
-    return _predicted_share(each) <= FORM_ERROR_SHARE * max(explained, default=0.0)
+    return _predicted_share(each) <= tuning.form_error_share * max(explained, default=0.0)
 
 
 def _predicted_share(each: Structure) -> float:

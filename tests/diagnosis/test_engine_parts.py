@@ -14,8 +14,11 @@ from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import read_simulation
 from armlab.diagnosis.solver import Solver, State
 from armlab.diagnosis.surrogate import feature_banks, find_structure, flexible_features
+from armlab.diagnosis.tuning import Tuning
 from armlab.effects.library import library
 from problem.base_parameters import base_parameters
+
+TUNING = Tuning()
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +39,12 @@ def observed(bench: DesignMatrix) -> Observed:
 
 def solved(bench: DesignMatrix) -> Solver:
     columns = bench.columns
-    return bench.solver(fit_noise(columns.target, bench.observed, 0.0))[1]
+    return bench.solver(fit_noise(columns.target, bench.observed, 0.0, TUNING.noise))[1]
 
 
 def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Observed) -> None:
     coloured = lfilter([0.3], [1, -0.9], np.random.default_rng(0).standard_normal((observed.rows, 3)), axis=0)
-    noise = fit_noise(coloured, observed, 0.0)
+    noise = fit_noise(coloured, observed, 0.0, TUNING.noise)
     white = noise.whitened(coloured[:, :1], 0, observed.used(0))[:, 0]
     assert np.var(white) == pytest.approx(1, abs=0.05)
     assert abs(np.mean(white[1:] * white[:-1])) < 0.06
@@ -50,7 +53,7 @@ def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Obs
 def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench: DesignMatrix) -> None:
     solver = solved(bench)
     columns = bench.columns
-    noise = fit_noise(columns.target, bench.observed, 0.0)
+    noise = fit_noise(columns.target, bench.observed, 0.0, TUNING.noise)
     state = State((0, 4, 8), (0.0, 0.0, 0.0))
     fit = solver.fit(state)
     rows, targets = [], []
@@ -100,35 +103,36 @@ def test_widths_are_the_relative_size_of_a_link_that_is_scaled() -> None:
 def test_parts_are_the_long_stretches_where_a_joint_moves() -> None:
     moving = np.ones(200, dtype=bool)
     moving[90:95] = moving[120] = False
-    found = split_segment(Segment(0, "identify", 10, 190), moving)
+    found = split_segment(Segment(0, "identify", 10, 190), moving, TUNING.data.min_segment_rows)
     assert [(each.start, each.stop) for each in found] == [(10, 90), (121, 190)]
 
 
 def test_a_surrogate_finds_structure_of_other_joints_and_none_in_noise(observed: Observed) -> None:
     rng = np.random.default_rng(1)
-    made = flexible_features(observed, 0, rng)
+    made = flexible_features(observed, 0, rng, TUNING.surrogate)
     noise_only = 0.05 * rng.standard_normal((observed.rows, 3))
-    noise = fit_noise(noise_only, observed, 0.0)
+    noise = fit_noise(noise_only, observed, 0.0, TUNING.noise)
     wave = np.sin(3 * observed.kept("position")[:, 2]) * 0.2
-    found = find_structure(noise_only[:, 0] + wave, 0, made, noise, observed)
+    found = find_structure(noise_only[:, 0] + wave, 0, made, noise, observed, TUNING.surrogate)
     assert found.gain > 0.5
     assert "position_3" in found.depends_on
-    assert find_structure(noise_only[:, 0], 0, made, noise, observed).gain < 0.05
+    assert find_structure(noise_only[:, 0], 0, made, noise, observed, TUNING.surrogate).gain < 0.05
 
 
 def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed) -> None:
     """A torque constant that falls with speed, on one joint that carries another's load."""
     rng = np.random.default_rng(2)
     left = 0.05 * rng.standard_normal(observed.rows)
-    noise = fit_noise(np.column_stack([left] * 3), observed, 0.0)
+    noise = fit_noise(np.column_stack([left] * 3), observed, 0.0, TUNING.noise)
     load = np.sin(2 * observed.kept("position")[:, 2]) + observed.kept("acceleration")[:, 1] / 10
     weak = 0.02 * load * observed.kept("velocity")[:, 1] ** 2
-    found = [find_structure(left + weak, 1, each, noise, observed) for each in feature_banks(observed, 1, load)]
+    banks = list(feature_banks(observed, 1, load, TUNING.surrogate))
+    found = [find_structure(left + weak, 1, each, noise, observed, TUNING.surrogate) for each in banks]
     best = max(found, key=lambda each: each.gain)
     assert best.gain > 0.2
     assert best.p_value < 0.05
     assert set(best.depends_on) <= {"torque_2", "velocity_2"}
-    chance = [find_structure(left, 1, each, noise, observed) for each in feature_banks(observed, 1, load)]
+    chance = [find_structure(left, 1, each, noise, observed, TUNING.surrogate) for each in banks]
     assert min(each.p_value for each in chance) * len(chance) > 0.1
 
 

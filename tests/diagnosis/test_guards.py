@@ -1,13 +1,18 @@
 """Guards of the diagnosis as switches."""
 
+from pathlib import Path
+
 import engine_cases as cases
 import pytest
+from click.testing import CliRunner
 
+from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.diagnosis.ablation import ALL_ON, GUARDS_AFTER_SEARCH, GUARDS_IN_SEARCH, diagnose_without_each
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.settings import GUARDS, Guards, Settings, guards_without
+from armlab.diagnosis.settings import GUARDS, Guards, Settings, guards_without, vary
+from armlab.diagnosis.tuning import parse_change
 
 
 def test_a_guard_that_is_named_is_off_and_all_others_are_on() -> None:
@@ -34,3 +39,20 @@ def test_stages_that_a_guard_has_no_part_in_need_not_be_done_again() -> None:
     for guard in (GUARDS_AFTER_SEARCH[2], GUARDS_IN_SEARCH[0]):
         alone = diagnose(recording, settings=Settings(guards=guards_without([guard])))
         assert _told(found[guard]) == _told(alone), guard
+
+
+def test_a_changed_number_is_one_more_diagnosis_beside_the_guards() -> None:
+    recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
+    changes = ("pruning.least_gain=0.9", "data.rows_per_cutoff=3")  # used after the search, and before it
+    found = dict(diagnose_without_each(recording, changes))
+    assert list(found) == [ALL_ON, *GUARDS, *changes]
+    for change in changes:
+        alone = diagnose(recording, settings=vary(Settings(), *parse_change(change)))
+        assert _told(found[change]) == _told(alone) != _told(found[ALL_ON]), change
+
+
+def test_an_ablation_refuses_a_number_that_there_is_not_before_it_starts(tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["ablate", "--work", str(tmp_path / "work"), "--vary", "noise.order=8"])
+    assert result.exit_code == 2
+    assert "noise.order: no such tuning number, did you mean 'noise.max_order'?" in result.output
+    assert not (tmp_path / "work").exists()

@@ -10,7 +10,10 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment
 from armlab.diagnosis.evidence import Evidence, reason_no_contact
 from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.tuning import Tuning
 from armlab.diagnosis.unknown import is_form_error, names_contradicted_by_residual
+
+TUNING = Tuning()
 
 
 def _evidence(gain: float, joint: int = 1, usual: bool = False) -> Evidence:
@@ -23,23 +26,23 @@ def _left(gain: float, joint: int = 1, p_value: float = 1e-9) -> Structure:
 
 def test_a_law_that_leaves_as_much_as_it_explains_has_the_wrong_name() -> None:
     effects = {4: _evidence(0.3), 7: _evidence(0.5), 9: _evidence(0.3, joint=0)}
-    assert names_contradicted_by_residual(effects, (_left(0.6),)) == {4}
+    assert names_contradicted_by_residual(effects, (_left(0.6),), TUNING) == {4}
 
 
 @pytest.mark.parametrize("left", [_left(0.4), _left(0.6, p_value=0.5), _left(0.6, joint=2)])
 def test_a_name_holds_where_little_or_nothing_sure_is_left_at_its_joint(left: Structure) -> None:
-    assert not names_contradicted_by_residual({4: _evidence(0.3)}, (left,))
+    assert not names_contradicted_by_residual({4: _evidence(0.3)}, (left,), TUNING)
 
 
 def test_friction_that_every_arm_has_keeps_its_name() -> None:
-    assert not names_contradicted_by_residual({4: _evidence(0.3, usual=True)}, (_left(0.6),))
+    assert not names_contradicted_by_residual({4: _evidence(0.3, usual=True)}, (_left(0.6),), TUNING)
 
 
 def test_what_a_named_law_leaves_of_itself_is_no_finding() -> None:
-    assert is_form_error(_left(0.4), {4: _evidence(5.0)})
-    assert not is_form_error(_left(0.4), {4: _evidence(1.0)})
-    assert not is_form_error(_left(0.4), {4: _evidence(5.0, usual=True)})
-    assert not is_form_error(_left(0.4), {4: _evidence(5.0, joint=0)})
+    assert is_form_error(_left(0.4), {4: _evidence(5.0)}, TUNING.unknown)
+    assert not is_form_error(_left(0.4), {4: _evidence(1.0)}, TUNING.unknown)
+    assert not is_form_error(_left(0.4), {4: _evidence(5.0, usual=True)}, TUNING.unknown)
+    assert not is_form_error(_left(0.4), {4: _evidence(5.0, joint=0)}, TUNING.unknown)
 
 
 def _observed(position: Array, velocity: Array) -> Observed:
@@ -52,26 +55,23 @@ def _observed(position: Array, velocity: Array) -> Observed:
 def test_a_push_in_a_state_that_came_often_is_one() -> None:
     time = np.arange(0, 20, 0.01)
     push = np.where((time > 5) & (time < 6), 3.0, 0.0)
-    assert reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), np.sin(2 * time)) is None
+    assert reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), np.sin(2 * time), TUNING.evidence) is None
 
 
 def test_a_push_at_an_end_of_the_range_that_was_reached_once_may_be_a_law() -> None:
     time = np.arange(0, 20, 0.01)
     inside = (time > 5) & (time < 6)
     push, reach = np.where(inside, 3.0, 0.0), np.where(inside, 2.0, np.sin(time))
-    assert (
-        reason_no_contact(push, 0, _observed(reach, np.cos(time)), np.sin(time))
-        == "no other stretch has such a position"
-    )
-    assert (
-        reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), reach) == "no other stretch has such a torque"
-    )
+    far = reason_no_contact(push, 0, _observed(reach, np.cos(time)), np.sin(time), TUNING.evidence)
+    assert far == "no other stretch has such a position"
+    strong = reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), reach, TUNING.evidence)
+    assert strong == "no other stretch has such a torque"
 
 
 def test_a_short_push_is_a_reversal() -> None:
     time = np.arange(0, 20, 0.01)
     push = np.where((time > 5) & (time < 5.1), 3.0, 0.0)
     assert (
-        reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), np.sin(time))
+        reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), np.sin(time), TUNING.evidence)
         == "the joint hardly moves during it"
     )

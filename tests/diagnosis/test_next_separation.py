@@ -8,7 +8,6 @@ from next_questions import points, told_apart
 from refusals import refusal
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.claims import MAX_DEFICIT
 from armlab.diagnosis.next.decision import (
     decision_chances,
     decision_strength,
@@ -23,10 +22,12 @@ from armlab.diagnosis.next.problem import RivalSettings, TellApartProblem, TellA
 from armlab.diagnosis.next.question import Law, Name, Question, Rival
 from armlab.diagnosis.next.remedies import find_remedies
 from armlab.diagnosis.next.sampling import kept_columns, white_noise_sampling
+from armlab.diagnosis.tuning import Tuning
 from armlab.effects.friction import ViscousFriction
 from problem.arm import Limits
 from problem.robot_file import load_arm
 
+MAX_DEFICIT = Tuning().claims.max_deficit
 COULOMB = RivalSettings(effect="coulomb_friction", joint=2, parameters=(("level", 0.3),))
 STRIBECK = RivalSettings(
     effect="stribeck_friction",

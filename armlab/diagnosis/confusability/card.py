@@ -178,7 +178,7 @@ def confusability_card(
     free = {"nominal": None, "refit": base_rows(base_parameters(arm), scenes, filters)}
     views = {name: compute_confusion(found, scenes, filters, free[name], scatter) for name in VIEWS}
     seconds = sum(float(each.time[-1] - each.time[0]) for each in motions)
-    rows = 2 * chosen.cutoff_hz * seconds
+    rows = 2 * chosen.tuning.data.cutoff_hz * seconds
     entries = tuple(_card_entry(index, views, rows) for index in range(len(found)))
     cosines = {name: view.covered for name, view in views.items()}
     return Card(arm, ", ".join(each.name for each in motions), entries, cosines, scatter, rows)
@@ -206,8 +206,9 @@ def _planned_scene(arm: Arm, planned: PlannedMotion) -> Scene:
 
 
 def _diagnosis_filter(planned: PlannedMotion, settings: Settings) -> Filter:
-    cutoff = min(settings.cutoff_hz, 0.32 * planned.rate_hz)
-    step = max(int(planned.rate_hz / (settings.rows_per_cutoff * cutoff)), 1)
+    tuning = settings.tuning.data
+    cutoff = min(tuning.cutoff_hz, tuning.max_cutoff_ratio * planned.rate_hz)
+    step = max(int(planned.rate_hz / (tuning.rows_per_cutoff * cutoff)), 1)
     return Butterworth(planned.rate_hz, cutoff, len(planned.time), step)
 
 

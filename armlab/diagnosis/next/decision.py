@@ -9,7 +9,6 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.claims import MAX_DEFICIT
 from armlab.diagnosis.next.moments import Index, draw_coefficients, solve_least_squares
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.question import Law, Question, Rival
@@ -80,13 +79,14 @@ def usual_friction_gain(products: Array, left: Array, extras: Index, rows: float
 
 def required_lead(right: Law, other: Law, rows: float) -> float:
     """By how much the likelihood of the right law has to lead that of another, in its logarithm."""
-    return max(MAX_DEFICIT + right.price(rows) - other.price(rows), required_held_out_gain(right, other, rows))
+    deficit = Settings().tuning.claims.max_deficit
+    return max(deficit + right.price(rows) - other.price(rows), required_held_out_gain(right, other, rows))
 
 
 def required_held_out_gain(right: Law, other: Law, rows: float) -> float:
     """What a special law of friction has to gain on usual friction: a share of the held-out error at its joint."""
     if other.candidate.facts.usual and other.candidate.effect in right.candidate.facts.contains:
-        return 0.5 * Settings().least_gain * rows * right.share
+        return 0.5 * Settings().tuning.pruning.least_gain * rows * right.share
     return -np.inf
 
 
@@ -138,7 +138,7 @@ def judge_draws(question: Question, explained: list[Array], right: int, rows: fl
     prices = [np.array([[law.price(rows)] for law in each]) for each in laws]
     scores = np.array([np.max(found - price, axis=0) for found, price in zip(explained, prices, strict=True)])
     best, ordered = np.argmax(scores, axis=0), np.sort(scores, axis=0)
-    clear = ordered[-1] - ordered[-2] > MAX_DEFICIT
+    clear = ordered[-1] - ordered[-2] > Settings().tuning.claims.max_deficit
     whole = np.array([np.max(found, axis=0) for found in explained])
     for one, special in enumerate(laws):
         for other, usual in enumerate(laws):

@@ -7,14 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.data import (
-    CREEP_RATIO,
-    HIGH_SPEED_QUANTILE,
-    POSITION_CUTOFF_RATIO,
-    STANDSTILL_SIGMAS,
-    Observed,
-    observe,
-)
+from armlab.diagnosis.data import Observed, observe
 from armlab.diagnosis.next.moments import Index, Moments
 from armlab.diagnosis.next.question import Layout
 from armlab.diagnosis.next.sampling import Sampling, Whitening, kept_columns
@@ -76,21 +69,24 @@ class FirstRun:
 
     def sampling(self, columns: Array, fitted: Index) -> Sampling:
         """The filter and the noise that is left when the fitted columns are taken out."""
-        noise = fit_noise(self._fit_residual(columns[:, :, fitted]), self.observed, len(fitted) / self.observed.joints)
+        left, each = self._fit_residual(columns[:, :, fitted]), len(fitted) / self.observed.joints
+        noise = fit_noise(left, self.observed, each, Settings().tuning.noise)
         whitening = Whitening(noise.taps, noise.scales)
         return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, whitening, self._standing_speeds())
 
     def _standing_speeds(self) -> tuple[float, ...]:
         """Speed of each joint (joints,) below which a diagnosis takes it as standing still, rad/s (m/s)."""
-        speed = np.quantile(np.abs(self.observed.motion.velocity), HIGH_SPEED_QUANTILE, axis=0)
-        highest = POSITION_CUTOFF_RATIO * self.observed.cutoff_hz
+        tuning = Settings().tuning.data
+        speed = np.quantile(np.abs(self.observed.motion.velocity), tuning.high_speed_quantile, axis=0)
+        highest = tuning.position_cutoff_ratio * self.observed.cutoff_hz
         noise = []
         for signals in self.observed.signals:
             run = signals.run
             frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
             density = noise_level(frequency, spectrum, shape, run.rate_hz)
             noise.append(2 * np.pi * np.sqrt(density * highest**3 / 3))
-        slow: list[float] = np.maximum(STANDSTILL_SIGMAS * np.max(noise, axis=0), CREEP_RATIO * speed).tolist()
+        noisy = tuning.standstill_sigmas * np.max(noise, axis=0)
+        slow: list[float] = np.maximum(noisy, tuning.creep_ratio * speed).tolist()
         return tuple(slow)
 
     def moments(self, columns: Array, noise: Whitening, role: Role) -> Moments:

@@ -112,7 +112,7 @@ def prepare_questions(
     own = tuple(part for name, part in parts.items() if name.effect != LINK_PARAMETER_ERROR)
     present = PresentModel(arm, verdict.inertial(arm), own)
     first = observe_first_run(recording, present) if recording is not None else None
-    sampling = white_noise_sampling(verdict.noise, verdict.cutoff_hz or Settings().cutoff_hz)
+    sampling = white_noise_sampling(verdict.noise, verdict.cutoff_hz or Settings().tuning.data.cutoff_hz)
     if first is not None:
         sampling = replace(sampling, kept_hz=first.observed.rate_hz, cutoff_hz=first.observed.cutoff_hz)
     rich = _rich_scenes(present, trajectory, sampling.times(duration), seed)

@@ -10,7 +10,8 @@ from scipy.ndimage import binary_dilation
 from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.data import STANDSTILL_MARGIN, Segment, rows_in, split_segment
+from armlab.diagnosis.data import Segment, rows_in, split_segment
+from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.filters import Butterworth, Filter
 from problem.base_parameters import BaseParameters
@@ -90,14 +91,16 @@ class Sampling:
         if not self.standing:
             return np.ones(velocity.shape, dtype=bool)
         still = np.abs(velocity) < np.array(self.standing)
-        reach = round(STANDSTILL_MARGIN / self.cutoff_hz * self.rate_hz)
+        margin = Settings().tuning.data.standstill_margin
+        reach = round(margin / self.cutoff_hz * self.rate_hz)
         return np.asarray(~binary_dilation(still, structure=np.ones((2 * reach + 1, 1))))
 
 
 def _row_weights(moves: NDArray[np.bool_]) -> Array:
     """What rows count, (rows,): nothing near a standstill, less in stretches too short for a diagnosis."""
     whole = Segment(0, "identify", 0, len(moves))
-    long = rows_in(split_segment(whole, moves), len(moves)) if not moves.all() else moves
+    shortest = Settings().tuning.data.min_segment_rows
+    long = rows_in(split_segment(whole, moves, shortest), len(moves)) if not moves.all() else moves
     return np.asarray(np.where(long, 1.0, np.where(moves, np.sqrt(SHORT_STRETCH_WORTH), 0.0)))
 
 

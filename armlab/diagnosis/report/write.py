@@ -17,7 +17,8 @@ from armlab.diagnosis.report.residuals import select_residuals
 from armlab.diagnosis.report.sections import findings_section
 from armlab.diagnosis.report.words import verdict_lines
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.settings import Baseline, Settings, guards_without
+from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
+from armlab.diagnosis.tuning import parse_change
 from armlab.diagnosis.verdict_files import (
     PREDICTED_FOLDER,
     check_output_folder,
@@ -68,23 +69,29 @@ def diagnose_recording(
     baseline: str | None,
     seed: int,
     without: tuple[str, ...] = (),
+    changes: tuple[str, ...] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
     """Diagnoses, writes verdict.json, report.html, model.yaml and figures into `out`, all or none; tells it in lines.
 
-    without: guards that are switched off. progress: is told what is being done. Raises InputError, in one line, for a
-    recording that cannot be used, and for a guard that there is not.
+    without: guards that are switched off. changes: tuning numbers with other values, like `noise.max_order=8`.
+    progress: is told what is being done. Raises InputError, in one line, for a recording that cannot be used, and for
+    a guard or a tuning number that there is not.
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
+    settings = Settings(guards=guards_without(without))
+    for change in changes:
+        settings = vary(settings, *parse_change(change))
     recording = load_recording(folder)
     check_output_folder(out, recording)
     try:
-        found = diagnose(recording, chosen, seed, Settings(guards=guards_without(without)), progress)
+        found = diagnose(recording, chosen, seed, settings, progress)
     except ValueError as error:
         raise InputError(f"{folder}: {error}") from None
     progress("writing the report")
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += [word for guard in without for word in ("--without", guard)]
+    options += [word for change in changes for word in ("--set", change)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     texts = verdict_texts(found, out) | report_texts(found, command) | predicted_texts(found)
     write_texts(texts, out)

@@ -1,0 +1,628 @@
+"""The tuning numbers of a diagnosis: each with its unit, its meaning, and where its value comes from.
+
+One frozen dataclass holds the numbers of one stage, `Tuning` holds the stages. A number is named `stage.number`, as in
+`noise.max_order`. Mathematical constants, guards against rounding and steps of derivatives stand beside their code.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, replace
+from typing import TypeVar
+
+from armlab.common.errors import InputError
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.settings import suggest_name
+
+BY_EYE = "chosen by eye"
+EVIDENCE_SOURCE = "fourth judged set: a quarter of the names below it were wrong in the clean tier"
+REFUTE_SOURCE = "development sets: wrong names left 0.2 to 9 times what they explained, right ones 0.53 at most"
+TuningValue = int | float | tuple[float, ...]
+V = TypeVar("V", int, float, tuple[float, ...])
+
+
+def tuned(
+    value: V,
+    *,
+    unit: str = "",
+    meaning: str,
+    source: str = BY_EYE,
+    least: float = 0.0,
+    most: float = math.inf,
+    count: int = 1,
+) -> V:
+    """The field of a tuning number. unit: empty for a pure number.
+
+    least, most: bounds of what can be computed, of each value of a list. count: least length of a list.
+    """
+    note = {"unit": unit, "meaning": meaning, "source": source, "least": least, "most": most, "count": count}
+    return field(default=value, metadata=note)
+
+
+@dataclass(frozen=True)
+class DataTuning:
+    """How runs are filtered and thinned, and which rows count as moving."""
+
+    cutoff_hz: float = tuned(
+        40.0,
+        unit="Hz",
+        meaning="highest cut-off of the filter that torque and columns share",
+        least=0.1,
+    )
+    max_cutoff_ratio: float = tuned(
+        0.32, unit="of the sampling rate", meaning="highest cut-off of that filter", least=0.01, most=0.45
+    )
+    rows_per_cutoff: float = tuned(
+        2.2,
+        unit="rows a period of the cut-off",
+        meaning="rows that are kept: so few that whitening lifts hardly any frequency that the filter has emptied",
+        least=0.1,
+    )
+    position_cutoff_ratio: float = tuned(
+        2.0,
+        unit="of the torque's cut-off",
+        meaning="cut-off of the positions: what the torque holds, the motion has to hold too",
+        least=0.1,
+    )
+    max_position_cutoff_ratio: float = tuned(
+        0.4, unit="of the sampling rate", meaning="highest cut-off of the positions", least=0.01, most=0.45
+    )
+    max_encoder_share: float = tuned(
+        0.5,
+        unit="of the torque's power density",
+        meaning="encoder noise in the columns that ends the usable frequencies",
+        source="a recording with nothing hidden: above it delays of 5 ms were claimed that cancel each other",
+    )
+    min_cutoff_hz: float = tuned(
+        10.0, unit="Hz", meaning="cut-off that is used however much the encoders disturb", least=0.1
+    )
+    median_width: int = tuned(
+        41, unit="frequencies", meaning="width of the running median of the torque's power", least=1
+    )
+    inertia_states: int = tuned(50, unit="states a run", meaning="states at which the mass matrix is averaged", least=1)
+    standstill_sigmas: float = tuned(
+        5.0, unit="standard deviations of the velocity's noise", meaning="a slower joint stands still"
+    )
+    creep_ratio: float = tuned(
+        0.01, unit="of the joint's high speed", meaning="below it friction takes any value up to its level"
+    )
+    high_speed_quantile: float = tuned(
+        0.95, unit="quantile", meaning="quantile of a joint's speed that is its high speed", most=1.0
+    )
+    min_standstill_s: float = tuned(0.004, unit="s", meaning="shorter standstills are single samples")
+    standstill_margin: float = tuned(
+        1.5, unit="periods of the cut-off", meaning="how far the filter carries a standstill to both sides"
+    )
+    min_segment_rows: int = tuned(
+        40, unit="rows", meaning="shorter stretches in motion tell too little of the noise", least=2
+    )
+    min_moving_share: float = tuned(
+        0.1, unit="of the rows", meaning="a joint with fewer moving rows counts as moving all the time", most=1.0
+    )
+    held_out_blocks: int = tuned(
+        6, unit="blocks a run", meaning="blocks of time that a run is cut into where no run validates", least=2
+    )
+    held_out_every: int = tuned(3, unit="blocks", meaning="every so many-th of these blocks is held out", least=2)
+
+
+@dataclass(frozen=True)
+class SoundnessTuning:
+    """When a recording cannot be used, or was read wrongly."""
+
+    min_duration_s: float = tuned(2.0, unit="s", meaning="least time of all runs that identify")
+    min_travel: float = tuned(1e-3, unit="rad (m)", meaning="a joint that travels less does not move")
+    unit_factor: float = tuned(
+        3.0, meaning="torque that is so many times too large or small on all joints is in another unit", least=1.0
+    )
+    min_explained_share: float = tuned(
+        0.3,
+        unit="of the torque's scatter",
+        meaning="a simulation that explains less on a joint tells nothing of its unit",
+    )
+    no_explained_share: float = tuned(
+        0.02,
+        unit="of the torque's scatter",
+        meaning="a simulation that explains less on every joint is of another arm",
+    )
+
+
+@dataclass(frozen=True)
+class NoiseTuning:
+    """The autoregressive model of each joint's errors."""
+
+    max_order: int = tuned(12, unit="rows", meaning="highest order of the autoregression; BIC takes the best")
+    min_rows_per_order: int = tuned(
+        4, unit="rows", meaning="rows of the shortest stretch for each order of the autoregression", least=1
+    )
+    white_noise_share: float = tuned(
+        1e-3,
+        unit="of the variance",
+        meaning="white noise that is added: bounds how much a quiet band of frequencies is lifted",
+    )
+    min_free_share: float = tuned(
+        0.2, unit="of the rows", meaning="least degrees of freedom in the variance of the noise", least=0.01, most=1.0
+    )
+    filter_correlation_rows: float = tuned(
+        1.5, unit="rows", meaning="rows at rest that the filter ties together", least=0.1
+    )
+
+
+@dataclass(frozen=True)
+class LinkTuning:
+    """The widths of the links' errors that the search tries."""
+
+    uncertainty_grid: tuple[float, ...] = tuned(
+        (0.01, 0.02, 0.04, 0.08, 0.16),
+        unit="of the links' inertia",
+        meaning="widths that all links have alike",
+        least=1e-6,
+    )
+    single_link_grid: tuple[float, ...] = tuned(
+        (0.01, 0.02, 0.04, 0.08, 0.16, 0.5),
+        unit="of the links' inertia",
+        meaning="widths of one link, which may carry what the simulation does not know",
+        least=1e-6,
+    )
+    initial_width: float = tuned(
+        0.08, unit="of the links' inertia", meaning="width of all links in the first fit", least=1e-6
+    )
+
+
+@dataclass(frozen=True)
+class SolverTuning:
+    """Fits and scores of sets of effects."""
+
+    ridge: float = tuned(
+        1e-9,
+        unit="of a column's squared length",
+        meaning="added to the normal equations: columns that hold each other do not stop a fit",
+        least=1e-15,
+    )
+    min_unabsorbed_share: float = tuned(
+        1e-6,
+        unit="of a column's squared length",
+        meaning="a column of which other columns leave less is not seen",
+        least=1e-15,
+    )
+    crowd_penalty: float = tuned(
+        4.0,
+        unit="log likelihood",
+        meaning="what each unusual effect makes the next one dearer: many at once are rare",
+    )
+
+
+@dataclass(frozen=True)
+class SearchTuning:
+    """The search for a set of effects."""
+
+    rounds: int = tuned(2, meaning="rounds of search and of better shapes, before the last search", least=1)
+    max_candidates_asked: int = tuned(
+        40, unit="candidates", meaning="best candidates of a step that are asked for their physics", least=1
+    )
+    max_unusual_effects: int = tuned(
+        12, unit="effects", meaning="effects beside usual friction: a start that asks for more has lost its way"
+    )
+    min_score_step: float = tuned(1e-6, unit="log likelihood", meaning="smaller gains of a move are rounding")
+    max_moves: int = tuned(200, unit="moves", meaning="moves from one start at most")
+
+
+@dataclass(frozen=True)
+class RefineTuning:
+    """The local search for an effect's shape."""
+
+    evaluations_per_shape: int = tuned(
+        18, unit="evaluations", meaning="evaluations of the local search for each shape parameter", least=1
+    )
+    logarithmic_ratio: float = tuned(30.0, meaning="bounds so far apart are searched by their logarithm", least=1.0)
+    first_step: float = tuned(
+        0.08, unit="of the way between the bounds", meaning="first step of the local search", least=1e-6
+    )
+    shape_tolerance: float = tuned(
+        1e-4, unit="of the way between the bounds", meaning="change of the shape that ends the search"
+    )
+    gain_tolerance: float = tuned(0.05, unit="log likelihood", meaning="change of the gain that ends the search")
+
+
+@dataclass(frozen=True)
+class BlockTuning:
+    """Stretches of time as the units of chance in identification rows."""
+
+    block_s: float = tuned(
+        0.5, unit="s", meaning="length of a stretch: longer than what whitening leaves of any tie", least=1e-3
+    )
+    min_blocks: int = tuned(
+        60, unit="stretches", meaning="least number of stretches: shorter where time is short", least=2
+    )
+    folds: int = tuned(5, meaning="parts of the identification stretches that are held out in turn", least=2)
+    max_variance_ratio: float = tuned(
+        1e5,
+        unit="of the least variance",
+        meaning="directions with a larger variance, which other columns hold as well, are not tested",
+        least=1.0,
+    )
+
+
+@dataclass(frozen=True)
+class EvidenceTuning:
+    """The evidence for each effect."""
+
+    block_s: float = tuned(
+        1.0, unit="s", meaning="length of the stretches of validation runs that are compared", least=1e-3
+    )
+    min_blocks: int = tuned(12, unit="stretches", meaning="least number of these stretches", least=2)
+    min_certain_share: float = tuned(
+        0.5,
+        unit="of the larger gain",
+        meaning="a held-out gain at least so large may say that the gain is sure",
+        most=1.0,
+    )
+    push_level: float = tuned(0.3, unit="of a push's peak", meaning="rows above it belong to the push", most=0.99)
+    min_push_s: float = tuned(0.15, unit="s", meaning="a push that is shorter in motion is a reversal")
+    min_push_moving_share: float = tuned(
+        0.5, unit="of the push's rows", meaning="part of a push in which the joint has to move", most=1.0
+    )
+    max_extreme_share: float = tuned(
+        0.5,
+        unit="of the push's rows",
+        meaning="part of a push in which position, speed or torque may be beyond all other stretches",
+        most=1.0,
+    )
+    wider_links_factor: float = tuned(
+        3.0,
+        unit="of the widest link",
+        meaning="widths of the links with which every effect has to pass, too: nobody knows that width",
+    )
+    min_excitation: float = tuned(
+        0.25,
+        unit="of the mean square in identification",
+        meaning="validation runs that excite an effect less may fail to profit from it",
+    )
+    max_loss: float = tuned(
+        0.002, unit="of the validation error", meaning="growth that is allowed where validation excites an effect"
+    )
+    max_loss_unexcited: float = tuned(
+        0.01,
+        unit="of the validation error",
+        meaning="growth that is allowed where validation hardly excites an effect",
+        source="validation run of the UR10",
+    )
+    max_whitened_loss: float = tuned(
+        0.05,
+        unit="of the gain in identification",
+        meaning="whitened loss in validation that is little where validation hardly excites an effect",
+    )
+    worse_level: float = tuned(
+        0.99, unit="one-sided p-value of a gain", meaning="above it the loss in validation is sure", most=1.0
+    )
+    min_likelihood_ratio: float = tuned(
+        20.0,
+        meaning="a law that stands for usual friction has to be so many times likelier than it",
+        least=1.0,
+    )
+
+
+@dataclass(frozen=True)
+class PruningTuning:
+    """What an effect has to pass to be claimed."""
+
+    level: float = tuned(
+        0.01,
+        unit="probability",
+        meaning="chance of any false claim on a recording with nothing missing",
+        least=1e-12,
+        most=1.0,
+    )
+    least_gain: float = tuned(
+        0.03,
+        unit="of the joint's held-out error",
+        meaning="gain that a claim has to make on held-out data",
+        source="development sets: of 30 right findings above two detection limits 29 gained more, wrong ones 2 to 3 %",
+    )
+    least_evidence: float = tuned(
+        60.0,
+        unit="log likelihood",
+        meaning="what a name adds to the log evidence: below, laws that resemble one another are confused",
+        source=EVIDENCE_SOURCE,
+    )
+    self_evident_gain: float = tuned(
+        0.25, unit="of the joint's held-out error", meaning="gain that needs no other evidence for its name"
+    )
+    single_event_share: float = tuned(
+        1 / 3, unit="of least_gain", meaning="gain of what happened once: it acts in a small part of the time"
+    )
+    held_out_level: float = tuned(
+        0.05, unit="one-sided p-value", meaning="level of the test that a held-out gain is sure", most=1.0
+    )
+    large_gain: float = tuned(
+        0.2, unit="of the joint's held-out error", meaning="gain to which large_gain_level applies"
+    )
+    large_gain_level: float = tuned(
+        0.2,
+        unit="one-sided p-value",
+        meaning="that level for a large gain, though a few stretches hold most of it",
+        most=1.0,
+    )
+    max_cycles: int = tuned(3, unit="cycles", meaning="cycles of withdrawing and looking again", least=1)
+
+
+@dataclass(frozen=True)
+class SurrogateTuning:
+    """The flexible regressions that stand in for physics without a name."""
+
+    ridge_exponents: tuple[float, ...] = tuned(
+        (-6.0, -5.0, -4.0, -3.0, -2.0, -1.0, 0.0, 1.0),
+        unit="powers of ten of a feature's mean squared length",
+        meaning="ridges that are tried",
+        least=-12.0,
+        most=12.0,
+    )
+    fold_s: float = tuned(2.0, unit="s", meaning="length of the stretches that choose the ridge in turn", least=1e-3)
+    block_s: float = tuned(
+        1.0, unit="s", meaning="length of the stretches that are compared on held-out data", least=1e-3
+    )
+    min_blocks: int = tuned(12, unit="stretches", meaning="least number of these stretches", least=3)
+    hats: int = tuned(8, unit="functions", meaning="piecewise linear functions of a variable", least=3)
+    fine_hats: int = tuned(16, unit="functions", meaning="the same, where one variable matters most", least=3)
+    position_hats: int = tuned(
+        12, unit="functions", meaning="piecewise linear functions of a position that multiply the velocity", least=3
+    )
+    fine_position_hats: int = tuned(
+        24, unit="functions", meaning="piecewise linear functions of a position alone or with the sign", least=3
+    )
+    product_positions: int = tuned(
+        4, unit="functions", meaning="piecewise linear functions of each of two positions, for products", least=3
+    )
+    product_speeds: int = tuned(
+        5, unit="functions", meaning="piecewise linear functions of speed and of acceleration, for products", least=3
+    )
+    waves: int = tuned(16, unit="waves", meaning="random waves of a pair of variables", least=2)
+    few_joints: int = tuned(4, unit="joints", meaning="an arm with more joints gets half as many waves a pair")
+    max_pairs: int = tuned(6, unit="pairs", meaning="pairs of other joints that get waves")
+    sign_widths: tuple[float, ...] = tuned(
+        (0.005, 0.02, 0.06, 0.2, 0.6),
+        unit="of the top speed",
+        meaning="widths of smooth signs of the velocity",
+        least=1e-6,
+        count=3,
+    )
+    memories_s: tuple[float, ...] = tuned(
+        (0.02, 0.1, 0.5),
+        unit="s",
+        meaning="lags of signs and velocities, for what depends on the way since a reversal",
+        least=1e-6,
+    )
+    min_noise_gain: float = tuned(
+        0.02, unit="of the held-out error", meaning="gain of a prediction that is taken out of the noise"
+    )
+    noise_level: float = tuned(
+        0.05,
+        unit="p-value",
+        meaning="below it a prediction counts as no noise: else whitening would hide what is slow",
+        most=1.0,
+    )
+    min_structure_gain: float = tuned(
+        0.03,
+        unit="of the held-out error",
+        meaning="gain of structure: less may be what known effects are known too little of",
+    )
+    min_variable_share: float = tuned(
+        0.1, unit="of the gain", meaning="part of the gain that is lost without an important variable", most=1.0
+    )
+    max_variables: int = tuned(4, unit="variables", meaning="important variables that are named", least=1)
+
+
+@dataclass(frozen=True)
+class LocationTuning:
+    """Where the error is beyond the noise."""
+
+    bins: int = tuned(10, unit="bins", meaning="quantile bins of a variable", least=2)
+    block_s: float = tuned(
+        1.0, unit="s", meaning="length of the stretches whose scatter decides whether an excess is chance", least=1e-3
+    )
+    min_blocks: int = tuned(3, unit="stretches", meaning="least number of these stretches", least=2)
+    min_significance: float = tuned(
+        2.0,
+        unit="standard errors times sqrt(log(stretches + 1))",
+        meaning="excess error of a joint that is more than chance",
+    )
+    min_bin_share: float = tuned(
+        0.5, unit="of the worst bin's excess", meaning="bins with more of it are the regime", most=0.99
+    )
+    min_run_share: float = tuned(
+        0.5, unit="of the worst run's excess", meaning="runs with more of it are affected", most=0.99
+    )
+    peak_parts: int = tuned(10, meaning="a peak is no longer than one of so many equal parts of a run", least=1)
+    min_peak_share: float = tuned(
+        0.5, unit="of all excess", meaning="a stretch with more of it is named by its time", most=1.0
+    )
+
+
+@dataclass(frozen=True)
+class UnknownTuning:
+    """When structure that is left is a finding, and when it contradicts a name."""
+
+    level: float = tuned(
+        0.03,
+        unit="p-value",
+        meaning="level of structure without a name, after all surrogates that were tried",
+        most=1.0,
+    )
+    max_residual_ratio: float = tuned(
+        1.0,
+        unit="of the error that a law explains",
+        meaning="structure above it withdraws the name of the law",
+        source=REFUTE_SOURCE,
+    )
+    form_error_share: float = tuned(
+        0.25,
+        unit="of the error that a law explains",
+        meaning="structure below it comes from the form of the law, and is no finding",
+        source=REFUTE_SOURCE,
+    )
+
+
+@dataclass(frozen=True)
+class ClaimTuning:
+    """How claims are stated: rivals, names of links, closed gaps."""
+
+    max_deficit: float = tuned(
+        2.0, unit="log likelihood", meaning="a rival whose score is lower by less may be as good by chance"
+    )
+    held_out_tolerance: float = tuned(
+        0.01, unit="of the held-out error", meaning="a rival that predicts worse by less predicts as well"
+    )
+    max_rivals: int = tuned(3, unit="rivals", meaning="rivals of a claim that are listed")
+    outlying_factor: float = tuned(
+        4.0, unit="of the other links' median width", meaning="a link that is so much wider carries something"
+    )
+    min_gap: float = tuned(
+        0.02, unit="of the noise floor", meaning="a smaller gap between error and noise cannot be measured"
+    )
+
+
+@dataclass(frozen=True)
+class IntervalTuning:
+    """Intervals of named parameters."""
+
+    confidence: float = tuned(
+        0.95,
+        unit="probability",
+        meaning="chance that an interval holds the true value",
+        source="convention",
+        most=0.999999,
+    )
+    factor: float = tuned(
+        1.45,
+        meaning="widens intervals: what laws leave out at reversals is no noise",
+        source="development sets: of 605 parameters 81 % were held without it",
+    )
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """All tuning numbers of a diagnosis, by stage."""
+
+    data: DataTuning = DataTuning()
+    soundness: SoundnessTuning = SoundnessTuning()
+    noise: NoiseTuning = NoiseTuning()
+    links: LinkTuning = LinkTuning()
+    solver: SolverTuning = SolverTuning()
+    search: SearchTuning = SearchTuning()
+    refine: RefineTuning = RefineTuning()
+    blocks: BlockTuning = BlockTuning()
+    evidence: EvidenceTuning = EvidenceTuning()
+    pruning: PruningTuning = PruningTuning()
+    surrogate: SurrogateTuning = SurrogateTuning()
+    location: LocationTuning = LocationTuning()
+    unknown: UnknownTuning = UnknownTuning()
+    claims: ClaimTuning = ClaimTuning()
+    intervals: IntervalTuning = IntervalTuning()
+
+
+@dataclass(frozen=True)
+class TuningNumber:
+    """One tuning number. name: `stage.number`; least, most: bounds of each value; count: least length of a list."""
+
+    name: str
+    value: TuningValue
+    unit: str
+    meaning: str
+    source: str
+    least: float
+    most: float
+    count: int
+
+
+def tuning_numbers(tuning: Tuning) -> Iterator[TuningNumber]:
+    """All numbers, stage by stage."""
+    for stage in fields(tuning):
+        own = getattr(tuning, stage.name)
+        for each in fields(own):
+            yield TuningNumber(f"{stage.name}.{each.name}", getattr(own, each.name), **each.metadata)
+
+
+def changed_numbers(tuning: Tuning) -> dict[str, TuningValue]:
+    """Numbers that differ from their default, by name."""
+    usual = {each.name: each.value for each in tuning_numbers(Tuning())}
+    return {each.name: each.value for each in tuning_numbers(tuning) if each.value != usual[each.name]}
+
+
+def find_number(name: str) -> TuningNumber:
+    """A number by its name; InputError, with the nearest name, for one that there is not."""
+    known = {each.name: each for each in tuning_numbers(Tuning())}
+    if name not in known:
+        close = suggest_name(name, list(known))
+        hint = close if close.startswith("did") else "`armlab tuning` lists them all"
+        raise InputError(f"{name}: no such tuning number, {hint}")
+    return known[name]
+
+
+def change_tuning(tuning: Tuning, name: str, value: object) -> Tuning:
+    """The tuning with another value of one number.
+
+    Raises InputError, in one line, for an unknown name, a value of a wrong type, or one that cannot be computed with.
+    """
+    number = find_number(name)
+    checked = _checked_value(number, value)
+    stage, own = name.split(".")
+    return replace(tuning, **{stage: replace(getattr(tuning, stage), **{own: checked})})
+
+
+def _checked_value(number: TuningNumber, value: object) -> TuningValue:
+    """The value as the number's type: a whole number may stand for a real one, a single value for a list."""
+    wanted = number.value
+    kind = {int: "a whole number", float: "a number", tuple: "numbers"}[type(wanted)]
+    whole = isinstance(wanted, int)
+    values = value if isinstance(value, tuple) else (value,)
+    right = len(values) == 1 if not isinstance(wanted, tuple) else len(values) >= number.count
+    right = right and all(isinstance(each, int if whole else int | float) for each in values)
+    if not right or any(isinstance(each, bool) for each in values):
+        some = f" ({number.count} at least)" if number.count > 1 else ""
+        raise InputError(f"{number.name}: {_value_text(value)} should be {kind}{some}, like {_value_text(wanted)}")
+    if not all(number.least <= each <= number.most and math.isfinite(each) for each in values):
+        bounds = f"{number.least:g} at least" + (f", {number.most:g} at most" if number.most < math.inf else "")
+        raise InputError(f"{number.name}: {_value_text(value)} should be {bounds}")
+    if isinstance(wanted, tuple):
+        return tuple(float(each) for each in values)
+    return values[0] if whole else float(values[0])
+
+
+def parse_change(text: str) -> tuple[str, TuningValue]:
+    """Name and value of `stage.number=value`; a list is written with commas. InputError where it is not so written."""
+    name, equals, written = text.partition("=")
+    try:
+        values = tuple(_parse_value(part) for part in written.split(","))
+    except ValueError:
+        values = ()
+    if not equals or not values:
+        raise InputError(f"{text}: should be like noise.max_order=8, and a list like surrogate.memories_s=0.1,0.5")
+    return name.strip(), values if len(values) > 1 else values[0]
+
+
+def _parse_value(text: str) -> int | float:
+    try:
+        return int(text)
+    except ValueError:
+        return float(text)
+
+
+def _value_text(value: object) -> str:
+    """A value as it is written in `stage.number=value`."""
+    if isinstance(value, tuple):
+        return ",".join(_value_text(each) for each in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def tuning_page() -> str:
+    """`docs/tuning.md`: all numbers with value, unit, meaning and source."""
+    intro = (
+        "Each number that was chosen, by stage of the diagnosis (`armlab/diagnosis/tuning.py`). `armlab tuning --out "
+        "docs/tuning.md` writes this page. `armlab diagnose --set noise.max_order=8` takes another value, and "
+        "`armlab ablate --vary noise.max_order=8` measures what that changes."
+    )
+    parts = []
+    for stage in fields(Tuning):
+        own = [each for each in tuning_numbers(Tuning()) if each.name.startswith(f"{stage.name}.")]
+        rows = [(f"`{each.name}`", _value_text(each.value), each.unit, each.meaning, each.source) for each in own]
+        about = str(type(getattr(Tuning(), stage.name)).__doc__)
+        parts += [f"## {stage.name}", about, markdown_table(("name", "value", "unit", "meaning", "source"), rows)]
+    return markdown_page("Tuning numbers of the diagnosis", intro, *parts)
