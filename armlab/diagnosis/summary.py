@@ -4,6 +4,8 @@ from collections.abc import Sequence
 
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.result import Claim, JointFit
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 
 MAX_FINDINGS_TOLD = 6  # findings that are told; the others are counted
 
@@ -21,10 +23,9 @@ def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit])
 
 
 def _describe_claim(claim: Claim) -> str:
-    name = claim.effect.replace("_", " ")
-    link = claim.effect in ("payload", "inertial_parameter_error")
-    where = "" if claim.joint is None else f" at {'link' if link else 'joint'} {claim.joint}"
-    if claim.effect == "unknown":
+    facts = effect_named(claim.effect)
+    where = "" if claim.joint is None else f" at {'link' if facts.where == 'link' else 'joint'} {claim.joint}"
+    if facts == UNKNOWN:
         return f"something unknown{where} that depends on {', '.join(claim.depends_on)}"
-    rivals = " or ".join(dict.fromkeys(each.effect.replace("_", " ") for each in claim.rivals))
-    return f"{name}{where}{f' (or {rivals})' if rivals else ''}: {claim.equation}"
+    rivals = " or ".join(dict.fromkeys(effect_named(each.effect).words for each in claim.rivals))
+    return f"{facts.words}{where}{f' (or {rivals})' if rivals else ''}: {claim.equation}"

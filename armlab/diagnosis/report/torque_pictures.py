@@ -152,17 +152,6 @@ MAX_DOTS = 700
 LAW_BINS = 48
 MAX_LAW_SCATTER = 0.2  # of the law's own range: a law that scatters less about its mean in a bin is drawn as a line
 FULL_TURN = 2 * np.pi
-VELOCITY_EFFECTS = (
-    "coulomb_friction",
-    "viscous_friction",
-    "nonlinear_viscous_friction",
-    "stribeck_friction",
-    "asymmetric_friction",
-    "presliding_hysteresis",
-    "joint_coupling",
-)
-POSITION_EFFECTS = ("gravity_compensator", "cable_stiffness", "backlash")
-TIME_EFFECTS = ("torque_offset", "external_contact", "friction_drift")
 MOTION_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "acceleration": ("rad/s²", "m/s²")}
 
 
@@ -190,17 +179,12 @@ def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) 
     arm, observed = diagnosis.simulation.arm, data.observed
     joint = claim.evidence.joint
     moving = (claim.joints[1] if len(claim.joints) > 1 else claim.joint or 0) - 1
-    if claim.effect in VELOCITY_EFFECTS and moving >= 0:
-        return _motion_variable(diagnosis, data, "velocity", moving)
-    if claim.effect in POSITION_EFFECTS and moving >= 0:
-        return _motion_variable(diagnosis, data, "position", moving)
-    if claim.effect == "rotor_inertia" and moving >= 0:
-        return _motion_variable(diagnosis, data, "acceleration", moving)
-    if claim.effect == "torque_ripple" and moving >= 0:
-        return _ripple_variable(data, claim, moving)
-    if claim.effect in TIME_EFFECTS:
-        return "time from the start of the run, s", observed.time
-    if claim.depends_on[:1] == ("time",):
+    axis = "" if claim.candidate is None else claim.candidate.facts.axis
+    if axis in MOTION_UNITS and moving >= 0:
+        return _motion_variable(diagnosis, data, axis, moving)
+    if axis == "cycle" and moving >= 0:
+        return _cycle_variable(data, claim, moving)
+    if axis == "time" or claim.depends_on[:1] == ("time",):
         return "time from the start of the run, s", observed.time
     for name in claim.depends_on:
         kind, _, which = name.rpartition("_")
@@ -223,8 +207,8 @@ def _load_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joi
     return f"torque of the model at joint {joint + 1}, {joint_unit(diagnosis.simulation.arm, joint)}", torque
 
 
-def _ripple_variable(data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
-    """Position within one wave of a ripple."""
+def _cycle_variable(data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
+    """Position within one wave; the parameter `order` of the effect counts the waves a turn."""
     order = next((each.value for each in claim.parameters if each.name == "order"), 1.0)
     waves = float(order) if isinstance(order, float) and order else 1.0
     position = data.observed.kept("position")[:, joint]

@@ -11,10 +11,11 @@ import numpy as np
 
 from armlab.diagnosis.report.residuals import is_white, select_residuals
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Rival
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from problem.arm import Arm
 
-LINK_EFFECTS = ("payload", "inertial_parameter_error")
 MAX_NAME_LENGTH = 24  # letters
 PARAMETER_DIGITS = 4  # of a parameter
 COMPONENT_NAMES = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "xz", "yz")}
@@ -22,23 +23,22 @@ MAX_NAMED_FINDINGS = 3  # findings that the verdict names; the others are counte
 
 
 def effect_in_words(effect: str) -> str:
-    """An effect in words."""
-    special = {"coulomb_friction": "Coulomb friction", "stribeck_friction": "Stribeck friction"}
-    return special.get(effect, effect.replace("_", " "))
+    """The name of an effect in a sentence; ValueError for an id that no effect has."""
+    return effect_named(effect).words
 
 
 def place_in_words(effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
     """Where an effect is: a joint, a link, a coupling, or the whole robot."""
     if joint is None:
         return "the whole robot"
-    if effect in LINK_EFFECTS:
+    if effect_named(effect).where == "link":
         return f"link {joint}"
     return f"joint {joint} from joint {joints[1]}" if len(joints) > 1 else f"joint {joint}"
 
 
 def finding_in_words(claim: Claim | Rival) -> str:
     """An effect with its place."""
-    if claim.effect == "unknown":
+    if claim.effect == UNKNOWN.id:
         return f"something unknown at {place_in_words(claim.effect, claim.joint)}"
     where = place_in_words(claim.effect, claim.joint, claim.joints)
     return f"{effect_in_words(claim.effect)} {'of' if claim.joint is None else 'at'} {where}"
@@ -127,8 +127,8 @@ def _largest_error_text(worst: JointFit, arm: Arm) -> str:
 
 
 def _list_findings(claims: Sequence[Claim]) -> str:
-    known = [_finding_with_rivals(claim) for claim in claims if claim.effect != "unknown"]
-    unknown = [f"joint {claim.joint}" for claim in claims if claim.effect == "unknown"]
+    known = [_finding_with_rivals(claim) for claim in claims if claim.effect != UNKNOWN.id]
+    unknown = [f"joint {claim.joint}" for claim in claims if claim.effect == UNKNOWN.id]
     parts = known[:MAX_NAMED_FINDINGS]
     if len(known) > MAX_NAMED_FINDINGS:
         parts.append(
