@@ -14,7 +14,6 @@ from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
 from armlab.diagnosis.next.moments import Index, Moments, empty_moments
 from armlab.diagnosis.next.question import (
-    LINK_PARAMETER_ERROR,
     Layout,
     Name,
     Question,
@@ -37,8 +36,8 @@ from armlab.diagnosis.next.rivals import (
 from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_noise_sampling
 from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictWithModel
 from armlab.diagnosis.settings import Settings
-from armlab.effects.contract import Candidate, Scene
-from armlab.effects.library import effect_named, library
+from armlab.effects.contract import UNKNOWN, Candidate, Scene
+from armlab.effects.library import library
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters, base_parameters
@@ -46,13 +45,6 @@ from problem.trajectories import Trajectory
 
 LinkKnowledge = Literal["exact", "near", "free"]
 NEAR_LINK_WIDTH = 0.08  # width of the links' errors: about as far as drawings are off
-DRY_FRICTION = (
-    "coulomb_friction",
-    "stribeck_friction",
-    "presliding_hysteresis",
-    "asymmetric_friction",
-    "load_dependent_friction",
-)
 RICH_MOTIONS = 3  # random motions that show what any motion could show
 
 
@@ -109,7 +101,7 @@ def prepare_questions(
     """
     families = library()
     parts = {each.name: part for each in verdict.findings if (part := restore_part(each, arm, families)) is not None}
-    own = tuple(part for name, part in parts.items() if name.effect != LINK_PARAMETER_ERROR)
+    own = tuple(part for name, part in parts.items() if not name.facts.in_links)
     present = PresentModel(arm, verdict.inertial(arm), own)
     first = observe_first_run(recording, present) if recording is not None else None
     sampling = white_noise_sampling(verdict.noise, verdict.cutoff_hz or Settings().cutoff_hz)
@@ -168,20 +160,21 @@ class _Preparation:
         sampling = replace(sampling, standing=self._standing_speeds(sampling, groups))
         before = self.first.moments(columns, sampling.noise, "identify")
         whole = before + self.first.moments(columns, sampling.noise, "validate")
-        for name in sorted(
-            {group[0] for group in groups if group[0].effect == LINK_PARAMETER_ERROR} & self.parts.keys(), key=str
-        ):
-            candidate, values = self.parts[name]  # what the links of the model hold already is given back
-            whole, before = (self._give_back(each, candidate, values) for each in (whole, before))
+        asked = {group[0] for group in groups if group[0].facts.in_links}
+        for name in sorted(asked & self.parts.keys(), key=str):
+            part = self.parts[name]  # the links of the model hold its torque, so the residual does not
+            whole, before = self._give_back(whole, part), self._give_back(before, part)
         return sampling, whole, before
 
     def _standing_speeds(self, sampling: Sampling, groups: tuple[RivalGroup, ...]) -> tuple[float, ...]:
-        """Speeds below which a joint with dry friction, found or asked for, stands still; 0 for the others."""
+        """Speeds below which a joint stands still whose friction sticks, found or asked for; 0 for the others."""
         named = {*self.parts, *(name for group in groups for name in group)}
-        sticky = {name.joint for name in named if name.effect in DRY_FRICTION}
-        return tuple(each if joint + 1 in sticky else 0.0 for joint, each in enumerate(sampling.standing))
+        sticking = {name.joint for name in named if name.facts.sticks}
+        return tuple(each if joint + 1 in sticking else 0.0 for joint, each in enumerate(sampling.standing))
 
-    def _give_back(self, moments: Moments, candidate: Candidate, values: Array) -> Moments:
+    def _give_back(self, moments: Moments, part: FoundEffect) -> Moments:
+        """The moments with the torque of a part added to the residual."""
+        candidate, values = part
         return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.of(candidate)] @ values)
 
     def _free_columns(self, group: RivalGroup) -> Index:
@@ -191,9 +184,7 @@ class _Preparation:
 
     def _found_columns(self, group: RivalGroup) -> Index:
         """Columns of the other findings, and of the links where they are not known exactly."""
-        others = [
-            part[0] for name, part in self.parts.items() if name not in group and name.effect != LINK_PARAMETER_ERROR
-        ]
+        others = [part[0] for name, part in self.parts.items() if name not in group and not name.facts.in_links]
         rigid = np.arange(0 if self.links == "exact" else len(self.layout.base))
         return np.unique(np.concatenate([rigid, *map(self.layout.of, others)])).astype(np.intp)
 
@@ -249,11 +240,6 @@ def _rich_scenes(present: PresentModel, trajectory: Trajectory, times: Array, se
 MAX_AMBIGUOUS_LEAD = 3.0  # standard errors: closer names are no more than guessed
 MAX_GROUP_SIZE = 4  # names in a group
 MAX_FINDINGS = 4  # findings that are asked about
-RESIDUAL_SEARCH_EFFECTS = (
-    "torque_ripple",
-    "external_contact",
-    "torque_saturation",
-)  # found by looking at the residual, not by columns
 
 
 def find_nearby_names(
@@ -269,7 +255,7 @@ def find_nearby_names(
     named = [
         each
         for each in verdict.findings
-        if each.parameters and each.name.effect not in (*RESIDUAL_SEARCH_EFFECTS, "unknown")
+        if each.parameters and each.name.facts != UNKNOWN and not each.name.facts.scanned
     ]
     out = []
     for finding in named[:MAX_FINDINGS]:
@@ -294,9 +280,10 @@ def _candidate_names(finding: Finding, verdict: VerdictWithModel, arm: Arm) -> l
     known = {each.name for each in verdict.findings}
     out = []
     for family in library():
-        if family.effect not in RESIDUAL_SEARCH_EFFECTS:
-            robot = effect_named(family.effect).where == "robot"
-            out += [Name(family.effect, None)] if robot else [Name(family.effect, each) for each in joints]
+        if family.facts.where == "robot" and not family.facts.scanned:
+            out.append(Name(family.effect, None))
+        elif not family.facts.scanned:
+            out += [Name(family.effect, each) for each in joints]
     return [name for name in out if name not in known]
 
 

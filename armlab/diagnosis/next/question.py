@@ -9,11 +9,10 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.moments import ROUNDING_SHARE, Index, Moments, unexplained_power
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
-from armlab.effects.contract import Candidate, Scene
+from armlab.effects.contract import Candidate, Effect, Scene
+from armlab.effects.library import effect_named
 from armlab.recordings.filters import Filter
 from problem.base_parameters import BaseParameters
-
-LINK_PARAMETER_ERROR = "inertial_parameter_error"  # is in the links of a model, not beside them
 
 
 @dataclass(frozen=True)
@@ -23,9 +22,16 @@ class Name:
     effect: str
     joint: int | None
 
+    @property
+    def facts(self) -> Effect:
+        """What is known of the effect; ValueError where there is no effect of that id."""
+        return effect_named(self.effect)
+
     def __str__(self) -> str:
         """`viscous friction at joint 2`."""
-        return self.effect.replace("_", " ") + ("" if self.joint is None else f" at joint {self.joint}")
+        facts = self.facts
+        place = "link" if facts.where == "link" else "joint"
+        return facts.words if self.joint is None else f"{facts.words} at {place} {self.joint}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,8 +179,8 @@ def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene
 
 
 def is_in_free_links(name: Name, free: Index) -> bool:
-    """Whether a name is part of what is free anyway: a link that is off, where the links are not known exactly."""
-    return name.effect == LINK_PARAMETER_ERROR and 0 in free
+    """Whether the free columns hold the effect already: an error of a link, where the base parameters are free."""
+    return 0 in free and name.facts.in_links
 
 
 def inseparable_rivals(rivals: tuple[Rival, ...], free: Index, gram: Array) -> Array:

@@ -12,6 +12,7 @@ from armlab.diagnosis.next.first_run import PresentModel
 from armlab.diagnosis.next.moments import Index
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.question import Layout, Question, Rival, build_layout, inseparable_rivals
+from armlab.effects.transmission import Transmission
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion
@@ -98,7 +99,8 @@ def _remedy_by_removal(
 ) -> Iterator[Remedy]:
     """The same motion with and without what a link carries: a load is gone then, a wrong link is still wrong."""
     for rival in rivals:
-        if rival.name.effect == "payload":
+        facts = rival.name.facts
+        if facts.where == "link" and not facts.in_links:
             with_it = prepared.moments(prepared.present.scene(motion, times)).gram
             without = with_it.copy()
             for law in rival.laws:
@@ -111,30 +113,31 @@ def _remedy_by_removal(
 def _remedy_by_data_sheet(rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
     """A value that the maker states."""
     for rival in rivals:
-        if rival.name.effect == "rotor_inertia":
-            size = abs(float(rival.values[0]))
-            told = (
-                f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to "
-                f"{size / DECISIVE_SEPARATION:.3g} kg m2"
-            )
-            yield Remedy(told, DECISIVE_SEPARATION)
+        armature = rival.laws[0].candidate.joint_fields(rival.values).get("armature")
+        if armature is not None:
+            accuracy = abs(armature) / DECISIVE_SEPARATION
+            what = f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to {accuracy:.3g} kg m2"
+            yield Remedy(what, DECISIVE_SEPARATION)
 
 
 def _remedy_by_encoder(
     prepared: PreparedQuestions, rivals: tuple[Rival, ...], motion: Motion, times: Array
 ) -> Iterator[Remedy]:
-    """An encoder behind the gear sees what the drive train gives."""
+    """An encoder behind the gear measures the twist of the drive train."""
     for rival in rivals:
-        named = rival.laws[0].candidate.parameters(rival.values)
-        joint = (rival.name.joint or 1) - 1
-        torque = prepared.present.scene(motion, times).torque[:, joint]
-        given: Array | None = None
-        if rival.name.effect == "joint_elasticity" and float(np.asarray(named["stiffness"])) > 0:
-            given = torque / float(np.asarray(named["stiffness"]))
-        elif rival.name.effect == "backlash":
-            given = np.sign(torque) * abs(float(np.asarray(named["gap"]))) / 2
-        if given is not None:
-            seen = float(np.sqrt(np.sum((given - given.mean()) ** 2))) / ENCODER_NOISE
-            yield Remedy(
-                f"a second encoder behind the gear of joint {joint + 1} with {ENCODER_NOISE:g} rad of noise", seen
+        candidate, size = rival.laws[0].candidate, float(rival.values[0])
+        if isinstance(candidate, Transmission) and size > 0:
+            torque = prepared.present.scene(motion, times).torque[:, candidate.index]
+            twist = size * _static_twist(candidate, torque)
+            separation = float(np.sqrt(np.sum((twist - twist.mean()) ** 2))) / ENCODER_NOISE
+            what = (
+                f"a second encoder behind the gear of joint {candidate.index + 1} with {ENCODER_NOISE:g} rad of noise"
             )
+            yield Remedy(what, separation)
+
+
+def _static_twist(candidate: Transmission, torque: Array) -> Array:
+    """Twist (samples,), rad (m), under a slow torque (samples,), N m (N), for a coefficient of one."""
+    law, coefficient = candidate.law
+    twist = np.sign(torque) * law.gap / 2 if law.gap > 0 else torque / law.stiffness
+    return np.asarray(twist / coefficient)

@@ -21,8 +21,7 @@ from armlab.diagnosis.next.moments import (
 from armlab.diagnosis.next.question import Law, Name, Rival, is_in_free_links
 from armlab.diagnosis.next.verdict_file import Finding
 from armlab.effects.contract import Candidate, Family, Scene
-from armlab.effects.drive import TORQUE_OFFSET
-from armlab.effects.friction import COULOMB_FRICTION, VISCOUS_FRICTION
+from armlab.effects.library import library
 from problem.arm import Arm
 
 MAX_SHAPES = 24  # of a law that are looked at
@@ -35,8 +34,8 @@ def name_of(candidate: Candidate) -> Name:
 
 
 def usual_friction(arm: Arm, scenes: Sequence[Scene]) -> list[Candidate]:
-    """Coulomb and viscous friction and an offset on every joint."""
-    families = (COULOMB_FRICTION, VISCOUS_FRICTION, TORQUE_OFFSET)
+    """The effects that every arm has, on every joint: Coulomb and viscous friction and an offset."""
+    families = [family for family in library() if family.facts.usual]
     return [shapes[0] for family in families for shapes in family.candidates(arm, scenes)]
 
 
