@@ -23,7 +23,9 @@ from armlab.diagnosis.report.words import (
     verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
+from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE
 from armlab.identification.real.study import RECIPES
@@ -34,7 +36,6 @@ from armlab.recordings.recording import Recording
 LOGGED_MODEL = "diagnosis"
 RECORDING_NAMES = ("emps", "staubli-tx40", "unisa-ur10", "kuka-kr300")
 DIAGNOSED_BY_RUN = ("kuka-kr300",)  # each of their runs is diagnosed alone too: one payload, so one answer
-LINK_EFFECTS = ("payload", "inertial_parameter_error")
 
 
 @dataclass(frozen=True)
@@ -102,10 +103,10 @@ def _relative_error(residual: Array, torque: Array) -> float:
 
 def mass_claims(found: Diagnosis) -> tuple[Claim, ...]:
     """Claims that give a link more or less mass."""
-    return tuple(each for each in found.claims if each.effect in LINK_EFFECTS)
+    return tuple(each for each in found.claims if effect_named(each.effect).where == "link")
 
 
-SPRING_EFFECTS = ("gravity_compensator", "cable_stiffness")
+COUNTERBALANCE_EFFECTS = (GRAVITY_COMPENSATOR.effect, CABLE_STIFFNESS.effect)  # names for the counterbalance of the arm
 MIN_AGREEMENT_P_VALUE = 0.01
 INTRODUCTION = """\
 # Real arms, diagnosed with only the rigid body given
@@ -191,7 +192,7 @@ def _run_lines(found: RealStudy) -> Iterator[str]:
                 (row,) = parameter_rows(parameter)
                 told_masses.append(f"{finding_in_words(claim)}, mass {row.value} kg ({row.interval})")
         masses += sorted((each for each in own if each.interval), key=_interval_width)[:1]  # one a run: its surest
-        springs = [finding_in_words(each) for each in diagnosis.claims if each.effect in SPRING_EFFECTS]
+        springs = [finding_in_words(each) for each in diagnosis.claims if each.effect in COUNTERBALANCE_EFFECTS]
         yield f"- {run}: {'; '.join([*told_masses, *springs]) or 'nothing'}"
     yield f"\n{mass_agreement(masses)}\n"
 

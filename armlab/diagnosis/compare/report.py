@@ -13,7 +13,7 @@ import numpy as np
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.structure import SIGNIFICANCE_LEVEL, Change
+from armlab.diagnosis.compare.structure import BASE_PARAMETER, SIGNIFICANCE_LEVEL, Change
 from armlab.diagnosis.formats import COMPARISON_SCHEMA, ChangeEntry, ComparisonFile
 from armlab.diagnosis.report import sections
 from armlab.diagnosis.report.charts import (
@@ -53,7 +53,7 @@ def comparison_sentences(found: Comparison) -> tuple[str, str]:
     names = f"{found.old.recording.name} and {found.new.recording.name}"
     if found.status == "inconclusive":
         return f"{names} cannot be compared.", found.reason
-    changed = [each for each in found.changes if each.changed and each.effect != "base_parameter"]
+    changed = [each for each in found.changes if each.changed and each.effect != BASE_PARAMETER]
     more = f", and {len(changed) - MAX_NAMED_CHANGES} more" if len(changed) > MAX_NAMED_CHANGES else ""
     numbers = join_words([change_phrase(each) for each in changed[:MAX_NAMED_CHANGES]]) + more if changed else ""
     if found.status == "same":
@@ -69,7 +69,7 @@ def change_phrase(change: Change) -> str:
     """A changed parameter with both values."""
     name = (
         change.parameter
-        if change.effect == "base_parameter"
+        if change.effect == BASE_PARAMETER
         else (
             f"{change.parameter} of {effect_in_words(change.effect)} at "
             f"{place_in_words(change.effect, change.joint, change.joints)}"
@@ -183,13 +183,13 @@ def _changes_table(changes: list[Change]) -> str:
 
 
 def _change_name(change: Change) -> str:
-    if change.effect == "base_parameter":
+    if change.effect == BASE_PARAMETER:
         return change.parameter
     return f"{change.parameter}, {effect_in_words(change.effect)}"
 
 
 def _change_row(change: Change) -> list[str]:
-    where = "links" if change.effect == "base_parameter" else place_in_words(change.effect, change.joint, change.joints)
+    where = "links" if change.effect == BASE_PARAMETER else place_in_words(change.effect, change.joint, change.joints)
     low, high = (format_number(value, PARAMETER_DIGITS) for value in change.interval)
     values = (format_number(change.old, PARAMETER_DIGITS), format_number(change.new, PARAMETER_DIGITS))
     return [

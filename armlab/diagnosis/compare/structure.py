@@ -147,6 +147,7 @@ def _filtered_base_columns(arm: Arm, base: BaseParameters, signals: Signals) -> 
 
 
 SIGNIFICANCE_LEVEL = 0.01
+BASE_PARAMETER = "base_parameter"  # in place of an effect: a parameter of the rigid body
 
 
 @dataclass(frozen=True)
@@ -219,7 +220,7 @@ def _base_changes(old: Diagnosis, base: BaseParameters, first: StructureFit, sec
         error = float(np.sqrt(first.covariance[index, index] + second.covariance[index, index]))
         before, after = (float(start[index] + fit.values[index]) for fit in (first, second))
         unit = PARAMETER_UNITS[base.columns[index] % 10]
-        out.append(_build_change("base_parameter", None, (), name, before, after, error, unit, degrees))
+        out.append(_build_change(BASE_PARAMETER, None, (), name, before, after, error, unit, degrees))
     return out
 
 

@@ -10,6 +10,7 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.diagnosis.real_concealed.plan import Disturbance, Piece, PieceKind
 from armlab.effects.contract import Candidate
+from armlab.effects.library import library
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.identifier import Identifier
 from armlab.identification.real.study import Recipe
@@ -57,19 +58,10 @@ LAWS_BY_KIND: dict[PieceKind, tuple[str, ...]] = {
     "counterbalance": ("gravity_compensator",),
     "payload": (),
 }
-FRICTION_LAWS = (
-    *LAWS_BY_KIND["friction"],
-    "stribeck_friction",
-    "asymmetric_friction",
-    "load_dependent_friction",
-    "presliding_hysteresis",
-    "friction_drift",
-)
-INSEPARABLE_EFFECTS = {  # what no motion separates, or what goes by either name
-    "payload": ("inertial_parameter_error",),
-    "gravity_compensator": ("cable_stiffness",),
-    "cable_stiffness": ("gravity_compensator",),
-}
+EQUIVALENT_NAMES = {"inertial_parameter_error": "payload", "gravity_compensator": "cable_stiffness"}
+"""What no motion separates, or what goes by either name; both count as the second one."""
+EQUIVALENT_AT_ONLY_JOINT = {"channel_skew": "time_delay", "rotor_inertia": "payload"}
+"""The same at the only joint of an arm."""
 KnownNumber = tuple[float, tuple[float, float] | None]
 
 
@@ -87,6 +79,18 @@ class SoughtEffect:
     numbers: dict[str, dict[str, KnownNumber]]
     identical: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
+
+
+def equivalent_effects(effect: str) -> tuple[str, ...]:
+    """The other effects that count as this one at any joint."""
+    common = EQUIVALENT_NAMES.get(effect, effect)
+    alike = (common, *(name for name, other in EQUIVALENT_NAMES.items() if other == common))
+    return tuple(name for name in alike if name != effect)
+
+
+def friction_laws() -> tuple[str, ...]:
+    """All effects of the library that take energy from the motion, those of plug-ins included."""
+    return tuple(family.effect for family in library() if family.facts.dissipates)
 
 
 def withhold_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> TorqueModel:
@@ -142,9 +146,10 @@ def _known_number(parameter: ParameterValue) -> tuple[str, KnownNumber]:
 
 def _build_sought(label: str, joints: tuple[int, ...], told: dict[str, dict[str, KnownNumber]]) -> SoughtEffect:
     """numbers of a spring hold under either of its names."""
-    same = tuple(other for effect in told for other in INSEPARABLE_EFFECTS.get(effect, ()))
-    numbers = told | {other: told[effect] for effect in told for other in INSEPARABLE_EFFECTS.get(effect, ())}
-    laws = tuple(each for each in FRICTION_LAWS if each not in told) if set(told) <= set(FRICTION_LAWS) else ()
+    same = tuple(other for effect in told for other in equivalent_effects(effect))
+    numbers = told | {other: told[effect] for effect in told for other in equivalent_effects(effect)}
+    friction = friction_laws()
+    laws = tuple(each for each in friction if each not in told) if set(told) <= set(friction) else ()
     return SoughtEffect(label, tuple(told), joints, numbers, same, laws)
 
 
@@ -181,6 +186,8 @@ MAIN_PARAMETER = {
     "cable_stiffness": "stiffness",
     "time_delay": "seconds",
     "viscous_friction": "coefficient",
+    "channel_skew": "seconds",
+    "rotor_inertia": "inertia",
 }
 
 
@@ -207,12 +214,12 @@ def sought_of_disturbance(what: Disturbance, joints: int) -> SoughtEffect:
     size: dict[str, KnownNumber] = {MAIN_PARAMETER[what.effect]: (what.size, None)}
     numbers: dict[str, dict[str, KnownNumber]] = {what.effect: size}
     place = () if what.joint is None else (what.joint,)
-    same: tuple[str, ...] = INSEPARABLE_EFFECTS.get(what.effect, ())
+    same = equivalent_effects(what.effect)
     numbers |= dict.fromkeys(same, size)
-    if joints == 1 and what.effect == "time_delay":
-        same, numbers["channel_skew"] = ("channel_skew",), size
-    if joints == 1 and what.effect == "payload":
-        same, numbers["rotor_inertia"] = (*same, "rotor_inertia"), {"inertia": (what.size, None)}
+    if joints == 1:
+        alike = tuple(name for name, other in EQUIVALENT_AT_ONLY_JOINT.items() if other == what.effect)
+        same += alike
+        numbers |= {name: {MAIN_PARAMETER[name]: (what.size, None)} for name in alike}
     return SoughtEffect(str(what), (what.effect,), place, numbers, same)
 
 

@@ -27,6 +27,7 @@ from armlab.diagnosis.real_concealed.conceal import (
 )
 from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.contract import UNKNOWN
 from armlab.identification.model_file import write_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Recording
@@ -102,9 +103,6 @@ def _joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
     return joints if len(joints) > 1 else (joint,)
 
 
-UNKNOWN_EFFECT = "unknown"
-
-
 def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> Outcome:
     """The outcome of a case. path: where the simulation that is handed over is written."""
     recording, handed = reference.recording, withhold_pieces(reference.model, case.withheld)
@@ -146,7 +144,7 @@ def _measure_outcome(case: Case, found: Diagnosis, hidden: Array, wanted: tuple[
     assert found.nominal is not None
     assert found.final is not None
     rows = rows_in(found.observed.of_role("validate"), found.observed.rows)
-    named = found.final + sum((each.prediction for each in found.claims if each.effect == UNKNOWN_EFFECT), np.zeros(1))
+    named = found.final + sum((each.prediction for each in found.claims if each.effect == UNKNOWN.id), np.zeros(1))
     answers = [each.prediction for each in found.claims if is_sought_kind(each, wanted)]
     left = hidden[rows] - sum((each[rows] for each in answers), np.zeros(1))
     power = float(np.sum(hidden[rows] ** 2))

@@ -5,15 +5,18 @@ from typing import Literal
 
 import numpy as np
 
-from armlab.diagnosis.real_concealed.conceal import KnownNumber, SoughtEffect
+from armlab.diagnosis.real_concealed.conceal import (
+    EQUIVALENT_AT_ONLY_JOINT,
+    EQUIVALENT_NAMES,
+    KnownNumber,
+    SoughtEffect,
+)
 from armlab.diagnosis.real_concealed.examine import Outcome, ParameterSize, ReportedFinding, Span
 from armlab.diagnosis.real_concealed.plan import Case
 
 Answer = Literal["named", "identical", "law", "class", "cancelled", "elsewhere", "missed"]
 Findings = tuple[ReportedFinding, ...]
 MAX_CLASS_RIVALS = 3  # of a class that counts as an answer
-EQUIVALENT_NAMES = {"inertial_parameter_error": "payload", "gravity_compensator": "cable_stiffness"}
-EQUIVALENT_AT_ONLY_JOINT = {"channel_skew": "time_delay", "rotor_inertia": "payload"}  # at the only joint of an arm
 UNCOMPARED_PARAMETERS = ("exponent", "rest")  # parameters that are not compared: they mean little without the others
 
 

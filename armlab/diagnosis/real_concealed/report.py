@@ -19,6 +19,7 @@ from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedN
 from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
 from armlab.diagnosis.report.words import effect_in_words, format_number, format_unit, place_in_words
+from armlab.effects.contract import UNKNOWN
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE
 
@@ -177,7 +178,7 @@ def count_lines(verdicts: Sequence[CaseVerdict], title: str) -> Iterator[str]:
         each.holds for verdict in verdicts for one in verdict.judged for each in one.numbers if each.holds is not None
     ]
     gaps = [verdict.gap for verdict in verdicts if verdict.gap is not None]
-    named = [each for verdict in verdicts for each in verdict.others if each.effect != "unknown"]
+    named = [each for verdict in verdicts for each in verdict.others if each.effect != UNKNOWN.id]
     unknown = sum(len(verdict.others) for verdict in verdicts) - len(named)
     yield (
         f"- {title}: {len(verdicts)} cases, {len(answers)} things to name: {tally}. "
