@@ -89,7 +89,6 @@ def runge_kutta(body: Body, position: Array, velocity: Array, torque: Array, ste
 
 WINDOW_SECONDS = 0.5
 MAX_WINDOWS = 24  # windows
-PROBE_STATES = 200  # random states at which the inertial part of a claim is read
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,7 @@ from armlab.diagnosis.report.html import figures, folded_details, html_document,
 from armlab.diagnosis.report.residuals import select_residuals
 from armlab.diagnosis.report.sections import findings_section
 from armlab.diagnosis.report.words import (
+    LINE_WIDTH,
     PARAMETER_DIGITS,
     effect_in_words,
     finding_in_words,
@@ -44,7 +45,6 @@ from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.verdict_files import check_output_folder, make_verdict
 from armlab.recordings.load import load_recording
 
-LINE_WIDTH = 110
 MAX_NAMED_CHANGES = 3
 
 

@@ -231,17 +231,13 @@ def _classes_table(card: Card, view: str) -> str:
     rows = []
     for each in card.entries:
         for place, rival in enumerate(each.rivals[view][:MAX_SHOWN_RIVALS]):
-            own = (each.label, f"{100 * each.absorbed[view]:.1f} %", _size_cell(each.shows_from[view]))
-            beside = (card.entries[rival.index].label, f"{rival.cosine:.3f}", _size_cell(rival.separation))
+            own = (each.label, f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
+            beside = (card.entries[rival.index].label, f"{rival.cosine:.3f}", _size_text(rival.separation))
             rows.append([*(own if place == 0 else ("", "", "")), *beside])
     listed = (
         html_table(PAGE_HEADINGS, rows, (0, 3)) if rows else paragraph("Every effect can be told from every other.")
     )
     return folded_details("What cannot be told apart", listed)
-
-
-def _size_cell(value: float) -> str:
-    return "never" if value == float("inf") else f"{value:.2g}"
 
 
 def write_card(

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.decision import Chances
-from armlab.diagnosis.next.experiment import CLEAR_SEPARATION, Experiment, RivalPair
+from armlab.diagnosis.next.experiment import Experiment, RivalPair
 from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
 from armlab.diagnosis.next.motion import random_point
-from armlab.diagnosis.next.question import Question
+from armlab.diagnosis.next.question import CLEAR_SEPARATION, Question
 from armlab.diagnosis.next.sampling import kept_columns
 
 CARD_SCHEMA = "next/1"

@@ -21,7 +21,7 @@ from armlab.diagnosis.next.motion import (
 )
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, find_nearby_names, prepare_questions
 from armlab.diagnosis.next.problem import TellApartProblem, tell_apart_problem
-from armlab.diagnosis.next.question import Question
+from armlab.diagnosis.next.question import CLEAR_SEPARATION, Question
 from armlab.diagnosis.next.remedies import Remedy, find_remedies
 from armlab.diagnosis.next.verdict_file import RivalGroup, VerdictWithModel, read_verdict, select_rival_groups
 from armlab.recordings.load import load_recording
@@ -32,7 +32,6 @@ from problem.robot_file import load_arm
 
 RANDOM_MOTIONS = 20  # random motions that a design is compared with
 WHOLE_LIBRARY = "library"  # in place of names: everything that comes near
-CLEAR_SEPARATION = 4.0  # standard errors: below it other ways are told, too
 
 
 @dataclass(frozen=True)

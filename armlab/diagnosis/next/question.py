@@ -14,6 +14,8 @@ from armlab.effects.library import effect_named
 from armlab.recordings.filters import Filter
 from problem.base_parameters import BaseParameters
 
+CLEAR_SEPARATION = 4.0  # standard errors between two rivals that decide
+
 
 @dataclass(frozen=True)
 class Name:

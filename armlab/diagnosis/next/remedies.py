@@ -11,7 +11,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.next.first_run import PresentModel
 from armlab.diagnosis.next.moments import Index
 from armlab.diagnosis.next.prepare import PreparedQuestions
-from armlab.diagnosis.next.question import Layout, Question, Rival, build_layout, inseparable_rivals
+from armlab.diagnosis.next.question import CLEAR_SEPARATION, Layout, Question, Rival, build_layout, inseparable_rivals
 from armlab.effects.transmission import Transmission
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -21,7 +21,6 @@ from problem.transforms import rotation_x
 LOAD_KG = 1.0
 LOAD_POSITION = (0.0, 0.0, 0.05)  # m, in the last link's frame
 TILT_DEG = 10.0
-DECISIVE_SEPARATION = 4.0  # standard errors that decide
 ENCODER_NOISE = 2e-5  # rad (m): noise of a second encoder
 
 
@@ -115,9 +114,9 @@ def _remedy_by_data_sheet(rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
     for rival in rivals:
         armature = rival.laws[0].candidate.joint_fields(rival.values).get("armature")
         if armature is not None:
-            accuracy = abs(armature) / DECISIVE_SEPARATION
+            accuracy = abs(armature) / CLEAR_SEPARATION
             what = f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to {accuracy:.3g} kg m2"
-            yield Remedy(what, DECISIVE_SEPARATION)
+            yield Remedy(what, CLEAR_SEPARATION)
 
 
 def _remedy_by_encoder(

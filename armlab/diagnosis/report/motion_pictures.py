@@ -24,7 +24,7 @@ from armlab.recordings.recording import Run
 
 MAX_DRAWN_WINDOWS = 3  # joints whose most telling window is drawn
 MOTION_HEIGHT = 215.0
-MILLI = 1e3  # mrad in a rad
+MILLI_PER_UNIT = 1e3  # mrad in a rad, mm in a m
 MAX_ERROR_RATIO = 300.0  # of the error at the end: less is not drawn
 
 
@@ -62,9 +62,9 @@ def _draw_growths(diagnosis: Diagnosis, found: Resimulation) -> list[str]:
     x = Axis("time since the start of a window, s", 0.0, float(found.time[-1]))
     for joint in range(found.new.shape[2]):
         size = f"m{_position_unit(diagnosis, joint)}"
-        lines = [Line(found.time[1:], MILLI * found.growth(found.new)[1:, joint], FOUND_LOOK)]
+        lines = [Line(found.time[1:], MILLI_PER_UNIT * found.growth(found.new)[1:, joint], FOUND_LOOK)]
         if found.old is not None:
-            lines.insert(0, Line(found.time[1:], MILLI * found.growth(found.old)[1:, joint], _old_look(found)))
+            lines.insert(0, Line(found.time[1:], MILLI_PER_UNIT * found.growth(found.old)[1:, joint], _old_look(found)))
         ends = [float(each.y[-1]) for each in lines]
         floor = max(min(ends) / MAX_ERROR_RATIO, 1e-12)
         y = fit_axis(f"rms error, {size} (log)", *(np.maximum(each.y, floor) for each in lines), log=True)
@@ -97,7 +97,6 @@ def _draw_windows(diagnosis: Diagnosis, found: Resimulation) -> list[str]:
     return out
 
 
-MRAD_PER_RAD = 1e3  # mrad in a rad
 DIFFERENCE_HEIGHT = 205.0
 REFERENCE_LOOK = Look("reference − measured", "#0072b2", 1.2)
 SIMULATED_LOOK = Look("simulated − measured", GIVEN_LOOK.color, 1.2, GIVEN_LOOK.dash)
@@ -116,13 +115,13 @@ def draw_motion_differences(diagnosis: Diagnosis) -> tuple[list[str], str]:
     time = chosen.time - chosen.time[0]
     for joint in range(chosen.joints):
         size = "mrad" if arm.joints[joint].kind == "revolute" else "mm"
-        lines: list[Layer] = [Line(time, MRAD_PER_RAD * apart[:, joint], look) for look, apart in found]
-        y = fit_axis(f"difference, {size}", *(MRAD_PER_RAD * apart[:, joint] for _, apart in found), zero=True)
+        lines: list[Layer] = [Line(time, MILLI_PER_UNIT * apart[:, joint], look) for look, apart in found]
+        y = fit_axis(f"difference, {size}", *(MILLI_PER_UNIT * apart[:, joint] for _, apart in found), zero=True)
         x = Axis(f"time in {shorten_name(chosen.name)}, s", float(time[0]), float(time[-1]))
         pictures.append(draw_chart(f"Joint {joint + 1}: difference of motion", x, y, lines, height=DIFFERENCE_HEIGHT))
     for look, apart in found:
         sizes = [
-            format_number(MRAD_PER_RAD * float(np.sqrt(np.nanmean(apart[:, joint] ** 2))))
+            format_number(MILLI_PER_UNIT * float(np.sqrt(np.nanmean(apart[:, joint] ** 2))))
             for joint in range(chosen.joints)
         ]
         told.append(f"{look.name}: {join_words(sizes)} mrad (mm) rms by joint in {chosen.name}")

@@ -171,7 +171,7 @@ def join_words(parts: Sequence[str], last: str = "and") -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
-LINE_WIDTH = 110
+LINE_WIDTH = 110  # letters in a line of the terminal
 
 
 def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
