@@ -16,7 +16,7 @@ from armlab.diagnosis.next.experiment import Experiment, RivalPair
 from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
 from armlab.diagnosis.next.motion import random_point
 from armlab.diagnosis.next.question import CLEAR_SEPARATION, Question
-from armlab.diagnosis.next.sampling import kept_columns
+from armlab.diagnosis.next.sampling import kept_columns, noise_levels
 
 CARD_SCHEMA = "next/1"
 
@@ -160,7 +160,7 @@ def _fill_panels(axes: list[Axes], experiment: Experiment, pair: RivalPair) -> N
     joint = int(np.argmax(np.sum(designed.torque**2, axis=0)))
     drive = "force" if experiment.excitation.arm.joints[joint].kind == "prismatic" else "torque"
     unit = "N" if drive == "force" else "N m"
-    level = float(experiment.prepared.sampling.noise.level[joint])
+    level = float(noise_levels(experiment.prepared.sampling.noise)[joint])
     top = max(1.3 * level, *(1.1 * float(np.abs(each.torque[:, joint]).max()) for each in (designed, other)))
     for axis, seen, color in zip(axes, (other, designed), (BEFORE_COLOR, AFTER_COLOR), strict=False):
         axis.axhspan(-level, level, color=NOISE_COLOR, alpha=0.6, label="noise of a sample")

@@ -17,8 +17,8 @@ from armlab.diagnosis.data import (
 )
 from armlab.diagnosis.next.moments import Index, Moments
 from armlab.diagnosis.next.question import Layout
-from armlab.diagnosis.next.sampling import Sampling, Whitening, kept_columns
-from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.next.sampling import Sampling, kept_columns
+from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
@@ -77,8 +77,7 @@ class FirstRun:
     def sampling(self, columns: Array, fitted: Index) -> Sampling:
         """The filter and the noise that is left when the fitted columns are taken out."""
         noise = fit_noise(self._fit_residual(columns[:, :, fitted]), self.observed, len(fitted) / self.observed.joints)
-        whitening = Whitening(noise.taps, noise.scales)
-        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, whitening, self._standing_speeds())
+        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, noise, self._standing_speeds())
 
     def _standing_speeds(self) -> tuple[float, ...]:
         """Speed of each joint (joints,) below which a diagnosis takes it as standing still, rad/s (m/s)."""
@@ -93,14 +92,14 @@ class FirstRun:
         slow: list[float] = np.maximum(STANDSTILL_SIGMAS * np.max(noise, axis=0), CREEP_RATIO * speed).tolist()
         return tuple(slow)
 
-    def moments(self, columns: Array, noise: Whitening, role: Role) -> Moments:
+    def moments(self, columns: Array, noise: Noise, role: Role) -> Moments:
         """Of the rows of a role in which a joint moves."""
         size = columns.shape[2]
         whole = np.concatenate([columns, self.torque[:, :, None]], axis=2)
         gram = np.zeros((size + 1, size + 1))
         for joint in range(self.observed.joints):
             for part in self.observed.of_role(role, joint):
-                rows = noise(whole[part.start : part.stop, joint], joint)
+                rows = noise.whitened(whole[:, joint], joint, [part])
                 gram += rows.T @ rows
         return Moments(gram[:size, :size], gram[:size, size])
 

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import STANDSTILL_MARGIN, Segment, rows_in, split_segment
+from armlab.diagnosis.noise import Noise
 from armlab.effects.contract import Candidate, Scene
 from armlab.recordings.filters import Butterworth, Filter
 from problem.base_parameters import BaseParameters
@@ -19,30 +20,15 @@ from problem.regressor import observation_matrix
 IMPULSE_ROWS = 2000  # rows after which noise has forgotten
 
 
-@dataclass(frozen=True, eq=False)
-class Whitening:
-    """Per joint the prediction-error filter (order + 1,), first tap one, and the innovations' standard deviation."""
-
-    taps: tuple[Array, ...]
-    scales: tuple[float, ...]
-
-    def __call__(self, rows: Array, joint: int) -> Array:
-        """Consecutive rows (rows, columns) of a joint at unit variance; the first ones, without a past, are lost."""
-        taps = self.taps[joint]
-        return np.asarray(lfilter(taps, [1.0], rows, axis=0)[len(taps) - 1 :] / self.scales[joint])
-
-    @property
-    def level(self) -> Array:
-        """Standard deviation of a row's noise at each joint, (joints,), N m."""
-        impulse = np.zeros(IMPULSE_ROWS)
-        impulse[0] = 1.0
-        pairs = zip(self.taps, self.scales, strict=True)
-        return np.array([scale * np.sqrt(np.sum(lfilter([1.0], taps, impulse) ** 2)) for taps, scale in pairs])
+def noise_levels(noise: Noise) -> Array:
+    """Standard deviation of a row's noise at each joint, (joints,), N m."""
+    impulse = np.zeros(IMPULSE_ROWS)
+    impulse[0] = 1.0
+    pairs = zip(noise.taps, noise.scales, strict=True)
+    return np.array([scale * np.sqrt(np.sum(lfilter([1.0], taps, impulse) ** 2)) for taps, scale in pairs])
 
 
-SHORT_STRETCH_WORTH = (
-    0.5  # of what a row is worth is left in a stretch between standstills that is too short for a diagnosis
-)
+SHORT_STRETCH_WORTH = 0.5  # of a row's worth, in a stretch between standstills that is too short for a diagnosis
 SAMPLES_PER_ROW = 2  # samples of a designed motion for each kept row
 ROWS_PER_CUTOFF = 3.0  # as a diagnosis keeps them
 INDEPENDENT_PER_HERTZ = 2.0  # numbers a second that a low-pass leaves independent, for each hertz of its cut-off
@@ -57,7 +43,7 @@ class Sampling:
 
     kept_hz: float
     cutoff_hz: float
-    noise: Whitening
+    noise: Noise
     standing: tuple[float, ...] = ()
 
     @property
@@ -81,7 +67,7 @@ class Sampling:
         moves = self._moving_samples(velocity)[::SAMPLES_PER_ROW]
         kept = []
         for joint in range(columns.shape[1]):
-            rows = self.noise(columns[:, joint], joint)
+            rows = self.noise.whitened(columns[:, joint], joint, [Segment(0, "identify", 0, len(columns))])
             kept.append(rows * _row_weights(moves[:, joint])[len(moves) - len(rows) :, None])
         return np.concatenate(kept)
 
@@ -107,7 +93,7 @@ def white_noise_sampling(levels: Array, cutoff_hz: float) -> Sampling:
     scales = np.asarray(levels) * np.sqrt(
         kept_hz / (INDEPENDENT_PER_HERTZ * cutoff_hz)
     )  # rows that share their noise count less
-    return Sampling(kept_hz, cutoff_hz, Whitening(tuple(np.ones(1) for _ in levels), tuple(scales.tolist())))
+    return Sampling(kept_hz, cutoff_hz, Noise(tuple(np.ones(1) for _ in levels), tuple(scales.tolist()), ()))
 
 
 def kept_columns(
