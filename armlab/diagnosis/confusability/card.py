@@ -111,9 +111,10 @@ VIEWS = ("nominal", "refit")
 
 @dataclass(frozen=True)
 class Rival:
-    """Another effect that can do all that one can. cosine: 1 where no amount of data tells them apart.
+    """Another effect that can imitate an entry. cosine: 1 where no amount of data separates the two.
 
-    separation: smallest size of the first, as rms torque in units of noise, at which the two differ by SURE errors.
+    separation: smallest size of the entry, as rms torque in units of noise, at which the two differ by
+    CERTAIN_STANDARD_ERRORS.
     """
 
     index: int
@@ -239,7 +240,7 @@ def _confused_rival(view: Confusion, index: int, other: int, rows: float) -> Riv
 
 
 def size_to_show(share: float, rows: float) -> float:
-    """rms torque, in units of noise, at which a share of a signal's length makes SURE standard errors."""
+    """rms torque, in units of noise, at which this share of a signal is CERTAIN_STANDARD_ERRORS long."""
     return float(CERTAIN_STANDARD_ERRORS / (np.sqrt(rows) * share)) if share > 1e-6 else float("inf")
 
 

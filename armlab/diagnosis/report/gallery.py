@@ -61,6 +61,8 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
     whole = [effect_in_words(claim.effect) for claim in diagnosis.claims if claim.joint is None]
     worst = [each.joint for each in diagnosis.located[:MAX_LOCATED_JOINTS]]
     located = [(joint, draw_located_errors(diagnosis, data, joint - 1)) for joint in worst]
+    motions, motion_text = draw_motion(diagnosis)
+    differences, difference_text = draw_motion_differences(diagnosis)
     return Gallery(
         data,
         draw_arm(arm, position, joint_marks(diagnosis), whole),
@@ -69,8 +71,10 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
         draw_errors(diagnosis, data),
         [(claim, draw_evidence(diagnosis, data, claim)) for claim in diagnosis.claims],
         located,
-        *draw_motion(diagnosis),
-        *draw_motion_differences(diagnosis),
+        motions,
+        motion_text,
+        differences,
+        difference_text,
     )
 
 
@@ -83,7 +87,7 @@ def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
             facts = effect_named(claim.effect)
             texts.setdefault(claim.joint, []).append(f"{facts.words} (link)" if facts.where == "link" else facts.words)
             unknown[claim.joint] = unknown.get(claim.joint, True) and facts == UNKNOWN
-    return {joint: JointMark(_short_mark(found), unknown[joint]) for joint, found in texts.items()}
+    return {joint: JointMark(_short_mark(names), unknown[joint]) for joint, names in texts.items()}
 
 
 def _short_mark(names: list[str]) -> str:

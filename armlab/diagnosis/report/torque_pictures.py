@@ -55,11 +55,11 @@ def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> str:
     content += _draw_grid(axis, top, height)
     for joint in range(len(floors)):
         content += _draw_joint_row(axis, top + JOINT_ROW_HEIGHT * (joint + 0.5), joint, series, float(floors[joint]))
-    told = "; ".join(
+    values = "; ".join(
         f"joint {joint + 1}: {', '.join(f'{look.name} {format_number(float(each[joint]))}' for look, each in series)}"
         for joint in range(len(floors))
     )
-    return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {told}")
+    return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {values}")
 
 
 def _draw_marks_legend(series: Series) -> str:

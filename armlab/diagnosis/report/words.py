@@ -85,8 +85,8 @@ class ParameterRow:
 def parameter_rows(parameter: ParameterValue) -> list[ParameterRow]:
     """A parameter as rows, a vector's components one by one."""
     values = np.atleast_1d(np.array(parameter.value, dtype=float)).tolist()
-    found = parameter.interval
-    pairs = [None] * len(values) if found is None else np.array(found, dtype=float).reshape(-1, 2).tolist()
+    interval = parameter.interval
+    pairs = [None] * len(values) if interval is None else np.array(interval, dtype=float).reshape(-1, 2).tolist()
     names = [parameter.name]
     if len(values) > 1:
         names = [f"{parameter.name} {part}" for part in COMPONENT_NAMES.get(len(values), range(1, len(values) + 1))]
@@ -178,8 +178,8 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     """The verdict, each finding with its equation, errors before and after, and what to do next."""
     first, second = verdict_sentences(diagnosis)
     yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
-    for number_, claim in enumerate(diagnosis.claims, 1):
-        yield from _claim_lines(number_, claim, joint_unit(diagnosis.simulation.arm, claim.evidence.joint))
+    for number, claim in enumerate(diagnosis.claims, 1):
+        yield from _claim_lines(number, claim, joint_unit(diagnosis.simulation.arm, claim.evidence.joint))
     for each in diagnosis.unexplained:
         yield f"  unexplained: {100 * each.share:.0f} % of joint {each.joint}, by {', '.join(each.depends_on)}"
     if diagnosis.fit:
@@ -190,12 +190,12 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"  {fit.joint:>5}{errors}{closed:>13}   {joint_unit(diagnosis.simulation.arm, fit.joint - 1)}"
 
 
-def _claim_lines(number_: int, claim: Claim, size: str) -> Iterator[str]:
+def _claim_lines(number: int, claim: Claim, unit: str) -> Iterator[str]:
     evidence = claim.evidence
     lines = wrap(f"{finding_in_words(claim)}: {claim.equation}", LINE_WIDTH - 5)
-    yield f"{number_:>3}. {lines[0]}"
+    yield f"{number:>3}. {lines[0]}"
     yield from (f"     {line}" for line in lines[1:])
-    error = f"{format_number(evidence.rms_before)} to {format_number(evidence.rms_after)} {size}"
+    error = f"{format_number(evidence.rms_before)} to {format_number(evidence.rms_after)} {unit}"
     yield f"     held-out error of joint {evidence.joint + 1}: {error}; p {format_probability(evidence.corrected)}"
     rivals = ", ".join(
         f"{effect_in_words(each.effect)} ({place_in_words(each.effect, each.joint, each.joints)})"
