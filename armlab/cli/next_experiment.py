@@ -30,8 +30,8 @@ def write_next_experiment(
     out: Path,
 ) -> Iterator[str]:
     """Designs and writes the next experiment, and tells its card in lines; InputError for what cannot be used."""
-    known: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
-    experiment = design_experiment(verdict, robot, recording, rivals, budget, known)
+    known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
+    experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links)
     yield from card_lines(experiment)
     try:
         out.mkdir(parents=True, exist_ok=True)

@@ -51,7 +51,7 @@ class PresentModel:
 
 @dataclass(frozen=True, eq=False)
 class FirstRun:
-    """observed: the runs. scenes: one a run. torque: (rows, joints), N m, what the links do not explain."""
+    """The first recording. scenes: one for each run. torque: (rows, joints), N m, measured less that of the links."""
 
     observed: Observed
     scenes: tuple[Scene, ...]
@@ -68,7 +68,7 @@ class FirstRun:
         return 2 / 3 if self.observed.held_out_blocks else 1.0
 
     def columns(self, layout: Layout) -> Array:
-        """All columns at the kept rows, (rows, joints, columns)."""
+        """Columns of a layout at the kept rows, (rows, joints, columns)."""
         pairs = zip(self.scenes, self.observed.signals, strict=True)
         return np.concatenate(
             [kept_columns(layout.base, layout.candidates, scene, signals.filter) for scene, signals in pairs]
@@ -93,7 +93,7 @@ class FirstRun:
         return tuple(slow)
 
     def moments(self, columns: Array, noise: Noise, role: Role) -> Moments:
-        """Of the rows of a role in which a joint moves."""
+        """Moments of the rows of a role in which a joint moves. columns: (rows, joints, columns)."""
         size = columns.shape[2]
         whole = np.concatenate([columns, self.torque[:, :, None]], axis=2)
         gram = np.zeros((size + 1, size + 1))

@@ -45,14 +45,16 @@ from problem.trajectories import Trajectory
 
 LinkKnowledge = Literal["exact", "near", "free"]
 NEAR_LINK_WIDTH = 0.08  # width of the links' errors: about as far as drawings are off
-RICH_MOTIONS = 3  # random motions that show what any motion could show
+RICH_MOTIONS = 3  # random motions that stand for all motions
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedQuestions:
-    """seen: what the first recording says of the columns of `layout`; before: its rows from which a diagnosis learns.
+    """Questions with everything that a design needs to answer them.
 
-    rows: those rows, of all joints. counted: share of a new run that will be among them, the rest is held out.
+    present: the model of the verdict. layout: the columns of all laws. seen: moments of all rows of the first
+    recording; before: those of the rows from which a diagnosis learns. rows: number of those rows, of all joints.
+    learned_share: share of a new run from which a diagnosis will learn; the rest is held out.
     """
 
     present: PresentModel
@@ -66,13 +68,13 @@ class PreparedQuestions:
     first: FirstRun | None
 
     def moments(self, scene: Scene) -> Moments:
-        """What a diagnosis would learn from a designed motion."""
+        """Moments of a designed motion, of the share from which a diagnosis will learn."""
         whole = self.layout.moments(scene, self.sampling.filter(len(scene.time)), self.sampling)
         return Moments(self.learned_share * whole.gram, self.learned_share * whole.vector)
 
     @property
     def known_moments(self) -> Moments:
-        """All that the first recording says, with what is known of the links beforehand."""
+        """Moments of the first recording, with the prior of the links."""
         return Moments(self.seen.gram + self.layout.prior, self.seen.vector)
 
     def rows_with(self, samples: int) -> float:
@@ -80,7 +82,7 @@ class PreparedQuestions:
         return self.rows + self.learned_share * (samples // SAMPLES_PER_ROW) * len(self.present.arm)
 
     def together(self, gram: Array) -> Array:
-        """Moments of both runs, and what is known of the links beforehand."""
+        """Gram matrix of the first recording and a new run (columns, columns), with the prior of the links."""
         return np.asarray(gram + self.before.gram + self.layout.prior)
 
 
@@ -95,12 +97,15 @@ def prepare_questions(
     seed: int = 0,
     lenient: bool = False,
 ) -> PreparedQuestions:
-    """Everything that a design needs; InputError where a rival cannot be sized or leaves no trace.
+    """Restores the model of a verdict, and prepares one question for each group of rival names.
 
-    lenient: groups with such a rival are left out instead.
+    groups: names of which one is right. trajectory, duration (s): motions that may be designed. links: how well the
+    links are known. lenient: leave out groups with a name that leaves no trace in the torques. Raises InputError where
+    such a name is asked for, or where neither the verdict nor a recording says how large a rival is.
     """
     families = library()
-    parts = {each.name: part for each in verdict.findings if (part := restore_part(each, arm, families)) is not None}
+    restored = {each.name: restore_part(each, arm, families) for each in verdict.findings}
+    parts = {name: part for name, part in restored.items() if part is not None}
     own = tuple(part for name, part in parts.items() if not name.facts.in_links)
     present = PresentModel(arm, verdict.inertial(arm), own)
     first = observe_first_run(recording, present) if recording is not None else None
@@ -201,25 +206,32 @@ class _Preparation:
         return out
 
     def _rich_gram(self, sampling: Sampling) -> Array:
-        """What rich motions show, even while a joint stands still."""
+        """Gram matrix of the rich motions; rows near a standstill count, too."""
         sampling = replace(sampling, standing=())
         moments = [self.layout.moments(scene, sampling.filter(len(scene.time)), sampling) for scene in self.rich]
         return np.asarray(np.sum([each.gram for each in moments], axis=0))
 
     def _keep_needed_columns(
-        self, questions: tuple[Question, ...], sampling: Sampling, *recorded: Moments
+        self, questions: tuple[Question, ...], sampling: Sampling, whole: Moments, before: Moments
     ) -> PreparedQuestions:
-        """The same with only the columns that the questions need."""
+        """The questions with only the columns that they need. whole, before: moments of all columns."""
         laws = [law.columns for question in questions for rival in question.rivals for law in rival.laws]
         needed = np.concatenate([np.arange(len(self.layout.base)), *(each.free for each in questions), *laws])
         kept = np.unique(needed).astype(np.intp)
         chosen = [each for each, at in zip(self.layout.candidates, self.layout.places, strict=True) if at[0] in kept]
         count = len(self.layout.base)
         layout = build_layout(self.layout.base, chosen, self.rich[0], self.layout.prior[:count, :count])
-        whole, before = (Moments(each.gram[np.ix_(kept, kept)], each.vector[kept]) for each in recorded)
-        rows, counted = (self.first.rows, self.first.learned_share) if self.first else (0, 1.0)
-        moved = tuple(each.with_columns(kept) for each in questions)
-        return PreparedQuestions(self.present, layout, moved, sampling, whole, before, rows, counted, self.first)
+        return PreparedQuestions(
+            present=self.present,
+            layout=layout,
+            questions=tuple(each.with_columns(kept) for each in questions),
+            sampling=sampling,
+            seen=whole.select(kept),
+            before=before.select(kept),
+            rows=self.first.rows if self.first else 0,
+            learned_share=self.first.learned_share if self.first else 1.0,
+            first=self.first,
+        )
 
 
 def _link_precision(arm: Arm, base: BaseParameters, inertial: Array, links: LinkKnowledge) -> Array:
@@ -251,20 +263,21 @@ def find_nearby_names(
     links: LinkKnowledge,
     seed: int,
 ) -> tuple[RivalGroup, ...]:
-    """For each finding its name, the rivals of the verdict, and the names that come closest; lone names left out."""
-    named = [
+    """One group for each finding: its name, its rivals in the verdict, and the names that explain the data nearly as
+    well. A finding without such a name has no group.
+    """
+    findings = [
         each
         for each in verdict.findings
         if each.parameters and each.name.facts != UNKNOWN and not each.name.facts.scanned
     ]
     out = []
-    for finding in named[:MAX_FINDINGS]:
+    for finding in findings[:MAX_FINDINGS]:
         pairs = tuple((finding.name, name) for name in _candidate_names(finding, verdict, arm))
-        found = prepare_questions(verdict, pairs, arm, trajectory, duration, recording, links, seed, lenient=True)
-        near = sorted(
-            (told for each in found.questions if (told := _nearby_name(found, each)) is not None), key=_search_lead
-        )
-        group = dict.fromkeys((finding.name, *finding.rivals, *(name for name, _ in near)))
+        prepared = prepare_questions(verdict, pairs, arm, trajectory, duration, recording, links, seed, lenient=True)
+        leads = [_nearby_name(prepared, each) for each in prepared.questions]
+        nearby = sorted((each for each in leads if each is not None), key=_search_lead)
+        group = dict.fromkeys((finding.name, *finding.rivals, *(name for name, _ in nearby)))
         out.append(tuple(group)[:MAX_GROUP_SIZE])
     return tuple(group for group in out if len(group) > 1)
 
@@ -288,19 +301,19 @@ def _candidate_names(finding: Finding, verdict: VerdictWithModel, arm: Arm) -> l
 
 
 def _nearby_name(prepared: PreparedQuestions, question: Question) -> tuple[Name, float] | None:
-    """The other name of a question and how much a search prefers the finding to it; None where there is no doubt.
+    """The other name of a question, and by how much a search prefers the finding; None where there is no doubt.
 
-    No rival is a name that physics refuses with the size that it would need, nor a larger law that holds the
-    finding's as a part, unless it explains more by more than noise.
+    There is no doubt where physics refuses the size that the other name needs. There is none either where the other
+    law contains that of the finding and explains no more than noise beyond it.
     """
-    seen = prepared.known_moments
-    found, other = question.rivals
+    known = prepared.known_moments
+    finding, other = question.rivals
     law = other.laws[0]
-    gain = explained_power(seen, question.free, law.columns) - explained_power(
-        seen, question.free, found.laws[0].columns
+    gain = explained_power(known, question.free, law.columns) - explained_power(
+        known, question.free, finding.laws[0].columns
     )
-    larger = bool(question.inseparable[0, 1]) and law.freedom > found.laws[0].freedom
+    larger = bool(question.inseparable[0, 1]) and law.freedom > finding.laws[0].freedom
     needed = MIN_BEYOND_NOISE**2 if larger else -(MAX_AMBIGUOUS_LEAD**2)
     if gain < needed or law.candidate.objection(other.values) is not None:
         return None
-    return other.name, law.price(prepared.rows) - found.laws[0].price(prepared.rows) - 0.5 * gain
+    return other.name, law.price(prepared.rows) - finding.laws[0].price(prepared.rows) - 0.5 * gain

@@ -38,8 +38,8 @@ class Name:
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A rival in one shape. columns: its places among all columns. freedom: how many parameters it adds to what is free
-    anyway. looks: among how many alternatives it was picked. share: of all joints, those whose torque it changes.
+    """A rival in one shape. columns: its indices among all columns. freedom: number of parameters that it adds to the
+    free columns. looks: number of alternatives from which a search picks it. share: of joints whose torque it changes.
     """
 
     candidate: Candidate
@@ -49,7 +49,7 @@ class Law:
     share: float
 
     def price(self, rows: float) -> float:
-        """Its price in units of log likelihood, as the search of a diagnosis counts it; nothing new costs nothing.
+        """Penalty of its parameters in units of log likelihood, as in the search of a diagnosis; 0 without freedom.
 
         rows: of all joints.
         """
@@ -60,10 +60,10 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A name that may be right, and the law that it then is: laws[0] with these values. The others are its shapes.
+    """A name that may be right. Its law is laws[0] with these values; the other laws are other shapes of it.
 
-    weight: how well it fits what was recorded, beside the others. sizes: for each law the coefficients that it may have
-    after what was recorded, (draws, columns); none where nothing was.
+    weight: its probability after the first recording, up to a factor. sizes: for each law draws of its coefficients
+    after that recording, (draws, columns); empty without a recording.
     """
 
     name: Name
@@ -81,10 +81,11 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Rivals of which one is right. free: columns that may be fitted beside any of them; found: those that surely are.
+    """Rivals of which one is right.
 
-    The rest of what is free, usual friction that no diagnosis has found yet, costs a price.
-    blind: (rivals, rivals), true where no motion shows, were the first right, that it is not the second.
+    free: columns that may be fitted beside any rival. found: those of them that the verdict has found; the others,
+    usual friction, are fitted at a price. inseparable: (rivals, rivals), true where no motion can refute the second
+    rival if the first one is right.
     """
 
     rivals: tuple[Rival, ...]
@@ -130,8 +131,8 @@ class Question:
     def separation(self, gram: Array, one: int, other: int) -> float:
         """Standard errors between two rivals, whichever is right.
 
-        Where one law contains the other, it explains whatever the other explains; then the simpler name is told
-        unless the larger one is needed, and only that direction can be measured.
+        Where one law contains the other, it explains all that the other explains. A diagnosis then names the simpler
+        law unless the larger one is needed, so only this direction is measured.
         """
         ways = [(one, other), (other, one)]
         seen = [self.noncentrality(gram, *way) for way in ways if not self.inseparable[way]]
@@ -161,7 +162,7 @@ class Layout:
         return self.places[self.candidates.index(candidate)]
 
     def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> Moments:
-        """What a motion without any torque recorded yet would say."""
+        """Moments of a motion whose torque is not recorded yet: the vector is zero."""
         columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
         rows = sampling.whitened(columns, scene.motion.velocity)
         return Moments(rows.T @ rows, np.zeros(self.size))
@@ -186,9 +187,9 @@ def is_in_free_links(name: Name, free: Index) -> bool:
 
 
 def inseparable_rivals(rivals: tuple[Rival, ...], free: Index, gram: Array) -> Array:
-    """Which rivals a rich motion's moments cannot tell from which, (rivals, rivals).
+    """Matrix (rivals, rivals): true where a rich motion cannot refute the second rival if the first one is right.
 
-    Links that may be off anyway explain nothing that speaks against another name.
+    gram: of rich motions, with the prior. An error of links that are free anyway refutes no other name.
     """
     count = len(rivals)
     out = np.zeros((count, count), dtype=bool)

@@ -1,5 +1,5 @@
-"""What else would separate rivals that no motion separates, or hardly: a known load, a tilted base, a data sheet, a
-second encoder.
+"""What separates rivals where no motion does, or not clearly: a known load, a tilted base, a data sheet, or a second
+encoder.
 """
 
 from collections.abc import Iterator
@@ -26,7 +26,7 @@ ENCODER_NOISE = 2e-5  # rad (m): noise of a second encoder
 
 @dataclass(frozen=True)
 class Remedy:
-    """What would help. separation: in standard errors, infinite where nothing is left to doubt."""
+    """A measure that separates rivals. separation: standard errors between them with it."""
 
     what: str
     separation: float
@@ -35,7 +35,10 @@ class Remedy:
 def find_remedies(
     prepared: PreparedQuestions, question: Question, pair: tuple[int, int], motion: Motion, times: Array
 ) -> list[Remedy]:
-    """Remedies for a pair that help, the best first; each beside a run of this motion."""
+    """Remedies for a pair that separate it by more than one standard error, the best first.
+
+    motion, times: of a run in which the remedy is used.
+    """
     rivals = tuple(question.rivals[number] for number in pair)
     every = [
         *_remedy_by_load(prepared, question, rivals, motion, times),
@@ -57,8 +60,8 @@ def _remedy_by_load(
     body[-10:] = LOAD_KG * np.array(moments)
     loaded = replace(prepared.present, inertial=prepared.present.inertial + body)
     grams = [prepared.moments(each.scene(motion, times)).gram for each in (prepared.present, loaded)]
-    found = _pair_separation(rivals, question.free, prepared.layout.prior + grams[0] + grams[1])
-    yield Remedy(f"the motion with and without a known load of {LOAD_KG:g} kg at the flange", found)
+    separation = _pair_separation(rivals, question.free, prepared.layout.prior + grams[0] + grams[1])
+    yield Remedy(f"the motion with and without a known load of {LOAD_KG:g} kg at the flange", separation)
 
 
 def _remedy_by_tilt(
@@ -75,8 +78,8 @@ def _remedy_by_tilt(
     keep, sampling = prepared.sampling.filter(len(times)), prepared.sampling
     tilted = PresentModel(arm, present.inertial, present.parts)
     grams = [other.moments(each.scene(motion, times), keep, sampling).gram for each in (present, tilted)]
-    found = _pair_separation(tuple(_rival_in_layout(each, other) for each in rivals), index, grams[0] + grams[1])
-    yield Remedy(f"the motion on the level and with the base tilted by {TILT_DEG:g} degrees", found)
+    separation = _pair_separation(tuple(_rival_in_layout(each, other) for each in rivals), index, grams[0] + grams[1])
+    yield Remedy(f"the motion on the level and with the base tilted by {TILT_DEG:g} degrees", separation)
 
 
 def _tilt_base(arm: Arm) -> Arm:
@@ -105,8 +108,8 @@ def _remedy_by_removal(
             for law in rival.laws:
                 without[law.columns] = 0
                 without[:, law.columns] = 0
-            found = _pair_separation(rivals, question.free, prepared.layout.prior + with_it + without)
-            yield Remedy(f"the motion with and without the load on link {rival.name.joint}", found)
+            separation = _pair_separation(rivals, question.free, prepared.layout.prior + with_it + without)
+            yield Remedy(f"the motion with and without the load on link {rival.name.joint}", separation)
 
 
 def _remedy_by_data_sheet(rivals: tuple[Rival, ...]) -> Iterator[Remedy]:

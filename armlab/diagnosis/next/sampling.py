@@ -17,7 +17,7 @@ from armlab.recordings.filters import Butterworth, Filter
 from problem.base_parameters import BaseParameters
 from problem.regressor import observation_matrix
 
-IMPULSE_ROWS = 2000  # rows after which noise has forgotten
+IMPULSE_ROWS = 2000  # rows after which the response of the noise model has died away
 
 
 def noise_levels(noise: Noise) -> Array:
@@ -36,9 +36,11 @@ INDEPENDENT_PER_HERTZ = 2.0  # numbers a second that a low-pass leaves independe
 
 @dataclass(frozen=True, eq=False)
 class Sampling:
-    """kept_hz: rows a second after the filter. noise: of those rows. standing: (joints,), slower is standing
-    still, where friction takes any value: such rows tell no law, and short stretches between them less of it. Zero
-    for a joint without such friction; none where nothing was recorded.
+    """How rows of a motion are kept and weighted.
+
+    kept_hz: rows a second after the filter. noise: of those rows. standing: (joints,), rad/s (m/s): below this speed a
+    joint stands still, and friction takes any value. Rows near a standstill count nothing, and rows of short stretches
+    between standstills count less. Zero for a joint whose friction does not stick; empty without a recording.
     """
 
     kept_hz: float
@@ -60,7 +62,7 @@ class Sampling:
         return Butterworth(self.rate_hz, self.cutoff_hz, samples, SAMPLES_PER_ROW)
 
     def whitened(self, columns: Array, velocity: Array) -> Array:
-        """Whitened rows of kept columns (rows, joints, columns), as much as they count: (rows of all joints, columns).
+        """Whitened and weighted rows of kept columns (rows, joints, columns): (rows of all joints, columns).
 
         velocity: (samples, joints), of the whole motion.
         """
@@ -81,7 +83,7 @@ class Sampling:
 
 
 def _row_weights(moves: NDArray[np.bool_]) -> Array:
-    """What rows count, (rows,): nothing near a standstill, less in stretches too short for a diagnosis."""
+    """Weights (rows,): zero near a standstill, less than one in stretches too short for a diagnosis."""
     whole = Segment(0, "identify", 0, len(moves))
     long = rows_in(split_segment(whole, moves), len(moves)) if not moves.all() else moves
     return np.asarray(np.where(long, 1.0, np.where(moves, np.sqrt(SHORT_STRETCH_WORTH), 0.0)))

@@ -132,7 +132,7 @@ def _parse_rival_name(effect: str, joint: str, place: int | None, verdict: Verdi
             raise InputError(f"--rivals {effect}@{joint}: the joint should be a number from 1 to {len(verdict.noise)}")
         return Name(effect, int(joint))
     own: Sequence[int | None] = [each.name.joint for each in verdict.findings if each.name.effect == effect]
-    found = own[0] if own else place
-    if found is None:
+    chosen = own[0] if own else place
+    if chosen is None:
         raise InputError(f"--rivals: at which joint? write {effect}@2 for joint 2")
-    return Name(effect, found)
+    return Name(effect, chosen)
