@@ -7,7 +7,7 @@ from armlab.diagnosis.result import Claim, JointFit
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 
-MAX_FINDINGS_TOLD = 6  # findings that are told; the others are counted
+MAX_NAMED_FINDINGS = 6  # findings that the summary names; the others are counted
 
 
 def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit]) -> str:
@@ -15,11 +15,11 @@ def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit])
     if status == "none":
         worst = max((each.after for each in fits), default=0.0)
         return f"Nothing is missing: the simulation explains the recording down to its noise (at most {worst:.3g} N m)."
-    told = "; ".join(_describe_claim(claim) for claim in claims[:MAX_FINDINGS_TOLD])
-    more = f"; and {len(claims) - MAX_FINDINGS_TOLD} more" if len(claims) > MAX_FINDINGS_TOLD else ""
+    findings = "; ".join(_describe_claim(claim) for claim in claims[:MAX_NAMED_FINDINGS])
+    more = f"; and {len(claims) - MAX_NAMED_FINDINGS} more" if len(claims) > MAX_NAMED_FINDINGS else ""
     best = max(fits, key=lambda each: each.before - each.after)
     gain = f"On held-out data the error of joint {best.joint} falls from {best.before:.3g} to {best.after:.3g} N m."
-    return f"The simulation misses {told}{more}. {gain}"
+    return f"The simulation misses {findings}{more}. {gain}"
 
 
 def _describe_claim(claim: Claim) -> str:

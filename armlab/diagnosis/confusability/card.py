@@ -173,14 +173,14 @@ def confusability_card(
     scenes = tuple(_planned_scene(arm, each) for each in motions)
     filters = tuple(_diagnosis_filter(each, chosen) for each in motions)
     scatter = _default_noise(scenes) if noise is None else np.asarray(noise, dtype=float)
-    found = visible_candidates(arm, scenes, filters, families)
-    if not found:
+    candidates = visible_candidates(arm, scenes, filters, families)
+    if not candidates:
         raise ValueError("no effect has a column on this motion")
     free = {"nominal": None, "refit": base_rows(base_parameters(arm), scenes, filters)}
-    views = {name: compute_confusion(found, scenes, filters, free[name], scatter) for name in VIEWS}
+    views = {name: compute_confusion(candidates, scenes, filters, free[name], scatter) for name in VIEWS}
     seconds = sum(float(each.time[-1] - each.time[0]) for each in motions)
     rows = 2 * chosen.cutoff_hz * seconds
-    entries = tuple(_card_entry(index, views, rows) for index in range(len(found)))
+    entries = tuple(_card_entry(index, views, rows) for index in range(len(candidates)))
     cosines = {name: view.covered for name, view in views.items()}
     return Card(arm, ", ".join(each.name for each in motions), entries, cosines, scatter, rows)
 
