@@ -67,7 +67,7 @@ def test_what_is_known_already_adds_to_what_a_motion_shows(tmp_path: Path) -> No
     point = random_point(plain, BUDGET)
     before = question.separation(known.before.gram, 0, 1)
     new = problem.moments(point).gram
-    alone, both = question.separation(new, 0, 1), question.separation(known.together(new), 0, 1)
+    alone, both = question.separation(new, 0, 1), question.separation(known.total_gram(new), 0, 1)
     assert before > 1
     assert both**2 >= 0.999 * (before**2 + alone**2)  # common parameters can only help
 

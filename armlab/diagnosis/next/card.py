@@ -236,7 +236,7 @@ def _difference_on_motion(experiment: Experiment, pair: RivalPair, point: Array,
     times = prepared.sampling.times(experiment.budget.duration)
     motion = experiment.excitation.trajectory.motions(point[None], times).motion.select(np.intp(0))
     scene = prepared.present.scene(motion, times)
-    gram = prepared.together(prepared.moments(scene).gram)
+    gram = prepared.total_gram(prepared.moments(scene).gram)
     keep = prepared.sampling.filter(len(times))
     columns = kept_columns(prepared.layout.base, prepared.layout.candidates, scene, keep, smooth=True)
     return _MotionDifference(title, times[keep.rows], torque_difference(question, pair.places, gram, columns))

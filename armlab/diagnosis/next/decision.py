@@ -132,7 +132,7 @@ def chances_if_right(
     prepared: PreparedQuestions, question: Question, right: int, new: Array, rows: float, rng: np.random.Generator
 ) -> Chances:
     """The same chances if one rival is right, with shapes and sizes that fit the first recording."""
-    gram = prepared.together(new)
+    gram = prepared.total_gram(new)
     values = _draw_coefficients(prepared, question, right, rng)
     noise = _matrix_root(new) @ rng.normal(size=values.shape)
     vectors = prepared.before.vector[:, None] + new @ values + noise

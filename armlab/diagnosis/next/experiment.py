@@ -163,9 +163,9 @@ def _compare_pairs(
     drawn = np.array([random_point(excitation, _budget_with_seed(budget, number)) for number in range(RANDOM_MOTIONS)])
     motions = excitation.trajectory.motions(drawn, times).motion
     scenes = [prepared.present.scene(motions.select(np.intp(number)), times) for number in range(RANDOM_MOTIONS)]
-    random_grams = [prepared.together(prepared.moments(scene).gram) for scene in scenes]
+    random_grams = [prepared.total_gram(prepared.moments(scene).gram) for scene in scenes]
     before = prepared.before.gram + prepared.layout.prior
-    after = before if problem is None or point is None else prepared.together(problem.moments(point).gram)
+    after = before if problem is None or point is None else prepared.total_gram(problem.moments(point).gram)
     out = []
     for number, question in enumerate(prepared.questions):
         for pair in sorted([*question.pairs, *question.hopeless]):

@@ -81,7 +81,7 @@ class PreparedQuestions:
         """Rows of both recordings from which a diagnosis learns, all joints; samples: of a designed motion."""
         return self.rows + self.learned_share * (samples // SAMPLES_PER_ROW) * len(self.present.arm)
 
-    def together(self, gram: Array) -> Array:
+    def total_gram(self, gram: Array) -> Array:
         """Gram matrix of the first recording and a new run (columns, columns), with the prior of the links."""
         return np.asarray(gram + self.before.gram + self.layout.prior)
 
@@ -123,7 +123,7 @@ def prepare_questions(
     candidates += [each for shapes in laws.values() for each in shapes]
     base = base_parameters(arm)
     layout = build_layout(base, candidates, scenes[0], _link_precision(arm, base, present.inertial, links))
-    return _Preparation(present, parts, laws, layout, links, first, rich, sampling).prepared(groups, offered)
+    return _Preparation(present, parts, laws, layout, links, first, rich, sampling).prepare(groups, offered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,7 @@ class _Preparation:
     rich: list[Scene]
     white: Sampling
 
-    def prepared(self, groups: tuple[RivalGroup, ...], offered: OfferedLaws) -> PreparedQuestions:
+    def prepare(self, groups: tuple[RivalGroup, ...], offered: OfferedLaws) -> PreparedQuestions:
         """Chooses laws and sizes, and keeps the columns that are needed."""
         sampling, whole, before = self._recorded_moments(groups)
         shown = self._rich_gram(sampling)
@@ -160,7 +160,7 @@ class _Preparation:
             return self.white, empty_moments(self.layout.size), empty_moments(self.layout.size)
         columns = self.first.columns(self.layout)
         found = [self.parts[group[0]][0] for group in groups if group[0] in self.parts]
-        fitted = np.unique(np.concatenate([self._free_columns(()), *(self.layout.of(each) for each in found)]))
+        fitted = np.unique(np.concatenate([self._free_columns(()), *(self.layout.indices_of(each) for each in found)]))
         sampling = self.first.sampling(columns, fitted.astype(np.intp))
         sampling = replace(sampling, standing=self._standing_speeds(sampling, groups))
         before = self.first.moments(columns, sampling.noise, "identify")
@@ -168,7 +168,7 @@ class _Preparation:
         asked = {group[0] for group in groups if group[0].facts.in_links}
         for name in sorted(asked & self.parts.keys(), key=str):
             part = self.parts[name]  # the links of the model hold its torque, so the residual does not
-            whole, before = self._give_back(whole, part), self._give_back(before, part)
+            whole, before = self._with_torque_of(whole, part), self._with_torque_of(before, part)
         return sampling, whole, before
 
     def _standing_speeds(self, sampling: Sampling, groups: tuple[RivalGroup, ...]) -> tuple[float, ...]:
@@ -177,21 +177,23 @@ class _Preparation:
         sticking = {name.joint for name in named if name.facts.sticks}
         return tuple(each if joint + 1 in sticking else 0.0 for joint, each in enumerate(sampling.standing))
 
-    def _give_back(self, moments: Moments, part: FoundEffect) -> Moments:
+    def _with_torque_of(self, moments: Moments, part: FoundEffect) -> Moments:
         """The moments with the torque of a part added to the residual."""
         candidate, values = part
-        return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.of(candidate)] @ values)
+        return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.indices_of(candidate)] @ values)
 
     def _free_columns(self, group: RivalGroup) -> Index:
         """Columns that may be fitted beside the rivals of a group: what was found, and usual friction of all joints."""
         usual = [each for each in usual_friction(self.present.arm, self.rich) if name_of(each) not in group]
-        return np.unique(np.concatenate([self._found_columns(group), *map(self.layout.of, usual)])).astype(np.intp)
+        return np.unique(np.concatenate([self._found_columns(group), *map(self.layout.indices_of, usual)])).astype(
+            np.intp
+        )
 
     def _found_columns(self, group: RivalGroup) -> Index:
         """Columns of the other findings, and of the links where they are not known exactly."""
         others = [part[0] for name, part in self.parts.items() if name not in group and not name.facts.in_links]
         rigid = np.arange(0 if self.links == "exact" else len(self.layout.base))
-        return np.unique(np.concatenate([rigid, *map(self.layout.of, others)])).astype(np.intp)
+        return np.unique(np.concatenate([rigid, *map(self.layout.indices_of, others)])).astype(np.intp)
 
     def _rival_choices(self, group: RivalGroup) -> list[RivalChoice]:
         out = []
@@ -200,7 +202,7 @@ class _Preparation:
             values = None if part is None else part[1]
             shapes = [*([] if part is None else [part[0]]), *self.laws[name]]
             unique = list(dict.fromkeys(shapes))
-            out.append(RivalChoice(name, tuple((each, self.layout.of(each)) for each in unique), values))
+            out.append(RivalChoice(name, tuple((each, self.layout.indices_of(each)) for each in unique), values))
         if all(each.values is None for each in out) and self.first is None:
             raise InputError(f"how large is {group[0]}? the verdict has found none of the rivals: give --recording")
         return out

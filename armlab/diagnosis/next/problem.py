@@ -66,7 +66,7 @@ class TellApartProblem(ExcitationProblem):
 
     def _strength(self, motion: Motion) -> float:
         moments = self.prepared.moments(self.prepared.present.scene(motion, self.times))
-        return decision_strength(self.prepared.questions, self.prepared.together(moments.gram), self.rows)
+        return decision_strength(self.prepared.questions, self.prepared.total_gram(moments.gram), self.rows)
 
 
 def tell_apart_problem(

@@ -157,14 +157,14 @@ class Layout:
         """Number of columns."""
         return len(self.prior)
 
-    def of(self, candidate: Candidate) -> Index:
-        """Places of a candidate's columns."""
+    def indices_of(self, candidate: Candidate) -> Index:
+        """Indices of the columns of a candidate."""
         return self.places[self.candidates.index(candidate)]
 
     def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> Moments:
         """Moments of a motion whose torque is not recorded yet: the vector is zero."""
         columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
-        rows = sampling.whitened(columns, scene.motion.velocity)
+        rows = sampling.whiten(columns, scene.motion.velocity)
         return Moments(rows.T @ rows, np.zeros(self.size))
 
 

@@ -74,7 +74,7 @@ def _remedy_by_tilt(
     present = prepared.present
     other = build_layout(base, list(layout.candidates), present.scene(motion, times), prior)
     free = [each for each, at in zip(layout.candidates, layout.places, strict=True) if at[0] in question.free]
-    index = np.concatenate([np.arange(len(base)), *(other.of(each) for each in free)]).astype(np.intp)
+    index = np.concatenate([np.arange(len(base)), *(other.indices_of(each) for each in free)]).astype(np.intp)
     keep, sampling = prepared.sampling.filter(len(times)), prepared.sampling
     tilted = PresentModel(arm, present.inertial, present.parts)
     grams = [other.moments(each.scene(motion, times), keep, sampling).gram for each in (present, tilted)]
@@ -88,7 +88,7 @@ def _tilt_base(arm: Arm) -> Arm:
 
 
 def _rival_in_layout(rival: Rival, layout: Layout) -> Rival:
-    return replace(rival, laws=tuple(replace(law, columns=layout.of(law.candidate)) for law in rival.laws))
+    return replace(rival, laws=tuple(replace(law, columns=layout.indices_of(law.candidate)) for law in rival.laws))
 
 
 def _pair_separation(rivals: tuple[Rival, ...], free: Index, gram: Array) -> float:

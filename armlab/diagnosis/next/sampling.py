@@ -61,7 +61,7 @@ class Sampling:
         """The filter of a designed motion."""
         return Butterworth(self.rate_hz, self.cutoff_hz, samples, SAMPLES_PER_ROW)
 
-    def whitened(self, columns: Array, velocity: Array) -> Array:
+    def whiten(self, columns: Array, velocity: Array) -> Array:
         """Whitened and weighted rows of kept columns (rows, joints, columns): (rows of all joints, columns).
 
         velocity: (samples, joints), of the whole motion.
