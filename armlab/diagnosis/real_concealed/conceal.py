@@ -180,10 +180,10 @@ def _model_links(model: TorqueModel) -> Array:
 
 
 def _part_indices(model: TorqueModel, piece: Piece) -> list[int]:
-    def lost(part: Candidate) -> bool:
+    def is_withheld(part: Candidate) -> bool:
         return part.effect in LAWS_BY_KIND[piece.kind] and piece.joint in (None, part.joint)
 
-    return [index for index, part in enumerate(model.structure.components) if lost(part)]
+    return [index for index, part in enumerate(model.structure.components) if is_withheld(part)]
 
 
 MAIN_PARAMETER = {

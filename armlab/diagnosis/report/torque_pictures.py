@@ -108,7 +108,7 @@ def _draw_mark(x: float, y: float, look: Look) -> str:
 
 
 def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
-    """One a joint: measured torque and the models' over the most telling stretch of held-out time."""
+    """One picture a joint: measured torque and that of each model, where the held-out error falls most."""
     segment, rows = clearest_stretch(data, STRETCH_SECONDS)
     time, torque = data.observed.time[rows], data.observed.torque
     run = data.observed.names[segment.run]
@@ -129,7 +129,7 @@ def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
 
 
 def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
-    """One a joint: what each model leaves over a whole held-out run, with the noise floor."""
+    """One picture a joint: the residual of each model over a whole held-out run, with the noise floor."""
     segment, _ = clearest_stretch(data, STRETCH_SECONDS)
     rows = slice(segment.start, segment.stop)
     time, run = data.observed.time[rows], data.observed.names[segment.run]
@@ -156,7 +156,7 @@ MOTION_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "acceler
 
 
 def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> str:
-    """Dots: measured torque that is left without the finding. Line: what the finding says of it."""
+    """Dots: residual torque of the model without the finding. Line: torque of the finding."""
     joint = claim.evidence.joint
     label, x = evidence_variable(diagnosis, data, claim)
     left, law = residual_without(diagnosis, claim, joint), claim.prediction[:, joint]
@@ -175,7 +175,7 @@ def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> s
 
 
 def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> tuple[str, Array]:
-    """Label and values (rows,) of what the finding depends on; its own torque where no single variable tells it."""
+    """Label and values (rows,) of the variable that the finding depends on; its own torque where there are several."""
     arm, observed = diagnosis.simulation.arm, data.observed
     joint = claim.evidence.joint
     moving = (claim.joints[1] if len(claim.joints) > 1 else claim.joint or 0) - 1

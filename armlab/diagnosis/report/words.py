@@ -45,12 +45,12 @@ def finding_in_words(claim: Claim | Rival) -> str:
 
 
 def shorten_name(name: str) -> str:
-    """A file's name where there is little room."""
+    """The name of a file, cut to MAX_NAME_LENGTH letters."""
     return name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}…"
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """The digits that count, no needless exponent."""
+    """A number with `digits` significant digits, and with an exponent only where it is very large or small."""
     if not math.isfinite(value):
         return "none" if math.isnan(value) else ("∞" if value > 0 else "−∞")
     size = abs(value)
@@ -104,7 +104,7 @@ def _format_interval(low: float, high: float) -> str:
 
 
 def format_probability(value: float) -> str:
-    """A p-value that does not pretend to more than it knows."""
+    """A p-value with three digits; a smaller one than 1e-12 only as this bound."""
     return "below 1e−12" if value < 1e-12 else format_number(value)
 
 
@@ -145,7 +145,7 @@ def _finding_with_rivals(claim: Claim) -> str:
 
 
 def gain_sentence(diagnosis: Diagnosis) -> str:
-    """How far the held-out error falls, at the joint that gains most, and how much of the gap that is."""
+    """How far the held-out error falls at the joint that gains most, and its share of the gap to the noise."""
     data = select_residuals(diagnosis)
     refit = np.array([each.before for each in diagnosis.fit])
     start = refit if data is None or data.given is None else data.held_out_rms(data.given)
