@@ -13,11 +13,66 @@ from collections import defaultdict
 from pathlib import Path
 
 ROOTS = ("problem", "algorithms", "bench", "armlab", "recordings", "identification", "diagnosis", "concealed")
-IRREGULAR = set(
-    "begun bent bound broken built bought cast caught chosen cut dealt drawn driven fed felt fitted found given gone "
-    "grown held hidden kept known laid led left lent let lost made meant met paid put read risen run said seen sent set "
-    "shown shut spent split spoken stood sunk taken taught thrown told understood withdrawn won worn written".split()
-)
+IRREGULAR = {
+    "begun",
+    "bent",
+    "bound",
+    "broken",
+    "built",
+    "bought",
+    "cast",
+    "caught",
+    "chosen",
+    "cut",
+    "dealt",
+    "drawn",
+    "driven",
+    "fed",
+    "felt",
+    "fitted",
+    "found",
+    "given",
+    "gone",
+    "grown",
+    "held",
+    "hidden",
+    "kept",
+    "known",
+    "laid",
+    "led",
+    "left",
+    "lent",
+    "let",
+    "lost",
+    "made",
+    "meant",
+    "met",
+    "paid",
+    "put",
+    "read",
+    "risen",
+    "run",
+    "said",
+    "seen",
+    "sent",
+    "set",
+    "shown",
+    "shut",
+    "spent",
+    "split",
+    "spoken",
+    "stood",
+    "sunk",
+    "taken",
+    "taught",
+    "thrown",
+    "told",
+    "understood",
+    "withdrawn",
+    "won",
+    "worn",
+    "written",
+}
 NOT_PARTICIPLES = {"cut", "put", "read", "run", "set", "split", "let", "left", "bound", "seed", "speed", "need", "feed"}
 LIBRARIES = ("armlab/effects/", "diagnosis/effects/", "recordings/vocabulary", "armlab/concealed/", "concealed/")
 
@@ -80,7 +135,7 @@ def files_naming_an_effect(sources: dict[Path, str]) -> list[Path]:
 def effect_ids(sources: dict[Path, str]) -> list[str]:
     """Ids of two words and more: those of one word are words of other things, too."""
     text = "\n".join(text for path, text in sources.items() if str(path).startswith(LIBRARIES))
-    return sorted({name for name in re.findall(r"Effect\(\s*\"(\w+_\w+)\"", text)})
+    return sorted(set(re.findall(r"Effect\(\s*\"(\w+_\w+)\"", text)))
 
 
 def modules_of_a_diagnosis(tree: Path) -> int:

@@ -29,9 +29,12 @@ def write_next_experiment(
     rate_hz: float,
     out: Path,
 ) -> Iterator[str]:
-    """Designs and writes the next experiment, and tells its card in lines; InputError for what cannot be used."""
-    known: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
-    experiment = design_experiment(verdict, robot, recording, rivals, budget, known)
+    """Designs and writes the next experiment, and yields the lines of its card.
+
+    Raises InputError for a file or an option that cannot be used.
+    """
+    known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
+    experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links)
     yield from card_lines(experiment)
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -43,7 +46,10 @@ def write_next_experiment(
 
 
 def _write_motion(experiment: Experiment, rate_hz: float, out: Path) -> Iterator[str]:
-    """The files of the motion, where one helps; a form that the arm does not have is told and left out."""
+    """Writes the files of the motion, if there is one, and yields a line for each.
+
+    A format that cannot hold the motion of this arm is left out, and its line says why.
+    """
     if experiment.problem is None or experiment.point is None:
         return
     trajectory = sample_trajectory(experiment.excitation, experiment.point, rate_hz, "next")

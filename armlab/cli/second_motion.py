@@ -17,13 +17,13 @@ SECOND_EVALUATIONS = 1000
 
 def plan_second_motion(kind: str, verdict: Path, robot: Path, recording: Path, seed: int) -> SecondMotion | None:
     """A second motion of a kind, and what is expected of it."""
-    known: MotionKind = next(each for each in get_args(MotionKind) if each == kind)
+    motion_kind: MotionKind = next(each for each in get_args(MotionKind) if each == kind)
     budget = Budget(SECOND_DURATION_S, SECOND_HARMONICS, evaluations=SECOND_EVALUATIONS, seed=seed % 2**31)
-    found = design_second_motion(known, verdict, robot, recording, budget)
-    if found is None:
+    second = design_second_motion(motion_kind, verdict, robot, recording, budget)
+    if second is None:
         return None
     forecasts = tuple(
         Forecast(frozenset((name.effect, name.joint) for name in names), each.right, each.wrong, each.open)
-        for names, each in found.expected
+        for names, each in second.expected
     )
-    return SecondMotion(found.motion, forecasts)
+    return SecondMotion(second.motion, forecasts)

@@ -23,7 +23,9 @@ from armlab.diagnosis.report.words import (
     verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
+from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE
 from armlab.identification.real.study import RECIPES
@@ -34,7 +36,6 @@ from armlab.recordings.recording import Recording
 LOGGED_MODEL = "diagnosis"
 RECORDING_NAMES = ("emps", "staubli-tx40", "unisa-ur10", "kuka-kr300")
 DIAGNOSED_BY_RUN = ("kuka-kr300",)  # each of their runs is diagnosed alone too: one payload, so one answer
-LINK_EFFECTS = ("payload", "inertial_parameter_error")
 
 
 @dataclass(frozen=True)
@@ -67,11 +68,11 @@ def study_recording(name: str, recordings: Path, looks: Looks, progress: Callabl
     recording = load_recording(place if place.is_dir() else fetch_recording(name, place))
     for run in recording.with_role("validate"):
         looks.note(recording.arm.name, run.name, LOGGED_MODEL)
-    found = diagnose(recording, progress=progress)
+    diagnosis = diagnose(recording, progress=progress)
     alone = tuple(
         _diagnose_run(recording, index, progress) for index in range(len(recording.runs)) if name in DIAGNOSED_BY_RUN
     )
-    return RealStudy(name, found, run_gains(name, found), alone)
+    return RealStudy(name, diagnosis, run_gains(name, diagnosis), alone)
 
 
 def _diagnose_run(recording: Recording, index: int, progress: Callable[[str], None]) -> tuple[str, Diagnosis]:
@@ -79,19 +80,20 @@ def _diagnose_run(recording: Recording, index: int, progress: Callable[[str], No
     return run.name, diagnose(replace(recording, runs=(replace(run, role="identify"),)), progress=progress)
 
 
-def run_gains(name: str, found: Diagnosis) -> tuple[RunGain, ...]:
-    """Of every run that validates; of the held-out blocks where none does."""
-    if found.observed is None or found.final is None or found.refit is None or found.nominal is None:
+def run_gains(name: str, diagnosis: Diagnosis) -> tuple[RunGain, ...]:
+    """Errors of each run that validates, on its held-out blocks where no run does."""
+    if diagnosis.observed is None or diagnosis.final is None or diagnosis.refit is None or diagnosis.nominal is None:
         return ()
     known = next((each.best_known for each in RECIPES if each.name == name), {})
-    torque, out = found.observed.torque, []
-    for index, run in enumerate(found.observed.names):
-        segments = [each for each in found.observed.of_role("validate") if each.run == index]
+    torque, out = diagnosis.observed.torque, []
+    for index, run in enumerate(diagnosis.observed.names):
+        segments = [each for each in diagnosis.observed.of_role("validate") if each.run == index]
         if not segments:
             continue
         rows = np.concatenate([np.arange(each.start, each.stop) for each in segments])
-        given = None if found.simulation.kind == "refit" else _relative_error(found.nominal[rows], torque[rows])
-        refitted, final = (_relative_error(each[rows], torque[rows]) for each in (found.refit, found.final))
+        given = None if diagnosis.simulation.kind == "refit" else _relative_error(diagnosis.nominal[rows], torque[rows])
+        refitted = _relative_error(diagnosis.refit[rows], torque[rows])
+        final = _relative_error(diagnosis.final[rows], torque[rows])
         out.append(RunGain(run, given, refitted, final, known.get(run)))
     return tuple(out)
 
@@ -100,12 +102,12 @@ def _relative_error(residual: Array, torque: Array) -> float:
     return float(100 * np.linalg.norm(residual) / np.linalg.norm(torque))
 
 
-def mass_claims(found: Diagnosis) -> tuple[Claim, ...]:
-    """Claims that give a link more or less mass."""
-    return tuple(each for each in found.claims if each.effect in LINK_EFFECTS)
+def mass_claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
+    """Claims about the inertial parameters of a link."""
+    return tuple(each for each in diagnosis.claims if effect_named(each.effect).where == "link")
 
 
-SPRING_EFFECTS = ("gravity_compensator", "cable_stiffness")
+COUNTERBALANCE_EFFECTS = (GRAVITY_COMPENSATOR.effect, CABLE_STIFFNESS.effect)  # names for the counterbalance of the arm
 MIN_AGREEMENT_P_VALUE = 0.01
 INTRODUCTION = """\
 # Real arms, diagnosed with only the rigid body given
@@ -124,19 +126,19 @@ def studies_markdown(studies: Sequence[RealStudy]) -> str:
     return INTRODUCTION + "".join(f"\n{line}" for each in studies for line in _study_lines(each)) + "\n"
 
 
-def _study_lines(found: RealStudy) -> Iterator[str]:
-    diagnosis = found.diagnosis
+def _study_lines(study: RealStudy) -> Iterator[str]:
+    diagnosis = study.diagnosis
     first, second = verdict_sentences(diagnosis)
-    yield f"## {found.name}\n"
+    yield f"## {study.name}\n"
     yield f"{first} {second}\n"
-    yield from gain_table(found.gains)
+    yield from gain_table(study.gains)
     if diagnosis.claims:
         yield from _claims_table(diagnosis)
     for each in diagnosis.unexplained:
         depends = ", ".join(each.depends_on)
         yield f"Unexplained at joint {each.joint}: {100 * each.share:.0f} % of the held-out variance, by {depends}.\n"
-    if found.alone:
-        yield from _run_lines(found)
+    if study.alone:
+        yield from _run_lines(study)
 
 
 def gain_table(gains: Sequence[RunGain]) -> Iterator[str]:
@@ -179,20 +181,21 @@ def _claims_table(diagnosis: Diagnosis) -> Iterator[str]:
     yield ""
 
 
-def _run_lines(found: RealStudy) -> Iterator[str]:
-    """What each run by itself says of the links: the same load should come out of each."""
+def _run_lines(study: RealStudy) -> Iterator[str]:
+    """Lines on the diagnosis of each run alone, which should all find the same load."""
     yield "Each run by itself (blocks of time held out), what it says of the links:\n"
     masses: list[ParameterValue] = []
-    for run, diagnosis in found.alone:
-        told_masses, own = [], list[ParameterValue]()
+    for run, diagnosis in study.alone:
+        mass_texts, run_masses = [], list[ParameterValue]()
         for claim in mass_claims(diagnosis):
             for parameter in (each for each in claim.parameters if each.name == "mass"):
-                own.append(parameter)
+                run_masses.append(parameter)
                 (row,) = parameter_rows(parameter)
-                told_masses.append(f"{finding_in_words(claim)}, mass {row.value} kg ({row.interval})")
-        masses += sorted((each for each in own if each.interval), key=_interval_width)[:1]  # one a run: its surest
-        springs = [finding_in_words(each) for each in diagnosis.claims if each.effect in SPRING_EFFECTS]
-        yield f"- {run}: {'; '.join([*told_masses, *springs]) or 'nothing'}"
+                mass_texts.append(f"{finding_in_words(claim)}, mass {row.value} kg ({row.interval})")
+        by_width = sorted((each for each in run_masses if each.interval), key=_interval_width)
+        masses += by_width[:1]  # one a run, of the smallest interval
+        springs = [finding_in_words(each) for each in diagnosis.claims if each.effect in COUNTERBALANCE_EFFECTS]
+        yield f"- {run}: {'; '.join([*mass_texts, *springs]) or 'nothing'}"
     yield f"\n{mass_agreement(masses)}\n"
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.result import Diagnosis
-from armlab.effects.drive import RotorInertia
 from armlab.identification.torque_model import joint_fields
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -89,7 +88,6 @@ def runge_kutta(body: Body, position: Array, velocity: Array, torque: Array, ste
 
 WINDOW_SECONDS = 0.5
 MAX_WINDOWS = 24  # windows
-PROBE_STATES = 200  # random states at which the inertial part of a claim is read
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +161,8 @@ def _new_body(diagnosis: Diagnosis) -> Body:
     assert diagnosis.inertial is not None
     rotors = _given_rotors(diagnosis)
     for claim in diagnosis.claims:
-        if isinstance(claim.candidate, RotorInertia) and claim.coefficients is not None:
-            rotors[claim.candidate.rows[0]] += float(claim.coefficients[0])
+        if claim.candidate is not None and claim.coefficients is not None:
+            rotors[claim.candidate.rows[0]] += claim.candidate.joint_fields(claim.coefficients).get("armature", 0.0)
     return Body(diagnosis.simulation.arm, diagnosis.inertial, rotors)
 
 

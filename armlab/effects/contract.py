@@ -58,7 +58,9 @@ class Effect:
     prior_scale: standard deviation of its coefficients (SI units) that a fit draws them to zero with; infinite
     where nothing is known. single_event: it happens once, in one stretch of one run, so that no other data repeat it.
     scanned: its places are found by a look at the residual, not by columns alone.
-    axis: the variable against which a figure shows it; `cycle` is the position within one wave.
+    in_links: the links of a model hold it, so that it is no term beside them.
+    axis: the variable against which a figure shows it; `cycle` is the position within one wave, of which a parameter
+    `order` says how many there are in a turn.
     experiment: the next experiment that separates it from its rivals.
     """
 
@@ -77,6 +79,7 @@ class Effect:
     prior_scale: float = float("inf")
     single_event: bool = False
     scanned: bool = False
+    in_links: bool = False
     axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
     experiment: str = ""
 

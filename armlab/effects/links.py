@@ -30,6 +30,7 @@ INERTIAL_ERROR_FACTS = Effect(
     "a link that is not as the simulation has it",
     BODY_PARAMETERS,
     where="link",
+    in_links=True,
     experiment="weigh the link, or repeat the motion with a payload of known mass",
 )
 

@@ -2,6 +2,7 @@
 
 import csv
 import json
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,11 @@ from click.testing import CliRunner, Result
 from next_questions import LATE, VISCOUS, robot_file, verdict_file
 
 from armlab.cli.main import main
+from armlab.diagnosis.next.question import Name
+from armlab.effects import library
+from armlab.effects.contract import COULOMB_LEVEL, Effect
+from armlab.effects.friction import CoulombFriction
+from armlab.effects.term import EveryJoint
 
 QUICK = ["--evaluations", "60", "--duration", "4", "--harmonics", "4", "--rate", "100"]
 ROTOR: dict[str, Any] = {"effect": "rotor_inertia", "joint": 1, "parameters": {"inertia": 0.05}}
@@ -104,6 +110,11 @@ def test_a_load_is_told_from_its_link_by_taking_it_off(tmp_path: Path) -> None:
     assert otherwise(tmp_path)["the motion with and without the load on link 3"] > 5
 
 
+def test_an_effect_of_a_link_is_at_a_link() -> None:
+    assert str(Name("payload", 3)) == "payload at link 3"
+    assert str(Name("coulomb_friction", 3)) == "Coulomb friction at joint 3"
+
+
 def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
     assert "no finding has rivals" in complaint(run(tmp_path, verdict_file(tmp_path, VISCOUS)))
 
@@ -111,6 +122,22 @@ def test_a_verdict_without_rivals_is_refused(tmp_path: Path) -> None:
 def test_rivals_can_be_named(tmp_path: Path) -> None:
     result = run(tmp_path, verdict_file(tmp_path, VISCOUS), "--rivals", "viscous_friction,nonlinear_viscous_friction")
     assert "viscous friction at joint 2 | nonlinear viscous friction at joint 2" in result.output
+
+
+class Seal(CoulombFriction):
+    """An effect of a user."""
+
+    facts = Effect("sticky_seal", "a seal that sticks", (COULOMB_LEVEL,), title="friction of a seal")
+
+
+SEAL = EveryJoint(Seal.facts, (Seal,))
+
+
+def test_an_effect_of_a_plug_in_can_be_a_rival(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    entries = [EntryPoint("seal", f"{__name__}:SEAL", "armlab.effects")]
+    monkeypatch.setattr(library, "entry_points", lambda group: entries)
+    result = run(tmp_path, verdict_file(tmp_path, VISCOUS), "--rivals", "viscous_friction,sticky_seal")
+    assert "viscous friction at joint 2 | friction of a seal at joint 2" in result.output
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from armlab.diagnosis.next.motion import Budget, build_excitation_problem, limit
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.problem import tell_apart_problem
 from armlab.diagnosis.next.question import Name
+from armlab.diagnosis.next.sampling import noise_levels
 from armlab.diagnosis.next.verdict_file import read_verdict
 from armlab.recordings.recording import Recording
 from problem.arm import Arm, Limits
@@ -46,7 +47,7 @@ def prepared(folder: Path, first: Recording | None) -> PreparedQuestions:
 def test_the_noise_is_that_of_the_recording(tmp_path: Path) -> None:
     found = prepared(tmp_path, recording(level))
     share = np.sqrt(found.sampling.cutoff_hz / 100)  # of white noise at 200 Hz that passes the low-pass
-    assert found.sampling.noise.level == pytest.approx(np.full(3, NOISE * share), rel=0.15)
+    assert noise_levels(found.sampling.noise) == pytest.approx(np.full(3, NOISE * share), rel=0.15)
 
 
 def test_a_rival_has_the_size_that_fits_the_recording(tmp_path: Path) -> None:
@@ -66,7 +67,7 @@ def test_what_is_known_already_adds_to_what_a_motion_shows(tmp_path: Path) -> No
     point = random_point(plain, BUDGET)
     before = question.separation(known.before.gram, 0, 1)
     new = problem.moments(point).gram
-    alone, both = question.separation(new, 0, 1), question.separation(known.together(new), 0, 1)
+    alone, both = question.separation(new, 0, 1), question.separation(known.total_gram(new), 0, 1)
     assert before > 1
     assert both**2 >= 0.999 * (before**2 + alone**2)  # common parameters can only help
 

@@ -43,12 +43,12 @@ def rows_of(problem: TellApartProblem, point: Array) -> Array:
     scene = prepared.present.scene(motion, problem.times)
     keep = prepared.sampling.filter(len(problem.times))
     columns = kept_columns(prepared.layout.base, prepared.layout.candidates, scene, keep, True)
-    return prepared.sampling.whitened(columns, scene.motion.velocity)
+    return prepared.sampling.whiten(columns, scene.motion.velocity)
 
 
 def separation(problem: TellApartProblem, point: Array) -> float:
     """Standard errors between the two rivals of a problem."""
-    gram = problem.prepared.together(problem.moments(point).gram)
+    gram = problem.prepared.total_gram(problem.moments(point).gram)
     return problem.prepared.questions[0].separation(gram, 0, 1)
 
 
@@ -157,7 +157,7 @@ def test_the_larger_of_two_nested_laws_is_measured_by_what_the_smaller_cannot_ex
     smaller = RivalSettings(effect="coulomb_friction", joint=2)
     problem = told_apart(STRIBECK, smaller)
     question, point = problem.prepared.questions[0], points(problem, 1)[0]
-    gram = problem.prepared.together(problem.moments(point).gram)
+    gram = problem.prepared.total_gram(problem.moments(point).gram)
     assert question.inseparable[1, 0]
     assert not question.inseparable[0, 1]
     assert question.separation(gram, 0, 1) == pytest.approx(np.sqrt(question.noncentrality(gram, 0, 1)))
@@ -220,12 +220,12 @@ def test_rows_in_which_a_joint_stands_still_tell_nothing() -> None:
     sampling = replace(white_noise_sampling(np.ones(2), 10.0), standing=(0.1, 0.1))
     velocity = np.ones((301, 2))  # 60 samples a second, every other one kept
     velocity[60, 1] = 0.0
-    rows = sampling.whitened(np.ones((151, 2, 1)), velocity)
+    rows = sampling.whiten(np.ones((151, 2, 1)), velocity)
     worth = (rows[151:, 0] / rows[0, 0]) ** 2
     assert np.count_nonzero(worth == 0) == 9  # a period and a half of 10 Hz to both sides
     assert worth[:26] == pytest.approx(0.5)  # fewer rows than a diagnosis asks for
     assert worth[35:] == pytest.approx(1.0)
-    free = replace(sampling, standing=(0.1, 0.0)).whitened(np.ones((151, 2, 1)), velocity)
+    free = replace(sampling, standing=(0.1, 0.0)).whiten(np.ones((151, 2, 1)), velocity)
     assert free == pytest.approx(free[0, 0])
 
 

@@ -133,16 +133,16 @@ def test_what_is_concealed_is_named_with_its_size_and_the_control_names_nothing(
     studied: tuple[ConcealedStudy, Path],
 ) -> None:
     found, _ = studied
-    assert found.control.said == ()
+    assert found.control.findings == ()
     friction, wear, spring = found.verdicts
     for verdict in found.verdicts:
         assert verdict.others == ()
         assert verdict.gap == pytest.approx(1, abs=0.1)
         assert verdict.outcome.recovered == pytest.approx(1, abs=0.05)
-    assert [each.answer for each in friction.judged + wear.judged] == ["named", "named"]
-    assert spring.judged[0].answer in ("named", "identical")
-    assert {each.effect for each in friction.judged[0].numbers} == {"coulomb_friction", "viscous_friction"}
-    assert all(each.holds for verdict in found.verdicts for one in verdict.judged for each in one.numbers)
+    assert [each.answer for each in friction.parts + wear.parts] == ["named", "named"]
+    assert spring.parts[0].answer in ("named", "identical")
+    assert {each.effect for each in friction.parts[0].numbers} == {"coulomb_friction", "viscous_friction"}
+    assert all(each.holds for verdict in found.verdicts for one in verdict.parts for each in one.numbers)
     assert (friction.joint_shown, wear.joint_shown, spring.joint_shown) == (2, 3, 1)
 
 
@@ -206,7 +206,7 @@ def test_friction_that_is_withheld_from_the_emps_is_named(tmp_path: Path, monkey
         "emps", tmp_path, open_outcomes(tmp_path), Looks(tmp_path / "looks.jsonl"), lambda message: None
     )
     (verdict,) = found.verdicts
-    assert [each.answer for each in verdict.judged] == ["named"]
+    assert [each.answer for each in verdict.parts] == ["named"]
     assert verdict.gap == pytest.approx(1, abs=0.1)
     recipe = next(each for each in RECIPES if each.name == "emps")
     assert identify_reference(found.reference.recording, recipe).model.inertial is not None

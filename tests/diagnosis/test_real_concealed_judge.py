@@ -35,7 +35,7 @@ def _verdict(
 
 
 def _answer(*said: ReportedFinding) -> Answer:
-    return _verdict(*said).judged[0].answer
+    return _verdict(*said).parts[0].answer
 
 
 def test_each_answer_has_its_word() -> None:
@@ -56,8 +56,8 @@ def test_findings_of_the_control_are_no_others_and_wrong_places_are_not_counted_
 
 def test_what_the_control_says_as_well_is_no_answer_and_is_taken_off_where_it_is_less() -> None:
     control = (_said("payload", 3, size=0.5),)
-    assert _verdict(_said("payload", 3, size=0.6), control=control).judged[0].answer == "missed"
-    (judged,) = _verdict(_said("payload", 3, size=2.4), control=control).judged
+    assert _verdict(_said("payload", 3, size=0.6), control=control).parts[0].answer == "missed"
+    (judged,) = _verdict(_said("payload", 3, size=2.4), control=control).parts
     (held,) = judged.numbers
     assert held.size.value == 2.4 - 0.5
     assert held.holds
@@ -67,7 +67,7 @@ def test_the_only_joint_cannot_tell_its_skew_from_a_delay_of_all() -> None:
     late = SoughtEffect("late", ("time_delay",), (), {"time_delay": {"seconds": (1.0, None)}}, ("channel_skew",))
     control = (_said("channel_skew", 1, size=-0.5, name="seconds"),)
     verdict = _verdict(_said("time_delay", size=0.4, name="seconds"), control=control, sought=late, joints=1)
-    (judged,) = verdict.judged
+    (judged,) = verdict.parts
     assert judged.answer == "named"
     assert judged.numbers[0].size.value == 0.9
     assert judged.numbers[0].holds
@@ -78,8 +78,8 @@ def test_numbers_are_not_judged_where_other_laws_were_found_than_were_withheld()
     friction = SoughtEffect("friction, joint 2", tuple(laws), (2,), laws)
     level = _said("coulomb_friction", 2, size=5.0, name="level")
     both = (level, _said("viscous_friction", 2, size=1.0, name="coefficient"))
-    assert [each.holds for each in _verdict(level, sought=friction).judged[0].numbers] == [None]
-    assert [each.holds for each in _verdict(*both, sought=friction).judged[0].numbers] == [False, True]
+    assert [each.holds for each in _verdict(level, sought=friction).parts[0].numbers] == [None]
+    assert [each.holds for each in _verdict(*both, sought=friction).parts[0].numbers] == [False, True]
 
 
 def test_the_gap_is_that_of_the_joint_where_it_shows_most() -> None:
@@ -92,16 +92,16 @@ def test_the_gap_is_that_of_the_joint_where_it_shows_most() -> None:
 def test_a_disturbance_that_cancels_what_the_control_names_is_counted_apart() -> None:
     late = SoughtEffect("late", ("time_delay",), (), {"time_delay": {"seconds": (2.0, None)}})
     control = (_said("time_delay", size=-1.7, name="seconds"),)
-    assert _verdict(control=control, sought=late).judged[0].answer == "cancelled"
+    assert _verdict(control=control, sought=late).parts[0].answer == "cancelled"
     more = SoughtEffect("late", ("time_delay",), (), {"time_delay": {"seconds": (5.0, None)}})
-    assert _verdict(control=control, sought=more).judged[0].answer == "missed"
+    assert _verdict(control=control, sought=more).parts[0].answer == "missed"
 
 
 def test_another_law_of_friction_is_an_answer_of_its_own_and_further_laws_are_no_others() -> None:
     friction = SoughtEffect("friction, joint 2", ("coulomb_friction",), (2,), {}, (), ("viscous_friction",))
-    assert _verdict(_said("viscous_friction", 2), sought=friction).judged[0].answer == "law"
+    assert _verdict(_said("viscous_friction", 2), sought=friction).parts[0].answer == "law"
     verdict = _verdict(_said("coulomb_friction", 2), _said("viscous_friction", 2), sought=friction)
-    assert verdict.judged[0].answer == "named"
+    assert verdict.parts[0].answer == "named"
     assert [each.effect for each in verdict.laws] == ["viscous_friction"]
     assert verdict.others == ()
     assert len(_verdict(_said("coulomb_friction", 2), _said("viscous_friction", 1), sought=friction).others) == 1

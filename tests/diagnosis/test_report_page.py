@@ -24,11 +24,14 @@ from armlab.diagnosis.report.charts import (
     REFITTED_LOOK,
     UNKNOWN_COLOR,
 )
-from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds
+from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
+from armlab.diagnosis.report.torque_pictures import evidence_variable
 from armlab.diagnosis.report.words import verdict_lines
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts
+from armlab.effects.contract import Effect
+from armlab.effects.friction import CoulombFriction
 from armlab.recordings.load import load_recording
 
 HOSTILE = "x<script>alert(1)<!script>\"&'<img src=y onerror=alert(2)>"
@@ -154,6 +157,25 @@ def test_every_finding_has_its_equation_numbers_and_evidence(found: Diagnosis, t
     for claim in found.claims:
         assert f"<code>{claim.equation}</code>" in page
     assert page.count("fitted law") >= len(found.claims)
+
+
+@pytest.mark.parametrize(
+    ("axis", "label"),
+    [
+        ("position", "position of joint 2, rad"),
+        ("velocity", "velocity of joint 2, rad/s"),
+        ("time", "time from the start of the run, s"),
+        ("", "torque that it predicts, N m"),
+    ],
+)
+def test_an_effect_of_a_user_is_drawn_against_its_own_axis(found: Diagnosis, axis: Any, label: str) -> None:
+    class Seal(CoulombFriction):
+        facts = Effect("sticky_seal", "a seal that sticks", axis=axis)
+
+    data = select_residuals(found)
+    assert data is not None
+    own = replace(found.claims[0], effect="sticky_seal", joint=2, joints=(2,), candidate=Seal(2, (2,), (1,)))
+    assert evidence_variable(found, data, own)[0] == label
 
 
 def test_the_page_repeats_the_command(texts: dict[str, str]) -> None:

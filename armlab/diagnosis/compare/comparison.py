@@ -59,17 +59,17 @@ def compare(
     _check_same_robot(old, new)
     new = replace(new, arm=old.arm, simulation=old.simulation)
 
-    def telling(which: str) -> Callable[[str], None]:
+    def progress_of(which: str) -> Callable[[str], None]:
         return lambda message: progress(f"{which}: {message}")
 
-    first = diagnose(old, baseline, seed, progress=telling("old recording"))
-    second = diagnose(new, baseline, seed, progress=telling("new recording"))
+    first = diagnose(old, baseline, seed, progress=progress_of("old recording"))
+    second = diagnose(new, baseline, seed, progress=progress_of("new recording"))
     for each in (first, second):
         if each.status == "inconclusive" or each.inertial is None:
             return Comparison("inconclusive", first, second, reason=f"{each.recording.name}: {each.summary}")
     signs_may_fall = Settings(guards=replace(Guards(), physics_signs=False))  # a change may be less friction
     simulated = with_simulation(new, first)
-    against = diagnose(simulated, "simulated", seed, signs_may_fall, telling("new recording, old model"))
+    against = diagnose(simulated, "simulated", seed, signs_may_fall, progress_of("new recording, old model"))
     if against.status == "inconclusive":
         return Comparison("inconclusive", first, second, reason=against.summary)
     status: ComparisonStatus = "changed" if against.status == "mismatch" else "same"

@@ -13,7 +13,7 @@ import numpy as np
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.structure import SIGNIFICANCE_LEVEL, Change
+from armlab.diagnosis.compare.structure import BASE_PARAMETER, SIGNIFICANCE_LEVEL, Change
 from armlab.diagnosis.formats import COMPARISON_SCHEMA, ChangeEntry, ComparisonFile
 from armlab.diagnosis.report import sections
 from armlab.diagnosis.report.charts import (
@@ -30,6 +30,7 @@ from armlab.diagnosis.report.html import figures, folded_details, html_document,
 from armlab.diagnosis.report.residuals import select_residuals
 from armlab.diagnosis.report.sections import findings_section
 from armlab.diagnosis.report.words import (
+    LINE_WIDTH,
     PARAMETER_DIGITS,
     effect_in_words,
     finding_in_words,
@@ -44,72 +45,72 @@ from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.verdict_files import check_output_folder, make_verdict
 from armlab.recordings.load import load_recording
 
-LINE_WIDTH = 110
 MAX_NAMED_CHANGES = 3
 
 
-def comparison_sentences(found: Comparison) -> tuple[str, str]:
+def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     """What changed by name, and which numbers."""
-    names = f"{found.old.recording.name} and {found.new.recording.name}"
-    if found.status == "inconclusive":
-        return f"{names} cannot be compared.", found.reason
-    changed = [each for each in found.changes if each.changed and each.effect != "base_parameter"]
+    names = f"{comparison.old.recording.name} and {comparison.new.recording.name}"
+    if comparison.status == "inconclusive":
+        return f"{names} cannot be compared.", comparison.reason
+    changed = [each for each in comparison.changes if each.changed and each.effect != BASE_PARAMETER]
     more = f", and {len(changed) - MAX_NAMED_CHANGES} more" if len(changed) > MAX_NAMED_CHANGES else ""
     numbers = join_words([change_phrase(each) for each in changed[:MAX_NAMED_CHANGES]]) + more if changed else ""
-    if found.status == "same":
+    if comparison.status == "same":
         small = f"Differences too small to matter for the torque: {numbers}." if numbers else ""
         return f"Nothing changed between {names} that the recordings show.", small
-    assert found.against is not None
-    claims = join_words([finding_in_words(each) for each in found.against.claims[:MAX_NAMED_CHANGES]])
+    assert comparison.against is not None
+    claims = join_words([finding_in_words(each) for each in comparison.against.claims[:MAX_NAMED_CHANGES]])
     in_numbers = f"In numbers: {numbers}. " if numbers else ""
-    return f"Between {names} this changed: {claims}.", in_numbers + gain_sentence(found.against)
+    return f"Between {names} this changed: {claims}.", in_numbers + gain_sentence(comparison.against)
 
 
 def change_phrase(change: Change) -> str:
     """A changed parameter with both values."""
     name = (
         change.parameter
-        if change.effect == "base_parameter"
+        if change.effect == BASE_PARAMETER
         else (
             f"{change.parameter} of {effect_in_words(change.effect)} at "
             f"{place_in_words(change.effect, change.joint, change.joints)}"
         )
     )
-    old, new = (format_number(value, PARAMETER_DIGITS) for value in (change.old, change.new))
+    old, new = format_number(change.old, PARAMETER_DIGITS), format_number(change.new, PARAMETER_DIGITS)
     return f"{name} from {old} to {new} {format_unit(change.unit)}".rstrip()
 
 
-def comparison_lines(found: Comparison) -> Iterator[str]:
+def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """The verdict, then each parameter that changed with its interval."""
-    first, second = comparison_sentences(found)
-    yield from wrap(f"{found.status.upper()}: {first} {second}", LINE_WIDTH)
-    if found.against is not None:
-        for claim in found.against.claims:
+    first, second = comparison_sentences(comparison)
+    yield from wrap(f"{comparison.status.upper()}: {first} {second}", LINE_WIDTH)
+    if comparison.against is not None:
+        for claim in comparison.against.claims:
             yield from wrap(
                 f"{finding_in_words(claim)}: {claim.equation}",
                 LINE_WIDTH,
                 initial_indent="  ",
                 subsequent_indent="    ",
             )
-    changed = [each for each in found.changes if each.changed]
+    changed = [each for each in comparison.changes if each.changed]
     for each in changed:
         low, high = (format_number(value, PARAMETER_DIGITS) for value in each.interval)
         yield f"  {change_phrase(each)}: difference {low} to {high} (95 %), p {format_probability(each.p_value)}"
-    if found.changes:
-        yield f"  {len(found.changes) - len(changed)} of {len(found.changes)} parameters show no change (1 %, Holm)"
+    if comparison.changes:
+        all_changes = len(comparison.changes)
+        yield f"  {all_changes - len(changed)} of {all_changes} parameters show no change (1 %, Holm)"
 
 
-def make_comparison_file(found: Comparison) -> ComparisonFile:
+def make_comparison_file(comparison: Comparison) -> ComparisonFile:
     """The content of `comparison.json`."""
     return ComparisonFile(
         schema=COMPARISON_SCHEMA,
-        status=found.status,
-        summary=" ".join(comparison_sentences(found)).strip(),
-        old=found.old.recording.name,
-        new=found.new.recording.name,
+        status=comparison.status,
+        summary=" ".join(comparison_sentences(comparison)).strip(),
+        old=comparison.old.recording.name,
+        new=comparison.new.recording.name,
         level=SIGNIFICANCE_LEVEL,
-        changes=tuple(_change_entry(each) for each in found.changes),
-        against=None if found.against is None else make_verdict(found.against),
+        changes=tuple(_change_entry(each) for each in comparison.changes),
+        against=None if comparison.against is None else make_verdict(comparison.against),
     )
 
 
@@ -133,45 +134,46 @@ PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 178.0
 MAX_DRAWN_CHANGES = 24
 
 
-def comparison_page(found: Comparison, command: str) -> str:
+def comparison_page(comparison: Comparison, command: str) -> str:
     """HTML text."""
-    first, second = comparison_sentences(found)
-    kind = {"changed": "mismatch", "same": "none", "inconclusive": "inconclusive"}[found.status]
-    title = f"What changed between {found.old.recording.name} and {found.new.recording.name}"
+    first, second = comparison_sentences(comparison)
+    kind = {"changed": "mismatch", "same": "none", "inconclusive": "inconclusive"}[comparison.status]
+    title = f"What changed between {comparison.old.recording.name} and {comparison.new.recording.name}"
     parts = [sections.page_header(title, kind, first, second)]
-    if found.changes:
-        parts.append(_numbers_section(found))
-    if found.against is not None:
-        data = select_residuals(found.against)
+    if comparison.changes:
+        parts.append(_numbers_section(comparison))
+    if comparison.against is not None:
+        data = select_residuals(comparison.against)
         if data is not None:
-            drawn = draw_gallery(found.against, data)
+            drawn = draw_gallery(comparison.against, data)
             text = (
-                f"Below, {found.new.recording.name} is diagnosed with the model of {found.old.recording.name} as its "
-                "simulation: “as given” is what the old model predicts. Signs are free: friction may have fallen."
+                f"Below, {comparison.new.recording.name} is diagnosed with the model of "
+                f"{comparison.old.recording.name} as its simulation: “as given” is what the old model "
+                "predicts. Signs are free: friction may have fallen."
             )
             parts += [
                 section("against", "The new recording against the old model", paragraph(text)),
-                sections.before_after_section(found.against, drawn),
-                findings_section(found.against, drawn),
-                sections.location_section(found.against, drawn),
+                sections.before_after_section(comparison.against, drawn),
+                findings_section(comparison.against, drawn),
+                sections.location_section(comparison.against, drawn),
             ]
-    parts.append(sections.origin_section(found.new, command))
+    parts.append(sections.origin_section(comparison.new, command))
     return html_document(title, parts)
 
 
-def _numbers_section(found: Comparison) -> str:
+def _numbers_section(comparison: Comparison) -> str:
     text = (
         "Both recordings are fitted in one structure: the base parameters and every effect that was found in either, "
         "nonlinear parameters held. Intervals are robust against errors that are tied within a second; p-values are "
         "corrected over all parameters (Holm)."
     )
-    changed = [each for each in found.changes if each.changed]
-    rest = [each for each in found.changes if not each.changed]
+    changed = [each for each in comparison.changes if each.changed]
+    rest = [each for each in comparison.changes if not each.changed]
     first = _changes_table(changed) if changed else ""
     return section(
         "numbers",
         "In numbers",
-        figures([draw_changes(found.changes)]),
+        figures([draw_changes(comparison.changes)]),
         first,
         paragraph(text, "pale"),
         folded_details(f"{len(rest)} parameters that show no change", _changes_table(rest)),
@@ -183,13 +185,13 @@ def _changes_table(changes: list[Change]) -> str:
 
 
 def _change_name(change: Change) -> str:
-    if change.effect == "base_parameter":
+    if change.effect == BASE_PARAMETER:
         return change.parameter
     return f"{change.parameter}, {effect_in_words(change.effect)}"
 
 
 def _change_row(change: Change) -> list[str]:
-    where = "links" if change.effect == "base_parameter" else place_in_words(change.effect, change.joint, change.joints)
+    where = "links" if change.effect == BASE_PARAMETER else place_in_words(change.effect, change.joint, change.joints)
     low, high = (format_number(value, PARAMETER_DIGITS) for value in change.interval)
     values = (format_number(change.old, PARAMETER_DIGITS), format_number(change.new, PARAMETER_DIGITS))
     return [
@@ -216,8 +218,8 @@ def draw_changes(changes: tuple[Change, ...]) -> str:
         x = _score_position(value, largest)
         out += svg_element("line", x1=x, x2=x, y1=44, y2=height - 28, stroke="#c4cad1" if value == 0 else "#e6e9ed")
         out += svg_text(text.replace("-", "−"), x, height - 12, 10.5, "middle", fill=PALE_COLOR)
-    for number_, each in enumerate(chosen):
-        y = 58 + ROW_HEIGHT * number_
+    for number, each in enumerate(chosen):
+        y = 58 + ROW_HEIGHT * number
         where = "" if each.joint is None else f", {each.joint}"
         out += svg_text(
             shorten_text(f"{_change_name(each)}{where}", NAMES_WIDTH - 12, 10.5), NAMES_WIDTH - 8, y + 4, 10.5, "end"
@@ -239,7 +241,7 @@ def _score(change: Change) -> float:
 
 def _score_position(score: float, largest: float) -> float:
     """Linear up to one half interval, then as the logarithm: differences reach from none to hundreds."""
-    own, most = (float(np.arcsinh(value)) for value in (score, largest))
+    own, most = float(np.arcsinh(score)), float(np.arcsinh(largest))
     return NAMES_WIDTH + (PICTURE_WIDTH - NAMES_WIDTH - 14) * (own + most) / (2 * most)
 
 
@@ -251,7 +253,7 @@ def compare_recordings(
     seed: int,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
-    """Compares, writes comparison.json and comparison.html into `out`, both or none, and tells the result in lines.
+    """Compares, writes comparison.json and comparison.html into `out`, both or none, and yields lines to print.
 
     Raises InputError, in one line, for recordings that cannot be used or are not of one robot.
     """
@@ -259,15 +261,15 @@ def compare_recordings(
     recordings = load_recording(old), load_recording(new)
     check_output_folder(out, recordings[1])
     try:
-        found = compare(*recordings, chosen, seed, progress)
+        comparison = compare(*recordings, chosen, seed, progress)
     except ValueError as error:
         raise InputError(f"{old} and {new}: {error}") from None
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     command = shlex.join(["armlab", "diagnose", "--compare", str(old), str(new), "--out", str(out), *options])
     texts = {
-        "comparison.json": make_comparison_file(found).to_json(),
-        "comparison.html": comparison_page(found, command),
+        "comparison.json": make_comparison_file(comparison).to_json(),
+        "comparison.html": comparison_page(comparison, command),
     }
     write_texts(texts, out)
-    yield from comparison_lines(found)
+    yield from comparison_lines(comparison)
     yield f"wrote {out}: {', '.join(texts)}"

@@ -41,7 +41,10 @@ class StructureFit:
 
 
 def unite_candidates(diagnoses: Sequence[Diagnosis]) -> tuple[Candidate, ...]:
-    """Candidates of all findings, one a place; the stronger evidence decides on shapes, and laws contain others."""
+    """Candidates of all findings, each effect once at a place, without laws that another candidate contains.
+
+    Where two findings name the same effect at a place, the one with the stronger evidence gives the shape.
+    """
     claims = [claim for each in diagnoses for claim in each.claims]
     chosen: list[Candidate] = []
     for claim in sorted(claims, key=lambda each: -each.evidence.score):
@@ -61,7 +64,7 @@ def _contains(one: Candidate, other: Candidate) -> bool:
 
 
 def scenes_of(diagnosis: Diagnosis) -> list[Scene]:
-    """The runs with the model found."""
+    """The runs as effects see them, each with the torque of the model found."""
     observed, arm = diagnosis.observed, diagnosis.simulation.arm
     assert observed is not None
     assert diagnosis.inertial is not None
@@ -75,7 +78,7 @@ def scenes_of(diagnosis: Diagnosis) -> list[Scene]:
 def select_separable(
     diagnosis: Diagnosis, candidates: Sequence[Candidate], base: BaseParameters
 ) -> tuple[Candidate, ...]:
-    """Those that the base parameters do not take in on these runs: what they do is in the base parameters."""
+    """The candidates whose torque the base parameters cannot imitate on these runs."""
     rigid, own, _ = _weighted_rows(diagnosis, candidates, base)
     lengths = np.linalg.norm(rigid, axis=0)
     basis = np.linalg.qr(rigid / np.where(lengths > 0, lengths, 1.0))[0]
@@ -147,6 +150,7 @@ def _filtered_base_columns(arm: Arm, base: BaseParameters, signals: Signals) -> 
 
 
 SIGNIFICANCE_LEVEL = 0.01
+BASE_PARAMETER = "base_parameter"  # in place of an effect: a parameter of the rigid body
 
 
 @dataclass(frozen=True)
@@ -192,13 +196,13 @@ def _effect_changes(candidates: tuple[Candidate, ...], old: StructureFit, new: S
     rows = []
     degrees = _degrees_of_freedom(old, new)
     for candidate, place in zip(candidates, old.places, strict=True):
-        before, after = (candidate.parameters(fit.values[place]) for fit in (old, new))
-        spreads = [_standard_errors(candidate, fit, place) for fit in (old, new)]
+        before, after = candidate.parameters(old.values[place]), candidate.parameters(new.values[place])
+        errors_before, errors_after = _standard_errors(candidate, old, place), _standard_errors(candidate, new, place)
+        where = candidate.effect, candidate.joint, candidate.joints
         for name, one in before.items():
             other = after[name]
             if isinstance(one, float) and isinstance(other, float):
-                error = float(np.hypot(spreads[0][name], spreads[1][name]))
-                where = candidate.effect, candidate.joint, candidate.joints
+                error = float(np.hypot(errors_before[name], errors_after[name]))
                 rows.append(_build_change(*where, name, one, other, error, candidate.unit(name), degrees))
     return rows
 
@@ -217,9 +221,9 @@ def _base_changes(old: Diagnosis, base: BaseParameters, first: StructureFit, sec
     out = []
     for index, name in enumerate(base.sums):
         error = float(np.sqrt(first.covariance[index, index] + second.covariance[index, index]))
-        before, after = (float(start[index] + fit.values[index]) for fit in (first, second))
+        before, after = float(start[index] + first.values[index]), float(start[index] + second.values[index])
         unit = PARAMETER_UNITS[base.columns[index] % 10]
-        out.append(_build_change("base_parameter", None, (), name, before, after, error, unit, degrees))
+        out.append(_build_change(BASE_PARAMETER, None, (), name, before, after, error, unit, degrees))
     return out
 
 

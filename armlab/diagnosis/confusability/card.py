@@ -111,9 +111,10 @@ VIEWS = ("nominal", "refit")
 
 @dataclass(frozen=True)
 class Rival:
-    """Another effect that can do all that one can. cosine: 1 where no amount of data tells them apart.
+    """Another effect that can imitate an entry. cosine: 1 where no amount of data separates the two.
 
-    separation: smallest size of the first, as rms torque in units of noise, at which the two differ by SURE errors.
+    separation: smallest size of the entry, as rms torque in units of noise, at which the two differ by
+    CERTAIN_STANDARD_ERRORS.
     """
 
     index: int
@@ -172,14 +173,14 @@ def confusability_card(
     scenes = tuple(_planned_scene(arm, each) for each in motions)
     filters = tuple(_diagnosis_filter(each, chosen) for each in motions)
     scatter = _default_noise(scenes) if noise is None else np.asarray(noise, dtype=float)
-    found = visible_candidates(arm, scenes, filters, families)
-    if not found:
+    candidates = visible_candidates(arm, scenes, filters, families)
+    if not candidates:
         raise ValueError("no effect has a column on this motion")
     free = {"nominal": None, "refit": base_rows(base_parameters(arm), scenes, filters)}
-    views = {name: compute_confusion(found, scenes, filters, free[name], scatter) for name in VIEWS}
+    views = {name: compute_confusion(candidates, scenes, filters, free[name], scatter) for name in VIEWS}
     seconds = sum(float(each.time[-1] - each.time[0]) for each in motions)
     rows = 2 * chosen.tuning.data.cutoff_hz * seconds
-    entries = tuple(_card_entry(index, views, rows) for index in range(len(found)))
+    entries = tuple(_card_entry(index, views, rows) for index in range(len(candidates)))
     cosines = {name: view.covered for name, view in views.items()}
     return Card(arm, ", ".join(each.name for each in motions), entries, cosines, scatter, rows)
 
@@ -240,7 +241,7 @@ def _confused_rival(view: Confusion, index: int, other: int, rows: float) -> Riv
 
 
 def size_to_show(share: float, rows: float) -> float:
-    """rms torque, in units of noise, at which a share of a signal's length makes SURE standard errors."""
+    """rms torque, in units of noise, at which this share of a signal is CERTAIN_STANDARD_ERRORS long."""
     return float(CERTAIN_STANDARD_ERRORS / (np.sqrt(rows) * share)) if share > 1e-6 else float("inf")
 
 

@@ -52,7 +52,7 @@ def explain_card(card: Card) -> str:
 
 
 def card_lines(card: Card) -> Iterator[str]:
-    """What a refit hides, and the classes of each view."""
+    """The meaning of the numbers, the effects that a refit hides, and those that cannot be separated, by view."""
     yield explain_card(card)
     hidden = [each for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE]
     if hidden:
@@ -108,7 +108,7 @@ def card_csv(card: Card) -> str:
 
 
 def card_content(card: Card) -> dict[str, Any]:
-    """Everything; a size that no amount of torque reaches is null."""
+    """The whole card as JSON; the size of an effect that no amount of torque shows is null."""
     return {
         "schema": CONFUSABILITY_SCHEMA,
         "robot": card.arm.name,
@@ -231,8 +231,8 @@ def _classes_table(card: Card, view: str) -> str:
     rows = []
     for each in card.entries:
         for place, rival in enumerate(each.rivals[view][:MAX_SHOWN_RIVALS]):
-            own = (each.label, f"{100 * each.absorbed[view]:.1f} %", _size_cell(each.shows_from[view]))
-            beside = (card.entries[rival.index].label, f"{rival.cosine:.3f}", _size_cell(rival.separation))
+            own = (each.label, f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
+            beside = (card.entries[rival.index].label, f"{rival.cosine:.3f}", _size_text(rival.separation))
             rows.append([*(own if place == 0 else ("", "", "")), *beside])
     listed = (
         html_table(PAGE_HEADINGS, rows, (0, 3)) if rows else paragraph("Every effect can be told from every other.")
@@ -240,14 +240,13 @@ def _classes_table(card: Card, view: str) -> str:
     return folded_details("What cannot be told apart", listed)
 
 
-def _size_cell(value: float) -> str:
-    return "never" if value == float("inf") else f"{value:.2g}"
-
-
 def write_card(
     robot: str, trajectory: str, joints: int | None, noise: tuple[float, ...], out: Path | None
 ) -> Iterator[str]:
-    """The card in lines, and as files where a folder is given; InputError, in one line, for what does not fit."""
+    """Yields the lines of the card, and writes it as files where a folder is given.
+
+    Raises InputError, in one line, for joints, a trajectory or a noise that do not fit the arm.
+    """
     arm = load_arm(robot)
     if joints is not None:
         if joints > len(arm):

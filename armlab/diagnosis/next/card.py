@@ -12,17 +12,17 @@ from matplotlib.figure import Figure
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.decision import Chances
-from armlab.diagnosis.next.experiment import CLEAR_SEPARATION, Experiment, RivalPair
+from armlab.diagnosis.next.experiment import Experiment, RivalPair
 from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
 from armlab.diagnosis.next.motion import random_point
-from armlab.diagnosis.next.question import Question
-from armlab.diagnosis.next.sampling import kept_columns
+from armlab.diagnosis.next.question import CLEAR_SEPARATION, Question
+from armlab.diagnosis.next.sampling import kept_columns, noise_levels
 
 CARD_SCHEMA = "next/1"
 
 
 def card_lines(experiment: Experiment) -> Iterator[str]:
-    """The card as a person reads it."""
+    """The card as lines for the terminal."""
     yield "standard errors between rivals           before   random motion   this motion"
     for pair in experiment.pairs:
         yield f"  {pair.names[0]} | {pair.names[1]}"
@@ -34,24 +34,24 @@ def card_lines(experiment: Experiment) -> Iterator[str]:
                 yield f"    {runs_needed(pair)} such runs would bring {CLEAR_SEPARATION:g} standard errors"
         for remedy in pair.remedies:
             yield f"    what else would: {remedy.what}: {remedy.separation:.1f} standard errors"
-    for number, found in enumerate(experiment.chances):
-        if found is not None:
-            yield _chances_line(found, experiment, number)
+    for number, chances in enumerate(experiment.chances):
+        if chances is not None:
+            yield _chances_line(chances, experiment, number)
     budget = experiment.budget
     yield f"designed in {experiment.seconds:.1f} s with {budget.evaluations} evaluations of {budget.algorithm}"
 
 
 def runs_needed(pair: RivalPair) -> int:
-    """How many runs of the designed motion bring enough, as information adds."""
+    """Number of runs of the designed motion that separate a pair clearly: the information of runs adds."""
     gain = pair.after**2 - pair.before**2
     return int(np.ceil((CLEAR_SEPARATION**2 - pair.before**2) / gain)) if gain > 0 else 0
 
 
-def _chances_line(found: Chances, experiment: Experiment, number: int) -> str:
+def _chances_line(chances: Chances, experiment: Experiment, number: int) -> str:
     names = " or ".join(str(rival.name) for rival in experiment.prepared.questions[number].rivals)
     return (
-        f"one such run decides between {names}: rightly {100 * found.right:.0f} %, wrongly {100 * found.wrong:.0f} %, "
-        f"still open {100 * found.open:.0f} % of simulated runs"
+        f"one such run decides between {names}: rightly {100 * chances.right:.0f} %, "
+        f"wrongly {100 * chances.wrong:.0f} %, still open {100 * chances.open:.0f} % of simulated runs"
     )
 
 
@@ -72,8 +72,11 @@ def card_content(experiment: Experiment) -> dict[str, Any]:
 
 
 def _question_content(experiment: Experiment, number: int) -> dict[str, Any]:
-    found = experiment.chances[number]
+    chances = experiment.chances[number]
     rivals = experiment.prepared.questions[number].rivals
+    decides = None
+    if chances is not None:
+        decides = {"rightly": chances.right, "wrongly": chances.wrong, "open": chances.open}
     return {
         "rivals": [
             {
@@ -84,7 +87,7 @@ def _question_content(experiment: Experiment, number: int) -> dict[str, Any]:
             for each in rivals
         ],
         "pairs": [_pair_content(each) for each in experiment.pairs if each.question == number],
-        "decides": None if found is None else {"rightly": found.right, "wrongly": found.wrong, "open": found.open},
+        "decides": decides,
     }
 
 
@@ -108,18 +111,18 @@ def _limits_content(limits: Any) -> dict[str, Any]:
 
 
 def torque_difference(question: Question, pair: tuple[int, int], gram: Array, columns: Array) -> Array:
-    """Torque (rows, joints), N m, in the direction that is harder to tell.
+    """Torque (rows, joints), N m, of the rival that is harder to refute, less the best fit of the other one.
 
-    gram: of everything that is fitted. columns: (rows, joints, columns), of the motion that is looked at.
+    gram: of everything that is fitted. columns: (rows, joints, columns), of the motion that is drawn.
     """
-    ways = [way for way in (pair, pair[::-1]) if not question.inseparable[way]] or [pair]
-    one, other = min(ways, key=lambda way: question.noncentrality(gram, *way))
+    directions = [each for each in (pair, pair[::-1]) if not question.inseparable[each]] or [pair]
+    one, other = min(directions, key=lambda each: question.noncentrality(gram, *each))
     right = question.rivals[one]
-    own = right.laws[0].columns
+    right_columns = right.laws[0].columns
     fits = [np.append(question.free, law.columns) for law in question.rivals[other].laws]
-    chosen = min(fits, key=lambda each: unexplained_power(gram, own, right.values, each))
-    best = solve_least_squares(gram, chosen, gram[:, own] @ right.values)
-    return np.asarray(columns[:, :, own] @ right.values - columns[:, :, chosen] @ best)
+    chosen = min(fits, key=lambda each: unexplained_power(gram, right_columns, right.values, each))
+    best = solve_least_squares(gram, chosen, gram[:, right_columns] @ right.values)
+    return np.asarray(columns[:, :, right_columns] @ right.values - columns[:, :, chosen] @ best)
 
 
 FIGURE_SIZE = (11.0, 6.6)  # inches
@@ -150,9 +153,11 @@ def draw_card(experiment: Experiment) -> bytes:
 
 
 def _headline(experiment: Experiment, pair: RivalPair) -> str:
-    found = experiment.chances[pair.question]
-    told = "" if found is None else f"\none run of this motion decides rightly with probability {found.right:.2f}"
-    return f"{pair.names[0]} or {pair.names[1]}?{told}"
+    chances = experiment.chances[pair.question]
+    question = f"{pair.names[0]} or {pair.names[1]}?"
+    if chances is None:
+        return question
+    return f"{question}\none run of this motion decides rightly with probability {chances.right:.2f}"
 
 
 def _fill_panels(axes: list[Axes], experiment: Experiment, pair: RivalPair) -> None:
@@ -160,12 +165,16 @@ def _fill_panels(axes: list[Axes], experiment: Experiment, pair: RivalPair) -> N
     joint = int(np.argmax(np.sum(designed.torque**2, axis=0)))
     drive = "force" if experiment.excitation.arm.joints[joint].kind == "prismatic" else "torque"
     unit = "N" if drive == "force" else "N m"
-    level = float(experiment.prepared.sampling.noise.level[joint])
+    level = float(noise_levels(experiment.prepared.sampling.noise)[joint])
     top = max(1.3 * level, *(1.1 * float(np.abs(each.torque[:, joint]).max()) for each in (designed, other)))
-    for axis, seen, color in zip(axes, (other, designed), (BEFORE_COLOR, AFTER_COLOR), strict=False):
+    for axis, difference, color in zip(axes, (other, designed), (BEFORE_COLOR, AFTER_COLOR), strict=False):
         axis.axhspan(-level, level, color=NOISE_COLOR, alpha=0.6, label="noise of a sample")
-        axis.plot(seen.time, seen.torque[:, joint], color=color, linewidth=1.1, label="difference of the rivals")
-        axis.set(title=seen.title, ylim=(-top, top), xlabel="time, s", ylabel=f"{drive} of joint {joint + 1}, {unit}")
+        axis.plot(
+            difference.time, difference.torque[:, joint], color=color, linewidth=1.1, label="difference of the rivals"
+        )
+        axis.set(
+            title=difference.title, ylim=(-top, top), xlabel="time, s", ylabel=f"{drive} of joint {joint + 1}, {unit}"
+        )
         axis.legend(loc="upper right", fontsize=8)
     _draw_separations(axes[2], pair)
     _draw_motion(axes[3], experiment)
@@ -195,9 +204,8 @@ def _draw_motion(axis: Axes, experiment: Experiment) -> None:
             color=JOINT_COLORS[number % len(JOINT_COLORS)],
             label=joint.name,
         )
-    units = {"prismatic": "m"}
-    told = dict.fromkeys(units.get(joint.kind, "rad") for joint in problem.arm.joints)
-    axis.set(title="the motion to record", xlabel="time, s", ylabel=f"joint position, {' or '.join(told)}")
+    units = dict.fromkeys("m" if joint.kind == "prismatic" else "rad" for joint in problem.arm.joints)
+    axis.set(title="the motion to record", xlabel="time, s", ylabel=f"joint position, {' or '.join(units)}")
     axis.legend(loc="upper right", fontsize=8, ncols=3)
 
 
@@ -228,7 +236,7 @@ def _difference_on_motion(experiment: Experiment, pair: RivalPair, point: Array,
     times = prepared.sampling.times(experiment.budget.duration)
     motion = experiment.excitation.trajectory.motions(point[None], times).motion.select(np.intp(0))
     scene = prepared.present.scene(motion, times)
-    gram = prepared.together(prepared.moments(scene).gram)
+    gram = prepared.total_gram(prepared.moments(scene).gram)
     keep = prepared.sampling.filter(len(times))
     columns = kept_columns(prepared.layout.base, prepared.layout.candidates, scene, keep, smooth=True)
     return _MotionDifference(title, times[keep.rows], torque_difference(question, pair.places, gram, columns))

@@ -18,19 +18,20 @@ MIN_SEPARATION = 1e-9  # standard errors
 
 
 def decision_strength(questions: tuple[Question, ...], gram: Array, rows: float) -> float:
-    """How well a run decides all questions: the distance d of two rivals that are confused as often, exp(-d^2 / 8).
+    """How well a run decides all questions, in standard errors.
 
-    gram: of everything that is fitted to both recordings. rows: that count, of all joints.
+    It is the distance d of two rivals that are confused as often, exp(-d^2 / 8). gram: of all columns in both
+    recordings. rows: number of rows from which a diagnosis learns, of all joints.
     """
     doubts = [log_doubt(each, gram, rows) for each in questions if each.pairs]
     return float(np.sqrt(max(-8 * (logsumexp(doubts) - np.log(len(doubts))), 0.0)))
 
 
 def log_doubt(question: Question, gram: Array, rows: float) -> float:
-    """Logarithm of the mean chance that a wrong rival stays, over the right one, its shapes and its sizes.
+    """Logarithm of the chance that a wrong rival stays, averaged over which rival is right, its shapes and its sizes.
 
-    Where one is right, its log likelihood leads another's by a normal number of mean d^2 / 2 and standard deviation d,
-    d^2 the noncentrality. The other stays where the lead is below what the rule of the diagnosis needs.
+    The log likelihood of the right rival leads that of another one by a normal variable of mean d^2 / 2 and standard
+    deviation d, where d^2 is the noncentrality. The other one stays where the lead is below `required_lead`.
     """
     rests = [
         [unexplained_gram(gram, np.append(question.found, law.columns)) for law in rival.laws]
@@ -59,16 +60,20 @@ def _log_pair_doubt(right: Rival, other: Rival, rests: list[Array], extras: Inde
 
 
 def _noncentrality(own: Index, sizes: Array, left: Array, extras: Index, rows: float) -> Array:
-    """What the fitted columns leave of a law with some sizes (draws, columns), one usual term more at its price."""
+    """Power (draws,) of a law with sizes (draws, columns) that the fitted columns leave, in standard errors squared.
+
+    The best column of usual friction is fitted, too, where it gains more than its price.
+    """
     products = left[:, own] @ sizes.T
     squared = np.sum(products[own] * sizes.T, axis=0)
     return np.asarray(squared - 2 * usual_friction_gain(products, left, extras, rows))
 
 
 def usual_friction_gain(products: Array, left: Array, extras: Index, rows: float) -> Array:
-    """Log likelihood less price that the best term of usual friction adds, (draws,).
+    """Log likelihood that the best term of usual friction gains beyond its price, (draws,), at least zero.
 
-    products: (columns, draws), of the columns with what is not explained. left: (columns, columns), as `rest` tells.
+    products: (columns, draws), of the columns with the unexplained torque. left: (columns, columns), of
+    `unexplained_gram`.
     """
     if not len(extras):
         return np.zeros(products.shape[1])
@@ -78,20 +83,25 @@ def usual_friction_gain(products: Array, left: Array, extras: Index, rows: float
 
 
 def required_lead(right: Law, other: Law, rows: float) -> float:
-    """By how much the likelihood of the right law has to lead that of another, in its logarithm."""
-    deficit = Settings().tuning.claims.max_deficit
-    return max(deficit + right.price(rows) - other.price(rows), required_held_out_gain(right, other, rows))
+    """Lead in log likelihood at which a diagnosis names the right law and not the other one."""
+    return max(
+        Settings().tuning.claims.max_deficit + right.price(rows) - other.price(rows),
+        required_held_out_gain(right, other, rows),
+    )
 
 
 def required_held_out_gain(right: Law, other: Law, rows: float) -> float:
-    """What a special law of friction has to gain on usual friction: a share of the held-out error at its joint."""
+    """Gain in log likelihood that a law needs over a usual effect that it contains; -inf for other pairs.
+
+    It stands for the share of held-out error by which a diagnosis wants such a law to be better.
+    """
     if other.candidate.facts.usual and other.candidate.effect in right.candidate.facts.contains:
         return 0.5 * Settings().tuning.pruning.least_gain * rows * right.share
     return -np.inf
 
 
 def unexplained_gram(gram: Array, fitted: Index) -> Array:
-    """What fitted columns leave of the products of all columns."""
+    """Gram matrix (columns, columns) of what the fitted columns leave of all columns."""
     return np.asarray(gram - gram[:, fitted] @ solve_least_squares(gram, fitted, gram))
 
 
@@ -110,21 +120,21 @@ class Chances:
 def decision_chances(
     prepared: PreparedQuestions, question: Question, new: Array, rows: float, rng: np.random.Generator
 ) -> Chances:
-    """What becomes of a question after a run with moments `new` (columns, columns).
+    """Chances that a run with the Gram matrix `new` (columns, columns) decides a question.
 
-    Each rival is right as often as it fits the first recording beside the others. rows: of both recordings, all joints.
+    Each rival is right with the probability of its weight. rows: of both recordings, all joints.
     """
     weights = np.array([each.weight for each in question.rivals])
-    found = [chances_if_right(prepared, question, right, new, rows, rng) for right in range(len(weights))]
-    shares = np.array([[each.right, each.wrong, each.open] for each in found])
+    chances = [chances_if_right(prepared, question, right, new, rows, rng) for right in range(len(weights))]
+    shares = np.array([[each.right, each.wrong, each.open] for each in chances])
     return Chances(*(weights @ shares / weights.sum()).tolist())
 
 
 def chances_if_right(
     prepared: PreparedQuestions, question: Question, right: int, new: Array, rows: float, rng: np.random.Generator
 ) -> Chances:
-    """What becomes of it where one rival is the right one, with shapes and sizes that fit the first recording."""
-    gram = prepared.together(new)
+    """The same chances if one rival is right, with shapes and sizes that fit the first recording."""
+    gram = prepared.total_gram(new)
     values = _draw_coefficients(prepared, question, right, rng)
     noise = _matrix_root(new) @ rng.normal(size=values.shape)
     vectors = prepared.before.vector[:, None] + new @ values + noise
@@ -133,13 +143,15 @@ def chances_if_right(
 
 
 def judge_draws(question: Question, explained: list[Array], right: int, rows: float) -> Chances:
-    """How draws end under the rule of the diagnosis. explained: for each rival log likelihoods, (laws, draws)."""
+    """Shares of draws by what the rule of the diagnosis decides. explained: log likelihoods (laws, draws) by rival."""
     laws = [each.laws for each in question.rivals]
     prices = [np.array([[law.price(rows)] for law in each]) for each in laws]
-    scores = np.array([np.max(found - price, axis=0) for found, price in zip(explained, prices, strict=True)])
+    scores = np.array(
+        [np.max(likelihoods - price, axis=0) for likelihoods, price in zip(explained, prices, strict=True)]
+    )
     best, ordered = np.argmax(scores, axis=0), np.sort(scores, axis=0)
     clear = ordered[-1] - ordered[-2] > Settings().tuning.claims.max_deficit
-    whole = np.array([np.max(found, axis=0) for found in explained])
+    whole = np.array([np.max(likelihoods, axis=0) for likelihoods in explained])
     for one, special in enumerate(laws):
         for other, usual in enumerate(laws):
             least = required_held_out_gain(special[0], usual[0], rows)
@@ -148,7 +160,7 @@ def judge_draws(question: Question, explained: list[Array], right: int, rows: fl
 
 
 def _draw_coefficients(prepared: PreparedQuestions, question: Question, right: int, rng: np.random.Generator) -> Array:
-    """Coefficients of all columns as the first recording leaves them where one rival is right, (columns, draws)."""
+    """Coefficients of all columns after the first recording if one rival is right, (columns, draws)."""
     rival = question.rivals[right]
     out = []
     shares = np.array([len(sizes) for _, sizes in rival.possible_sizes], dtype=np.float64)
@@ -157,18 +169,18 @@ def _draw_coefficients(prepared: PreparedQuestions, question: Question, right: i
         drawn = np.zeros((len(prepared.layout.prior), count))
         drawn[law.columns] = sizes[rng.integers(len(sizes), size=count)].T
         if prepared.first is not None:
-            chosen, found = draw_coefficients(
+            chosen, coefficients = draw_coefficients(
                 prepared.known_moments, question.found, law.columns, law.candidate, count, rng
             )
-            if found.shape[1]:
-                drawn = np.zeros((len(drawn), found.shape[1]))
-                drawn[chosen] = found
+            if coefficients.shape[1]:
+                drawn = np.zeros((len(drawn), coefficients.shape[1]))
+                drawn[chosen] = coefficients
         out.append(drawn)
     return np.concatenate(out, axis=1)
 
 
 def _log_likelihoods(question: Question, number: int, gram: Array, vectors: Array, rows: float) -> Array:
-    """Log likelihood of each of a rival's laws, (laws, draws), less the price of a usual term that helps."""
+    """Log likelihood of each law of a rival, (laws, draws), with the gain of the best term of usual friction."""
     out = []
     for law in question.rivals[number].laws:
         chosen = np.append(question.found, law.columns)

@@ -21,7 +21,7 @@ from armlab.diagnosis.next.motion import (
 )
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, find_nearby_names, prepare_questions
 from armlab.diagnosis.next.problem import TellApartProblem, tell_apart_problem
-from armlab.diagnosis.next.question import Question
+from armlab.diagnosis.next.question import CLEAR_SEPARATION, Question
 from armlab.diagnosis.next.remedies import Remedy, find_remedies
 from armlab.diagnosis.next.verdict_file import RivalGroup, VerdictWithModel, read_verdict, select_rival_groups
 from armlab.recordings.load import load_recording
@@ -31,14 +31,15 @@ from problem.excitation import ExcitationProblem
 from problem.robot_file import load_arm
 
 RANDOM_MOTIONS = 20  # random motions that a design is compared with
-WHOLE_LIBRARY = "library"  # in place of names: everything that comes near
-CLEAR_SEPARATION = 4.0  # standard errors: below it other ways are told, too
+WHOLE_LIBRARY = "library"  # in place of names: all names that explain the data nearly as well
 
 
 @dataclass(frozen=True)
 class RivalPair:
-    """Two rivals of a question. before, random, after: standard errors between them with the first recording alone,
-    with a random motion of the same limits (median), with the designed one. hopeless: no motion separates them.
+    """Two rivals of a question, and the standard errors between them.
+
+    before: with the first recording alone. random: with a random motion of the same limits, too (median). after: with
+    the designed motion, too. hopeless: no motion separates them.
     """
 
     question: int
@@ -71,15 +72,15 @@ def design_experiment(
     """Designs the next experiment; InputError, in one line, for anything that cannot be used."""
     began = time.perf_counter()
     arm = load_arm(robot)
-    loaded = None if recording is None else load_recording(recording)
-    prepared, plain = prepare_experiment(verdict, arm, loaded, rivals, budget, links)
+    recorded = None if recording is None else load_recording(recording)
+    prepared, excitation = prepare_experiment(verdict, arm, recorded, rivals, budget, links)
     problem = point = None
     if any(question.pairs for question in prepared.questions):
-        problem = tell_apart_problem(prepared, plain)
+        problem = tell_apart_problem(prepared, excitation)
         point = search_motion(problem, budget)
-    pairs = _compare_pairs(prepared, plain, problem, point, budget)
-    decided = tuple(_question_chances(prepared, question, problem, point, budget) for question in prepared.questions)
-    return Experiment(prepared, plain, budget, problem, point, pairs, decided, time.perf_counter() - began)
+    pairs = _compare_pairs(prepared, excitation, problem, point, budget)
+    chances = tuple(_question_chances(prepared, question, problem, point, budget) for question in prepared.questions)
+    return Experiment(prepared, excitation, budget, problem, point, pairs, chances, time.perf_counter() - began)
 
 
 def prepare_experiment(
@@ -91,16 +92,20 @@ def prepare_experiment(
     links: LinkKnowledge | None,
 ) -> tuple[PreparedQuestions, ExcitationProblem]:
     """The questions of a verdict, and the motions that this arm may make."""
-    read = read_verdict(verdict)
+    loaded_verdict = read_verdict(verdict)
     if recording is not None and len(recording.arm) != len(arm):
         raise InputError(f"{recording.name} has {len(recording.arm)} joints, {arm.name} {len(arm)}")
-    if len(read.noise) not in (0, len(arm)) or (not len(read.noise) and recording is None):
-        raise InputError(f"{read.path} tells the noise of {len(read.noise)} joints, {arm.name} has {len(arm)}")
+    if len(loaded_verdict.noise) not in (0, len(arm)) or (not len(loaded_verdict.noise) and recording is None):
+        raise InputError(
+            f"{loaded_verdict.path} tells the noise of {len(loaded_verdict.noise)} joints, {arm.name} has {len(arm)}"
+        )
     limits = limits_in_force(arm, recording)
-    plain = build_excitation_problem(arm, limits, budget)
-    kind = links or infer_link_knowledge(read, arm)
-    groups = choose_rival_groups(read, arm, plain, recording, rivals, kind, budget)
-    return prepare_questions(read, groups, arm, plain.trajectory, budget.duration, recording, kind, budget.seed), plain
+    excitation = build_excitation_problem(arm, limits, budget)
+    known_links = links or infer_link_knowledge(loaded_verdict, arm)
+    groups = choose_rival_groups(loaded_verdict, arm, excitation, recording, rivals, known_links, budget)
+    return prepare_questions(
+        loaded_verdict, groups, arm, excitation.trajectory, budget.duration, recording, known_links, budget.seed
+    ), excitation
 
 
 def infer_link_knowledge(verdict: VerdictWithModel, arm: Arm) -> LinkKnowledge:
@@ -113,18 +118,21 @@ def infer_link_knowledge(verdict: VerdictWithModel, arm: Arm) -> LinkKnowledge:
 def choose_rival_groups(
     verdict: VerdictWithModel,
     arm: Arm,
-    plain: ExcitationProblem,
+    excitation: ExcitationProblem,
     recording: Recording | None,
     rivals: str | None,
     links: LinkKnowledge,
     budget: Budget,
 ) -> tuple[RivalGroup, ...]:
-    """Groups of names of which one is right: those of the verdict, named ones, or with `library` all that come near."""
+    """Groups of names of which one is right: those of the verdict, or those in `rivals`.
+
+    With `library` in `rivals`, each finding stands with all names that explain the recording nearly as well.
+    """
     if rivals != WHOLE_LIBRARY:
         return select_rival_groups(verdict, rivals)
     if recording is None:
         raise InputError("--rivals library: needs --recording, in which all names are compared")
-    groups = find_nearby_names(verdict, arm, plain.trajectory, budget.duration, recording, links, budget.seed)
+    groups = find_nearby_names(verdict, arm, excitation.trajectory, budget.duration, recording, links, budget.seed)
     if not groups:
         raise InputError(f"{verdict.path}: no name of the library comes near a finding, so nothing is to be decided")
     return groups
@@ -146,28 +154,28 @@ def _question_chances(
 
 def _compare_pairs(
     prepared: PreparedQuestions,
-    plain: ExcitationProblem,
+    excitation: ExcitationProblem,
     problem: TellApartProblem | None,
     point: Array | None,
     budget: Budget,
 ) -> tuple[RivalPair, ...]:
     times = prepared.sampling.times(budget.duration)
-    drawn = np.array([random_point(plain, _budget_with_seed(budget, number)) for number in range(RANDOM_MOTIONS)])
-    motions = plain.trajectory.motions(drawn, times).motion
+    drawn = np.array([random_point(excitation, _budget_with_seed(budget, number)) for number in range(RANDOM_MOTIONS)])
+    motions = excitation.trajectory.motions(drawn, times).motion
     scenes = [prepared.present.scene(motions.select(np.intp(number)), times) for number in range(RANDOM_MOTIONS)]
-    others = [prepared.together(prepared.moments(scene).gram) for scene in scenes]
+    random_grams = [prepared.total_gram(prepared.moments(scene).gram) for scene in scenes]
     before = prepared.before.gram + prepared.layout.prior
-    after = before if problem is None or point is None else prepared.together(problem.moments(point).gram)
+    after = before if problem is None or point is None else prepared.total_gram(problem.moments(point).gram)
     out = []
     for number, question in enumerate(prepared.questions):
         for pair in sorted([*question.pairs, *question.hopeless]):
             hopeless = pair in question.hopeless
-            near, far = question.separation(before, *pair), question.separation(after, *pair)
-            middle = float(np.median([question.separation(each, *pair) for each in others]))
-            weak = hopeless or far < CLEAR_SEPARATION
-            elsewise = find_remedies(prepared, question, pair, scenes[0].motion, times) if weak else []
+            first_alone, designed = question.separation(before, *pair), question.separation(after, *pair)
+            random = float(np.median([question.separation(each, *pair) for each in random_grams]))
+            weak = hopeless or designed < CLEAR_SEPARATION
+            remedies = find_remedies(prepared, question, pair, scenes[0].motion, times) if weak else []
             names = (str(question.rivals[pair[0]].name), str(question.rivals[pair[1]].name))
-            out.append(RivalPair(number, names, pair, near, middle, far, hopeless, tuple(elsewise)))
+            out.append(RivalPair(number, names, pair, first_alone, random, designed, hopeless, tuple(remedies)))
     return tuple(out)
 
 

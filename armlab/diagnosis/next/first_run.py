@@ -10,8 +10,8 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, observe
 from armlab.diagnosis.next.moments import Index, Moments
 from armlab.diagnosis.next.question import Layout
-from armlab.diagnosis.next.sampling import Sampling, Whitening, kept_columns
-from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.next.sampling import Sampling, kept_columns
+from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
@@ -44,7 +44,7 @@ class PresentModel:
 
 @dataclass(frozen=True, eq=False)
 class FirstRun:
-    """observed: the runs. scenes: one a run. torque: (rows, joints), N m, what the links do not explain."""
+    """The first recording. scenes: one for each run. torque: (rows, joints), N m, measured less that of the links."""
 
     observed: Observed
     scenes: tuple[Scene, ...]
@@ -61,7 +61,7 @@ class FirstRun:
         return 2 / 3 if self.observed.held_out_blocks else 1.0
 
     def columns(self, layout: Layout) -> Array:
-        """All columns at the kept rows, (rows, joints, columns)."""
+        """Columns of a layout at the kept rows, (rows, joints, columns)."""
         pairs = zip(self.scenes, self.observed.signals, strict=True)
         return np.concatenate(
             [kept_columns(layout.base, layout.candidates, scene, signals.filter) for scene, signals in pairs]
@@ -71,8 +71,7 @@ class FirstRun:
         """The filter and the noise that is left when the fitted columns are taken out."""
         left, each = self._fit_residual(columns[:, :, fitted]), len(fitted) / self.observed.joints
         noise = fit_noise(left, self.observed, each, Settings().tuning.noise)
-        whitening = Whitening(noise.taps, noise.scales)
-        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, whitening, self._standing_speeds())
+        return Sampling(self.observed.rate_hz, self.observed.cutoff_hz, noise, self._standing_speeds())
 
     def _standing_speeds(self) -> tuple[float, ...]:
         """Speed of each joint (joints,) below which a diagnosis takes it as standing still, rad/s (m/s)."""
@@ -89,14 +88,14 @@ class FirstRun:
         slow: list[float] = np.maximum(noisy, tuning.creep_ratio * speed).tolist()
         return tuple(slow)
 
-    def moments(self, columns: Array, noise: Whitening, role: Role) -> Moments:
-        """Of the rows of a role in which a joint moves."""
+    def moments(self, columns: Array, noise: Noise, role: Role) -> Moments:
+        """Moments of the rows of a role in which a joint moves. columns: (rows, joints, columns)."""
         size = columns.shape[2]
         whole = np.concatenate([columns, self.torque[:, :, None]], axis=2)
         gram = np.zeros((size + 1, size + 1))
         for joint in range(self.observed.joints):
             for part in self.observed.of_role(role, joint):
-                rows = noise(whole[part.start : part.stop, joint], joint)
+                rows = noise.whitened(whole[:, joint], joint, [part])
                 gram += rows.T @ rows
         return Moments(gram[:size, :size], gram[:size, size])
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
 
-RELATIVE_RIDGE = 1e-9  # of a column's squared length: columns that hold each other do not stop a fit
-ROUNDING_SHARE = 1e-6  # of a squared length: what less of it is left is not seen
+RELATIVE_RIDGE = 1e-9  # of a column's squared length, so that dependent columns do not stop a fit
+ROUNDING_SHARE = 1e-6  # of a column's squared length: a smaller remainder is rounding
 Index = NDArray[np.intp]
 
 
@@ -22,20 +22,24 @@ class Moments:
     gram: Array
     vector: Array
 
+    def select(self, kept: Index) -> "Moments":
+        """The moments of the `kept` columns alone."""
+        return Moments(self.gram[np.ix_(kept, kept)], self.vector[kept])
+
     def __add__(self, other: "Moments") -> "Moments":
-        """Both, with one set of coefficients."""
+        """Moments of both sets of rows, for one set of coefficients."""
         return Moments(self.gram + other.gram, self.vector + other.vector)
 
 
 def empty_moments(columns: int) -> Moments:
-    """Nothing recorded."""
+    """Moments of no rows."""
     return Moments(np.zeros((columns, columns)), np.zeros(columns))
 
 
 def solve_least_squares(gram: Array, chosen: Index, right: Array) -> Array:
     """Coefficients of the chosen columns for right-hand sides (columns, ...): least squares, slightly damped.
 
-    What a motion never shows, torque below zero say, has none: its column is zero.
+    A column of zeros, of a law that the motion never excites, has the coefficient zero.
     """
     part = gram[np.ix_(chosen, chosen)]
     lengths = np.sqrt(np.where(np.diag(part) > 0, np.diag(part), np.inf))
@@ -55,7 +59,7 @@ def unexplained_power(gram: Array, own: Index, values: Array, fitted: Index) -> 
 
 
 def count_independent(gram: Array, own: Index, fitted: Index) -> int:
-    """How many of the own columns add something that the fitted ones do not hold."""
+    """Number of own columns that are independent of the fitted ones and of each other."""
     lengths = np.sqrt(np.maximum(np.diag(gram)[own], 1e-300))
     part = gram[np.ix_(own, own)]
     if len(fitted):
@@ -70,9 +74,10 @@ DRAWS_PER_SAMPLE = 20  # draws for each one that is wanted
 def draw_coefficients(
     seen: Moments, free: Index, own: Index, candidate: Candidate, count: int, rng: np.random.Generator
 ) -> tuple[Index, Array]:
-    """Places of the free columns and a law's own, and draws of their coefficients, (places, at most count).
+    """Indices of the free columns and a law's own, and draws from the posterior of their coefficients.
 
-    seen: of the recording, with what is known beforehand. No draws where physics refuses nearly all of them.
+    seen: moments of the recording, with the prior. own: the columns of `candidate`. Returns (indices,) and
+    (indices, draws) with at most `count` draws. A draw that physics refuses is left out, so there may be none.
     """
     chosen = np.append(free, own)
     gram = seen.gram.copy()

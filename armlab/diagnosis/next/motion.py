@@ -33,7 +33,7 @@ PEAK_INSTANTS = 801  # instants
 class WithinLimits:
     """A series whose swing about q0 shrinks, joint by joint, until position, speed and acceleration are allowed.
 
-    A point whose swing is small stays small: slow motions are worth finding, too.
+    A small swing is not enlarged, so that the search can find slow motions, too.
     """
 
     series: JointFourier
@@ -58,8 +58,8 @@ class WithinLimits:
         """Motions (points, samples, joints) of points (points, dimension) at `times` (samples,), s."""
         rest = self._centres(points)[:, None]
         scale = self._scale(points, rest)
-        found = self.series.motions(points, times).motion
-        moved = Motion(rest + scale * (found.position - rest), scale * found.velocity, scale * found.acceleration)
+        motion = self.series.motions(points, times).motion
+        moved = Motion(rest + scale * (motion.position - rest), scale * motion.velocity, scale * motion.acceleration)
         return Excitation(moved, np.zeros(len(points)))
 
     def _centres(self, points: Array) -> Array:
@@ -72,7 +72,7 @@ class WithinLimits:
     @property
     def _range(self) -> tuple[Array, Array]:
         """Lowest and highest position that are used, (joints,) each."""
-        low, high = (np.array(side) for side in zip(*(each.position for each in self.limits), strict=True))
+        low, high = np.array([each.position for each in self.limits]).T
         spared = (1 - USED_LIMIT_SHARE) * (high - low) / 2
         return low + spared, high - spared
 
@@ -89,10 +89,8 @@ class WithinLimits:
     def _used_and_allowed(self, swing: Array, motion: Motion, rest: Array) -> list[tuple[Array, Array]]:
         """What is used of each limit at a swing of one, and what there is of it: (points, 1, joints)."""
         low, high = self._range
-        speed, acceleration = (
-            USED_LIMIT_SHARE * np.array([getattr(each, name) for each in self.limits])
-            for name in ("velocity", "acceleration")
-        )
+        speed = USED_LIMIT_SHARE * np.array([each.velocity for each in self.limits])
+        acceleration = USED_LIMIT_SHARE * np.array([each.acceleration for each in self.limits])
         return [
             (swing.max(axis=1, keepdims=True), high - rest),
             (-swing.min(axis=1, keepdims=True), rest - low),
@@ -107,7 +105,7 @@ class WithinLimits:
 
 def fourier_within_limits(limits: tuple[Limits, ...], duration: float, harmonics: int) -> WithinLimits:
     """The series of an arm with these limits, from rest to rest; ValueError where a speed or a range is not limited."""
-    low, high = (np.array(side) for side in zip(*(each.position for each in limits), strict=True))
+    low, high = np.array([each.position for each in limits]).T
     speed = np.array([each.velocity for each in limits])
     if not np.all(np.isfinite([low, high, speed])):
         raise ValueError("a motion can only be designed for joints with limits of position and speed")
@@ -133,24 +131,24 @@ class Budget:
 
 
 def limits_in_force(arm: Arm, recording: Recording | None) -> tuple[Limits, ...]:
-    """Limits of each joint; what the robot file leaves open is what the recording has shown the joint can do.
+    """Limits of each joint from the robot file; where it gives none, the peaks of the recording.
 
-    Raises InputError where neither tells a range, a speed and an acceleration.
+    Raises InputError where neither gives a range, a speed and an acceleration.
     """
     shown = None if recording is None else _limits_shown(recording)
     out = []
     for number, joint in enumerate(arm.joints):
-        known = joint.limits
-        seen = Limits() if shown is None else shown[number]
-        low, high = known.position if np.all(np.isfinite(known.position)) else seen.position
-        speed = known.velocity if np.isfinite(known.velocity) else seen.velocity
-        acceleration = known.acceleration if np.isfinite(known.acceleration) else seen.acceleration
+        given = joint.limits
+        shown_by_joint = Limits() if shown is None else shown[number]
+        low, high = given.position if np.all(np.isfinite(given.position)) else shown_by_joint.position
+        speed = given.velocity if np.isfinite(given.velocity) else shown_by_joint.velocity
+        acceleration = given.acceleration if np.isfinite(given.acceleration) else shown_by_joint.acceleration
         if not np.all(np.isfinite([low, high, speed, acceleration])):
             raise InputError(
                 f"{arm.name}, {joint.name}: give position_limits, velocity_limit and acceleration_limit in the robot "
                 "file, or --recording, whose motion shows what the joint can do"
             )
-        out.append(Limits((low, high), speed, acceleration, known.torque))
+        out.append(Limits((low, high), speed, acceleration, given.torque))
     return tuple(out)
 
 
@@ -180,10 +178,10 @@ def search_motion(problem: Problem, budget: Budget) -> Array:
         return problem.evaluate(points).fitness
 
     with np.errstate(over="ignore"):
-        found = minimise(algorithm, algorithm.Params(), objective, box, population, budget.evaluations, rng)
-    if problem.evaluate(found.best_x[None]).violation[0] > 0:
+        result = minimise(algorithm, algorithm.Params(), objective, box, population, budget.evaluations, rng)
+    if problem.evaluate(result.best_x[None]).violation[0] > 0:
         raise InputError(f"{problem.name}: {budget.evaluations} evaluations found no motion within all limits")
-    return found.best_x
+    return result.best_x
 
 
 def random_point(problem: Problem, budget: Budget, tries: int = 200) -> Array:
@@ -202,10 +200,10 @@ def random_generator(purpose: str, budget: Budget) -> np.random.Generator:
 
 
 def _limits_shown(recording: Recording) -> list[Limits]:
-    """What each joint did in a recording."""
-    found = np.stack([_motion_peaks(run) for run in recording.runs])
-    low, high = found[..., 0].min(axis=0), found[..., 1].max(axis=0)
-    rows = np.column_stack([low, high, found[..., 2].max(axis=0), found[..., 3].max(axis=0)]).tolist()
+    """The peaks of each joint in a recording, as limits."""
+    run_peaks = np.stack([_motion_peaks(run) for run in recording.runs])
+    low, high = run_peaks[..., 0].min(axis=0), run_peaks[..., 1].max(axis=0)
+    rows = np.column_stack([low, high, run_peaks[..., 2].max(axis=0), run_peaks[..., 3].max(axis=0)]).tolist()
     return [Limits((row[0], row[1]), row[2], row[3]) for row in rows]
 
 

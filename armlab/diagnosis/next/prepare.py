@@ -14,7 +14,6 @@ from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.next.first_run import FirstRun, FoundEffect, PresentModel, observe_first_run
 from armlab.diagnosis.next.moments import Index, Moments, empty_moments
 from armlab.diagnosis.next.question import (
-    LINK_PARAMETER_ERROR,
     Layout,
     Name,
     Question,
@@ -37,8 +36,8 @@ from armlab.diagnosis.next.rivals import (
 from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_noise_sampling
 from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictWithModel
 from armlab.diagnosis.settings import Settings
-from armlab.effects.contract import Candidate, Scene
-from armlab.effects.library import effect_named, library
+from armlab.effects.contract import UNKNOWN, Candidate, Scene
+from armlab.effects.library import library
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters, base_parameters
@@ -46,21 +45,16 @@ from problem.trajectories import Trajectory
 
 LinkKnowledge = Literal["exact", "near", "free"]
 NEAR_LINK_WIDTH = 0.08  # width of the links' errors: about as far as drawings are off
-DRY_FRICTION = (
-    "coulomb_friction",
-    "stribeck_friction",
-    "presliding_hysteresis",
-    "asymmetric_friction",
-    "load_dependent_friction",
-)
-RICH_MOTIONS = 3  # random motions that show what any motion could show
+RICH_MOTIONS = 3  # random motions that stand for all motions
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedQuestions:
-    """seen: what the first recording says of the columns of `layout`; before: its rows from which a diagnosis learns.
+    """Questions with everything that a design needs to answer them.
 
-    rows: those rows, of all joints. counted: share of a new run that will be among them, the rest is held out.
+    present: the model of the verdict. layout: the columns of all laws. seen: moments of all rows of the first
+    recording; before: those of the rows from which a diagnosis learns. rows: number of those rows, of all joints.
+    learned_share: share of a new run from which a diagnosis will learn; the rest is held out.
     """
 
     present: PresentModel
@@ -74,21 +68,21 @@ class PreparedQuestions:
     first: FirstRun | None
 
     def moments(self, scene: Scene) -> Moments:
-        """What a diagnosis would learn from a designed motion."""
+        """Moments of a designed motion, of the share from which a diagnosis will learn."""
         whole = self.layout.moments(scene, self.sampling.filter(len(scene.time)), self.sampling)
         return Moments(self.learned_share * whole.gram, self.learned_share * whole.vector)
 
     @property
     def known_moments(self) -> Moments:
-        """All that the first recording says, with what is known of the links beforehand."""
+        """Moments of the first recording, with the prior of the links."""
         return Moments(self.seen.gram + self.layout.prior, self.seen.vector)
 
     def rows_with(self, samples: int) -> float:
         """Rows of both recordings from which a diagnosis learns, all joints; samples: of a designed motion."""
         return self.rows + self.learned_share * (samples // SAMPLES_PER_ROW) * len(self.present.arm)
 
-    def together(self, gram: Array) -> Array:
-        """Moments of both runs, and what is known of the links beforehand."""
+    def total_gram(self, gram: Array) -> Array:
+        """Gram matrix of the first recording and a new run (columns, columns), with the prior of the links."""
         return np.asarray(gram + self.before.gram + self.layout.prior)
 
 
@@ -103,13 +97,16 @@ def prepare_questions(
     seed: int = 0,
     lenient: bool = False,
 ) -> PreparedQuestions:
-    """Everything that a design needs; InputError where a rival cannot be sized or leaves no trace.
+    """Restores the model of a verdict, and prepares one question for each group of rival names.
 
-    lenient: groups with such a rival are left out instead.
+    groups: names of which one is right. trajectory, duration (s): motions that may be designed. links: how well the
+    links are known. lenient: leave out groups with a name that leaves no trace in the torques. Raises InputError where
+    such a name is asked for, or where neither the verdict nor a recording says how large a rival is.
     """
     families = library()
-    parts = {each.name: part for each in verdict.findings if (part := restore_part(each, arm, families)) is not None}
-    own = tuple(part for name, part in parts.items() if name.effect != LINK_PARAMETER_ERROR)
+    restored = {each.name: restore_part(each, arm, families) for each in verdict.findings}
+    parts = {name: part for name, part in restored.items() if part is not None}
+    own = tuple(part for name, part in parts.items() if not name.facts.in_links)
     present = PresentModel(arm, verdict.inertial(arm), own)
     first = observe_first_run(recording, present) if recording is not None else None
     sampling = white_noise_sampling(verdict.noise, verdict.cutoff_hz or Settings().tuning.data.cutoff_hz)
@@ -126,7 +123,7 @@ def prepare_questions(
     candidates += [each for shapes in laws.values() for each in shapes]
     base = base_parameters(arm)
     layout = build_layout(base, candidates, scenes[0], _link_precision(arm, base, present.inertial, links))
-    return _Preparation(present, parts, laws, layout, links, first, rich, sampling).prepared(groups, offered)
+    return _Preparation(present, parts, laws, layout, links, first, rich, sampling).prepare(groups, offered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +137,7 @@ class _Preparation:
     rich: list[Scene]
     white: Sampling
 
-    def prepared(self, groups: tuple[RivalGroup, ...], offered: OfferedLaws) -> PreparedQuestions:
+    def prepare(self, groups: tuple[RivalGroup, ...], offered: OfferedLaws) -> PreparedQuestions:
         """Chooses laws and sizes, and keeps the columns that are needed."""
         sampling, whole, before = self._recorded_moments(groups)
         shown = self._rich_gram(sampling)
@@ -163,39 +160,40 @@ class _Preparation:
             return self.white, empty_moments(self.layout.size), empty_moments(self.layout.size)
         columns = self.first.columns(self.layout)
         found = [self.parts[group[0]][0] for group in groups if group[0] in self.parts]
-        fitted = np.unique(np.concatenate([self._free_columns(()), *(self.layout.of(each) for each in found)]))
+        fitted = np.unique(np.concatenate([self._free_columns(()), *(self.layout.indices_of(each) for each in found)]))
         sampling = self.first.sampling(columns, fitted.astype(np.intp))
         sampling = replace(sampling, standing=self._standing_speeds(sampling, groups))
         before = self.first.moments(columns, sampling.noise, "identify")
         whole = before + self.first.moments(columns, sampling.noise, "validate")
-        for name in sorted(
-            {group[0] for group in groups if group[0].effect == LINK_PARAMETER_ERROR} & self.parts.keys(), key=str
-        ):
-            candidate, values = self.parts[name]  # what the links of the model hold already is given back
-            whole, before = (self._give_back(each, candidate, values) for each in (whole, before))
+        asked = {group[0] for group in groups if group[0].facts.in_links}
+        for name in sorted(asked & self.parts.keys(), key=str):
+            part = self.parts[name]  # the links of the model hold its torque, so the residual does not
+            whole, before = self._with_torque_of(whole, part), self._with_torque_of(before, part)
         return sampling, whole, before
 
     def _standing_speeds(self, sampling: Sampling, groups: tuple[RivalGroup, ...]) -> tuple[float, ...]:
-        """Speeds below which a joint with dry friction, found or asked for, stands still; 0 for the others."""
+        """Speeds below which a joint stands still whose friction sticks, found or asked for; 0 for the others."""
         named = {*self.parts, *(name for group in groups for name in group)}
-        sticky = {name.joint for name in named if name.effect in DRY_FRICTION}
-        return tuple(each if joint + 1 in sticky else 0.0 for joint, each in enumerate(sampling.standing))
+        sticking = {name.joint for name in named if name.facts.sticks}
+        return tuple(each if joint + 1 in sticking else 0.0 for joint, each in enumerate(sampling.standing))
 
-    def _give_back(self, moments: Moments, candidate: Candidate, values: Array) -> Moments:
-        return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.of(candidate)] @ values)
+    def _with_torque_of(self, moments: Moments, part: FoundEffect) -> Moments:
+        """The moments with the torque of a part added to the residual."""
+        candidate, values = part
+        return Moments(moments.gram, moments.vector + moments.gram[:, self.layout.indices_of(candidate)] @ values)
 
     def _free_columns(self, group: RivalGroup) -> Index:
         """Columns that may be fitted beside the rivals of a group: what was found, and usual friction of all joints."""
         usual = [each for each in usual_friction(self.present.arm, self.rich) if name_of(each) not in group]
-        return np.unique(np.concatenate([self._found_columns(group), *map(self.layout.of, usual)])).astype(np.intp)
+        return np.unique(np.concatenate([self._found_columns(group), *map(self.layout.indices_of, usual)])).astype(
+            np.intp
+        )
 
     def _found_columns(self, group: RivalGroup) -> Index:
         """Columns of the other findings, and of the links where they are not known exactly."""
-        others = [
-            part[0] for name, part in self.parts.items() if name not in group and name.effect != LINK_PARAMETER_ERROR
-        ]
+        others = [part[0] for name, part in self.parts.items() if name not in group and not name.facts.in_links]
         rigid = np.arange(0 if self.links == "exact" else len(self.layout.base))
-        return np.unique(np.concatenate([rigid, *map(self.layout.of, others)])).astype(np.intp)
+        return np.unique(np.concatenate([rigid, *map(self.layout.indices_of, others)])).astype(np.intp)
 
     def _rival_choices(self, group: RivalGroup) -> list[RivalChoice]:
         out = []
@@ -204,31 +202,38 @@ class _Preparation:
             values = None if part is None else part[1]
             shapes = [*([] if part is None else [part[0]]), *self.laws[name]]
             unique = list(dict.fromkeys(shapes))
-            out.append(RivalChoice(name, tuple((each, self.layout.of(each)) for each in unique), values))
+            out.append(RivalChoice(name, tuple((each, self.layout.indices_of(each)) for each in unique), values))
         if all(each.values is None for each in out) and self.first is None:
             raise InputError(f"how large is {group[0]}? the verdict has found none of the rivals: give --recording")
         return out
 
     def _rich_gram(self, sampling: Sampling) -> Array:
-        """What rich motions show, even while a joint stands still."""
+        """Gram matrix of the rich motions; rows near a standstill count, too."""
         sampling = replace(sampling, standing=())
         moments = [self.layout.moments(scene, sampling.filter(len(scene.time)), sampling) for scene in self.rich]
         return np.asarray(np.sum([each.gram for each in moments], axis=0))
 
     def _keep_needed_columns(
-        self, questions: tuple[Question, ...], sampling: Sampling, *recorded: Moments
+        self, questions: tuple[Question, ...], sampling: Sampling, whole: Moments, before: Moments
     ) -> PreparedQuestions:
-        """The same with only the columns that the questions need."""
+        """The questions with only the columns that they need. whole, before: moments of all columns."""
         laws = [law.columns for question in questions for rival in question.rivals for law in rival.laws]
         needed = np.concatenate([np.arange(len(self.layout.base)), *(each.free for each in questions), *laws])
         kept = np.unique(needed).astype(np.intp)
         chosen = [each for each, at in zip(self.layout.candidates, self.layout.places, strict=True) if at[0] in kept]
         count = len(self.layout.base)
         layout = build_layout(self.layout.base, chosen, self.rich[0], self.layout.prior[:count, :count])
-        whole, before = (Moments(each.gram[np.ix_(kept, kept)], each.vector[kept]) for each in recorded)
-        rows, counted = (self.first.rows, self.first.learned_share) if self.first else (0, 1.0)
-        moved = tuple(each.with_columns(kept) for each in questions)
-        return PreparedQuestions(self.present, layout, moved, sampling, whole, before, rows, counted, self.first)
+        return PreparedQuestions(
+            present=self.present,
+            layout=layout,
+            questions=tuple(each.with_columns(kept) for each in questions),
+            sampling=sampling,
+            seen=whole.select(kept),
+            before=before.select(kept),
+            rows=self.first.rows if self.first else 0,
+            learned_share=self.first.learned_share if self.first else 1.0,
+            first=self.first,
+        )
 
 
 def _link_precision(arm: Arm, base: BaseParameters, inertial: Array, links: LinkKnowledge) -> Array:
@@ -249,11 +254,6 @@ def _rich_scenes(present: PresentModel, trajectory: Trajectory, times: Array, se
 MAX_AMBIGUOUS_LEAD = 3.0  # standard errors: closer names are no more than guessed
 MAX_GROUP_SIZE = 4  # names in a group
 MAX_FINDINGS = 4  # findings that are asked about
-RESIDUAL_SEARCH_EFFECTS = (
-    "torque_ripple",
-    "external_contact",
-    "torque_saturation",
-)  # found by looking at the residual, not by columns
 
 
 def find_nearby_names(
@@ -265,20 +265,21 @@ def find_nearby_names(
     links: LinkKnowledge,
     seed: int,
 ) -> tuple[RivalGroup, ...]:
-    """For each finding its name, the rivals of the verdict, and the names that come closest; lone names left out."""
-    named = [
+    """One group for each finding: its name, its rivals in the verdict, and the names that explain the data nearly as
+    well. A finding without such a name has no group.
+    """
+    findings = [
         each
         for each in verdict.findings
-        if each.parameters and each.name.effect not in (*RESIDUAL_SEARCH_EFFECTS, "unknown")
+        if each.parameters and each.name.facts != UNKNOWN and not each.name.facts.scanned
     ]
     out = []
-    for finding in named[:MAX_FINDINGS]:
+    for finding in findings[:MAX_FINDINGS]:
         pairs = tuple((finding.name, name) for name in _candidate_names(finding, verdict, arm))
-        found = prepare_questions(verdict, pairs, arm, trajectory, duration, recording, links, seed, lenient=True)
-        near = sorted(
-            (told for each in found.questions if (told := _nearby_name(found, each)) is not None), key=_search_lead
-        )
-        group = dict.fromkeys((finding.name, *finding.rivals, *(name for name, _ in near)))
+        prepared = prepare_questions(verdict, pairs, arm, trajectory, duration, recording, links, seed, lenient=True)
+        leads = [_nearby_name(prepared, each) for each in prepared.questions]
+        nearby = sorted((each for each in leads if each is not None), key=_search_lead)
+        group = dict.fromkeys((finding.name, *finding.rivals, *(name for name, _ in nearby)))
         out.append(tuple(group)[:MAX_GROUP_SIZE])
     return tuple(group for group in out if len(group) > 1)
 
@@ -294,26 +295,27 @@ def _candidate_names(finding: Finding, verdict: VerdictWithModel, arm: Arm) -> l
     known = {each.name for each in verdict.findings}
     out = []
     for family in library():
-        if family.effect not in RESIDUAL_SEARCH_EFFECTS:
-            robot = effect_named(family.effect).where == "robot"
-            out += [Name(family.effect, None)] if robot else [Name(family.effect, each) for each in joints]
+        if family.facts.where == "robot" and not family.facts.scanned:
+            out.append(Name(family.effect, None))
+        elif not family.facts.scanned:
+            out += [Name(family.effect, each) for each in joints]
     return [name for name in out if name not in known]
 
 
 def _nearby_name(prepared: PreparedQuestions, question: Question) -> tuple[Name, float] | None:
-    """The other name of a question and how much a search prefers the finding to it; None where there is no doubt.
+    """The other name of a question, and by how much a search prefers the finding; None where there is no doubt.
 
-    No rival is a name that physics refuses with the size that it would need, nor a larger law that holds the
-    finding's as a part, unless it explains more by more than noise.
+    There is no doubt where physics refuses the size that the other name needs. There is none either where the other
+    law contains that of the finding and explains no more than noise beyond it.
     """
-    seen = prepared.known_moments
-    found, other = question.rivals
+    known = prepared.known_moments
+    finding, other = question.rivals
     law = other.laws[0]
-    gain = explained_power(seen, question.free, law.columns) - explained_power(
-        seen, question.free, found.laws[0].columns
+    gain = explained_power(known, question.free, law.columns) - explained_power(
+        known, question.free, finding.laws[0].columns
     )
-    larger = bool(question.inseparable[0, 1]) and law.freedom > found.laws[0].freedom
+    larger = bool(question.inseparable[0, 1]) and law.freedom > finding.laws[0].freedom
     needed = MIN_BEYOND_NOISE**2 if larger else -(MAX_AMBIGUOUS_LEAD**2)
     if gain < needed or law.candidate.objection(other.values) is not None:
         return None
-    return other.name, law.price(prepared.rows) - found.laws[0].price(prepared.rows) - 0.5 * gain
+    return other.name, law.price(prepared.rows) - finding.laws[0].price(prepared.rows) - 0.5 * gain

@@ -26,7 +26,7 @@ from problem.motion import Motion
 from problem.presets import LimitSettings, PerJoint, Positive, per_joint_values
 from problem.robot_file import load_arm
 
-MIN_STRENGTH = 1e-6  # standard errors: less is none
+MIN_STRENGTH = 1e-6  # standard errors: avoids a division by zero
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,19 +54,19 @@ class TellApartProblem(ExcitationProblem):
         return self.prepared.rows_with(self.samples)
 
     def moments(self, point: Array) -> Moments:
-        """What the motion of a point (dimension,) would say."""
+        """Moments of the motion of a point (dimension,)."""
         motion = self.trajectory.motions(point[None], self.times).motion.select(np.intp(0))
         return self.prepared.moments(self.prepared.present.scene(motion, self.times))
 
     def _judge(self, motion: Motion) -> tuple[Array, Array]:
         """Value of motions (points, samples, joints), (points,), twice: it is also what is minimised."""
-        found = np.array([self._strength(motion.select(np.intp(number))) for number in range(len(motion.position))])
-        value = 1 / np.maximum(found, MIN_STRENGTH)
+        strengths = np.array([self._strength(motion.select(np.intp(number))) for number in range(len(motion.position))])
+        value = 1 / np.maximum(strengths, MIN_STRENGTH)
         return value, value
 
     def _strength(self, motion: Motion) -> float:
-        found = self.prepared.moments(self.prepared.present.scene(motion, self.times))
-        return decision_strength(self.prepared.questions, self.prepared.together(found.gram), self.rows)
+        moments = self.prepared.moments(self.prepared.present.scene(motion, self.times))
+        return decision_strength(self.prepared.questions, self.prepared.total_gram(moments.gram), self.rows)
 
 
 def tell_apart_problem(
@@ -117,8 +117,9 @@ DEFAULT_RIVALS = (
 class TellApartSettings(Settings):
     """Find the motion, from rest to rest within all limits, on which rivals differ most.
 
-    arm: a built-in name or a file. noise: N m, of the torque below cutoff_hz. links: how well they are known: exactly,
-    nearly (8 % off), or not at all. frame_seed: search in randomly shifted coordinates.
+    arm: a built-in name or a file. noise: N m, of the torque below cutoff_hz. links: `exact` where they are known,
+    `near` where they may be off by 8 %, `free` where they are unknown. frame_seed: search in randomly shifted
+    coordinates.
     """
 
     preset: Literal["tell-apart"] = "tell-apart"
@@ -140,16 +141,16 @@ class TellApartSettings(Settings):
         verdict = self._verdict(arm)
         budget = Budget(duration=self.duration, harmonics=self.harmonics)
         try:
-            plain = build_excitation_problem(arm, self.limits.of(arm), budget)
+            excitation = build_excitation_problem(arm, self.limits.of(arm), budget)
             groups = (tuple(Name(each.effect, each.joint) for each in self.rivals),)
-            prepared = prepare_questions(verdict, groups, arm, plain.trajectory, self.duration, None, self.links)
-            problem = tell_apart_problem(prepared, plain)
+            prepared = prepare_questions(verdict, groups, arm, excitation.trajectory, self.duration, None, self.links)
+            problem = tell_apart_problem(prepared, excitation)
         except ValueError as error:
             raise InputError(f"tell-apart: {error}") from None
         return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
 
     def _verdict(self, arm: Arm) -> VerdictWithModel:
-        """What a diagnosis would have said."""
+        """The verdict that a diagnosis would give if the first rival were right."""
         first, *others = (Name(each.effect, each.joint) for each in self.rivals)
         parameters = dict(self.rivals[0].parameters)
         finding = Finding(first, () if first.joint is None else (first.joint,), parameters, tuple(others))

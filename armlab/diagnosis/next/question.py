@@ -9,11 +9,12 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.moments import ROUNDING_SHARE, Index, Moments, unexplained_power
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
-from armlab.effects.contract import Candidate, Scene
+from armlab.effects.contract import Candidate, Effect, Scene
+from armlab.effects.library import effect_named
 from armlab.recordings.filters import Filter
 from problem.base_parameters import BaseParameters
 
-LINK_PARAMETER_ERROR = "inertial_parameter_error"  # is in the links of a model, not beside them
+CLEAR_SEPARATION = 4.0  # standard errors between two rivals that decide
 
 
 @dataclass(frozen=True)
@@ -23,15 +24,22 @@ class Name:
     effect: str
     joint: int | None
 
+    @property
+    def facts(self) -> Effect:
+        """What is known of the effect; ValueError where there is no effect of that id."""
+        return effect_named(self.effect)
+
     def __str__(self) -> str:
         """`viscous friction at joint 2`."""
-        return self.effect.replace("_", " ") + ("" if self.joint is None else f" at joint {self.joint}")
+        facts = self.facts
+        place = "link" if facts.where == "link" else "joint"
+        return facts.words if self.joint is None else f"{facts.words} at {place} {self.joint}"
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A rival in one shape. columns: its places among all columns. freedom: how many parameters it adds to what is free
-    anyway. looks: among how many alternatives it was picked. share: of all joints, those whose torque it changes.
+    """A rival in one shape. columns: its indices among all columns. freedom: number of parameters that it adds to the
+    free columns. looks: number of alternatives from which a search picks it. share: of joints whose torque it changes.
     """
 
     candidate: Candidate
@@ -41,7 +49,7 @@ class Law:
     share: float
 
     def price(self, rows: float) -> float:
-        """Its price in units of log likelihood, as the search of a diagnosis counts it; nothing new costs nothing.
+        """Penalty of its parameters in units of log likelihood, as in the search of a diagnosis; 0 without freedom.
 
         rows: of all joints.
         """
@@ -52,10 +60,10 @@ class Law:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A name that may be right, and the law that it then is: laws[0] with these values. The others are its shapes.
+    """A name that may be right. Its law is laws[0] with these values; the other laws are other shapes of it.
 
-    weight: how well it fits what was recorded, beside the others. sizes: for each law the coefficients that it may have
-    after what was recorded, (draws, columns); none where nothing was.
+    weight: its probability after the first recording, up to a factor. sizes: for each law draws of its coefficients
+    after that recording, (draws, columns); empty without a recording.
     """
 
     name: Name
@@ -73,10 +81,11 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Rivals of which one is right. free: columns that may be fitted beside any of them; found: those that surely are.
+    """Rivals of which one is right.
 
-    The rest of what is free, usual friction that no diagnosis has found yet, costs a price.
-    blind: (rivals, rivals), true where no motion shows, were the first right, that it is not the second.
+    free: columns that may be fitted beside any rival. found: those of them that the verdict has found; the others,
+    usual friction, are fitted at a price. inseparable: (rivals, rivals), true where no motion can refute the second
+    rival if the first one is right.
     """
 
     rivals: tuple[Rival, ...]
@@ -122,8 +131,8 @@ class Question:
     def separation(self, gram: Array, one: int, other: int) -> float:
         """Standard errors between two rivals, whichever is right.
 
-        Where one law contains the other, it explains whatever the other explains; then the simpler name is told
-        unless the larger one is needed, and only that direction can be measured.
+        Where one law contains the other, it explains all that the other explains. A diagnosis then names the simpler
+        law unless the larger one is needed, so only this direction is measured.
         """
         ways = [(one, other), (other, one)]
         seen = [self.noncentrality(gram, *way) for way in ways if not self.inseparable[way]]
@@ -148,14 +157,14 @@ class Layout:
         """Number of columns."""
         return len(self.prior)
 
-    def of(self, candidate: Candidate) -> Index:
-        """Places of a candidate's columns."""
+    def indices_of(self, candidate: Candidate) -> Index:
+        """Indices of the columns of a candidate."""
         return self.places[self.candidates.index(candidate)]
 
     def moments(self, scene: Scene, keep: Filter, sampling: Sampling) -> Moments:
-        """What a motion without any torque recorded yet would say."""
+        """Moments of a motion whose torque is not recorded yet: the vector is zero."""
         columns = kept_columns(self.base, self.candidates, scene, keep, smooth=True)
-        rows = sampling.whitened(columns, scene.motion.velocity)
+        rows = sampling.whiten(columns, scene.motion.velocity)
         return Moments(rows.T @ rows, np.zeros(self.size))
 
 
@@ -173,14 +182,14 @@ def build_layout(base: BaseParameters, candidates: list[Candidate], scene: Scene
 
 
 def is_in_free_links(name: Name, free: Index) -> bool:
-    """Whether a name is part of what is free anyway: a link that is off, where the links are not known exactly."""
-    return name.effect == LINK_PARAMETER_ERROR and 0 in free
+    """Whether the free columns hold the effect already: an error of a link, where the base parameters are free."""
+    return 0 in free and name.facts.in_links
 
 
 def inseparable_rivals(rivals: tuple[Rival, ...], free: Index, gram: Array) -> Array:
-    """Which rivals a rich motion's moments cannot tell from which, (rivals, rivals).
+    """Matrix (rivals, rivals): true where a rich motion cannot refute the second rival if the first one is right.
 
-    Links that may be off anyway explain nothing that speaks against another name.
+    gram: of rich motions, with the prior. An error of links that are free anyway refutes no other name.
     """
     count = len(rivals)
     out = np.zeros((count, count), dtype=bool)

@@ -1,5 +1,5 @@
-"""What else would separate rivals that no motion separates, or hardly: a known load, a tilted base, a data sheet, a
-second encoder.
+"""What separates rivals where no motion does, or not clearly: a known load, a tilted base, a data sheet, or a second
+encoder.
 """
 
 from collections.abc import Iterator
@@ -11,7 +11,8 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.next.first_run import PresentModel
 from armlab.diagnosis.next.moments import Index
 from armlab.diagnosis.next.prepare import PreparedQuestions
-from armlab.diagnosis.next.question import Layout, Question, Rival, build_layout, inseparable_rivals
+from armlab.diagnosis.next.question import CLEAR_SEPARATION, Layout, Question, Rival, build_layout, inseparable_rivals
+from armlab.effects.transmission import Transmission
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion
@@ -20,13 +21,12 @@ from problem.transforms import rotation_x
 LOAD_KG = 1.0
 LOAD_POSITION = (0.0, 0.0, 0.05)  # m, in the last link's frame
 TILT_DEG = 10.0
-DECISIVE_SEPARATION = 4.0  # standard errors that decide
 ENCODER_NOISE = 2e-5  # rad (m): noise of a second encoder
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """What would help. separation: in standard errors, infinite where nothing is left to doubt."""
+    """A measure that separates rivals. separation: standard errors between them with it."""
 
     what: str
     separation: float
@@ -35,7 +35,10 @@ class Remedy:
 def find_remedies(
     prepared: PreparedQuestions, question: Question, pair: tuple[int, int], motion: Motion, times: Array
 ) -> list[Remedy]:
-    """Remedies for a pair that help, the best first; each beside a run of this motion."""
+    """Remedies for a pair that separate it by more than one standard error, the best first.
+
+    motion, times: of a run in which the remedy is used.
+    """
     rivals = tuple(question.rivals[number] for number in pair)
     every = [
         *_remedy_by_load(prepared, question, rivals, motion, times),
@@ -57,8 +60,8 @@ def _remedy_by_load(
     body[-10:] = LOAD_KG * np.array(moments)
     loaded = replace(prepared.present, inertial=prepared.present.inertial + body)
     grams = [prepared.moments(each.scene(motion, times)).gram for each in (prepared.present, loaded)]
-    found = _pair_separation(rivals, question.free, prepared.layout.prior + grams[0] + grams[1])
-    yield Remedy(f"the motion with and without a known load of {LOAD_KG:g} kg at the flange", found)
+    separation = _pair_separation(rivals, question.free, prepared.layout.prior + grams[0] + grams[1])
+    yield Remedy(f"the motion with and without a known load of {LOAD_KG:g} kg at the flange", separation)
 
 
 def _remedy_by_tilt(
@@ -71,12 +74,12 @@ def _remedy_by_tilt(
     present = prepared.present
     other = build_layout(base, list(layout.candidates), present.scene(motion, times), prior)
     free = [each for each, at in zip(layout.candidates, layout.places, strict=True) if at[0] in question.free]
-    index = np.concatenate([np.arange(len(base)), *(other.of(each) for each in free)]).astype(np.intp)
+    index = np.concatenate([np.arange(len(base)), *(other.indices_of(each) for each in free)]).astype(np.intp)
     keep, sampling = prepared.sampling.filter(len(times)), prepared.sampling
     tilted = PresentModel(arm, present.inertial, present.parts)
     grams = [other.moments(each.scene(motion, times), keep, sampling).gram for each in (present, tilted)]
-    found = _pair_separation(tuple(_rival_in_layout(each, other) for each in rivals), index, grams[0] + grams[1])
-    yield Remedy(f"the motion on the level and with the base tilted by {TILT_DEG:g} degrees", found)
+    separation = _pair_separation(tuple(_rival_in_layout(each, other) for each in rivals), index, grams[0] + grams[1])
+    yield Remedy(f"the motion on the level and with the base tilted by {TILT_DEG:g} degrees", separation)
 
 
 def _tilt_base(arm: Arm) -> Arm:
@@ -85,7 +88,7 @@ def _tilt_base(arm: Arm) -> Arm:
 
 
 def _rival_in_layout(rival: Rival, layout: Layout) -> Rival:
-    return replace(rival, laws=tuple(replace(law, columns=layout.of(law.candidate)) for law in rival.laws))
+    return replace(rival, laws=tuple(replace(law, columns=layout.indices_of(law.candidate)) for law in rival.laws))
 
 
 def _pair_separation(rivals: tuple[Rival, ...], free: Index, gram: Array) -> float:
@@ -98,43 +101,45 @@ def _remedy_by_removal(
 ) -> Iterator[Remedy]:
     """The same motion with and without what a link carries: a load is gone then, a wrong link is still wrong."""
     for rival in rivals:
-        if rival.name.effect == "payload":
+        facts = rival.name.facts
+        if facts.where == "link" and not facts.in_links:
             with_it = prepared.moments(prepared.present.scene(motion, times)).gram
             without = with_it.copy()
             for law in rival.laws:
                 without[law.columns] = 0
                 without[:, law.columns] = 0
-            found = _pair_separation(rivals, question.free, prepared.layout.prior + with_it + without)
-            yield Remedy(f"the motion with and without the load on link {rival.name.joint}", found)
+            separation = _pair_separation(rivals, question.free, prepared.layout.prior + with_it + without)
+            yield Remedy(f"the motion with and without the load on link {rival.name.joint}", separation)
 
 
 def _remedy_by_data_sheet(rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
     """A value that the maker states."""
     for rival in rivals:
-        if rival.name.effect == "rotor_inertia":
-            size = abs(float(rival.values[0]))
-            told = (
-                f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to "
-                f"{size / DECISIVE_SEPARATION:.3g} kg m2"
-            )
-            yield Remedy(told, DECISIVE_SEPARATION)
+        armature = rival.laws[0].candidate.joint_fields(rival.values).get("armature")
+        if armature is not None:
+            accuracy = abs(armature) / CLEAR_SEPARATION
+            what = f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to {accuracy:.3g} kg m2"
+            yield Remedy(what, CLEAR_SEPARATION)
 
 
 def _remedy_by_encoder(
     prepared: PreparedQuestions, rivals: tuple[Rival, ...], motion: Motion, times: Array
 ) -> Iterator[Remedy]:
-    """An encoder behind the gear sees what the drive train gives."""
+    """An encoder behind the gear measures the twist of the drive train."""
     for rival in rivals:
-        named = rival.laws[0].candidate.parameters(rival.values)
-        joint = (rival.name.joint or 1) - 1
-        torque = prepared.present.scene(motion, times).torque[:, joint]
-        given: Array | None = None
-        if rival.name.effect == "joint_elasticity" and float(np.asarray(named["stiffness"])) > 0:
-            given = torque / float(np.asarray(named["stiffness"]))
-        elif rival.name.effect == "backlash":
-            given = np.sign(torque) * abs(float(np.asarray(named["gap"]))) / 2
-        if given is not None:
-            seen = float(np.sqrt(np.sum((given - given.mean()) ** 2))) / ENCODER_NOISE
-            yield Remedy(
-                f"a second encoder behind the gear of joint {joint + 1} with {ENCODER_NOISE:g} rad of noise", seen
+        candidate, size = rival.laws[0].candidate, float(rival.values[0])
+        if isinstance(candidate, Transmission) and size > 0:
+            torque = prepared.present.scene(motion, times).torque[:, candidate.index]
+            twist = size * _static_twist(candidate, torque)
+            separation = float(np.sqrt(np.sum((twist - twist.mean()) ** 2))) / ENCODER_NOISE
+            what = (
+                f"a second encoder behind the gear of joint {candidate.index + 1} with {ENCODER_NOISE:g} rad of noise"
             )
+            yield Remedy(what, separation)
+
+
+def _static_twist(candidate: Transmission, torque: Array) -> Array:
+    """Twist (samples,), rad (m), under a slow torque (samples,), N m (N), for a coefficient of one."""
+    law, coefficient = candidate.law
+    twist = np.sign(torque) * law.gap / 2 if law.gap > 0 else torque / law.stiffness
+    return np.asarray(twist / coefficient)

@@ -21,8 +21,7 @@ from armlab.diagnosis.next.moments import (
 from armlab.diagnosis.next.question import Law, Name, Rival, is_in_free_links
 from armlab.diagnosis.next.verdict_file import Finding
 from armlab.effects.contract import Candidate, Family, Scene
-from armlab.effects.drive import TORQUE_OFFSET
-from armlab.effects.friction import COULOMB_FRICTION, VISCOUS_FRICTION
+from armlab.effects.library import library
 from problem.arm import Arm
 
 MAX_SHAPES = 24  # of a law that are looked at
@@ -35,13 +34,13 @@ def name_of(candidate: Candidate) -> Name:
 
 
 def usual_friction(arm: Arm, scenes: Sequence[Scene]) -> list[Candidate]:
-    """Coulomb and viscous friction and an offset on every joint."""
-    families = (COULOMB_FRICTION, VISCOUS_FRICTION, TORQUE_OFFSET)
+    """The effects that every arm has, on every joint: Coulomb and viscous friction and an offset."""
+    families = [family for family in library() if family.facts.usual]
     return [shapes[0] for family in families for shapes in family.candidates(arm, scenes)]
 
 
 def restore_part(finding: Finding, arm: Arm, families: Sequence[Family]) -> FoundEffect | None:
-    """A finding as a candidate with its coefficients; None where its parameters do not say all."""
+    """A finding as a candidate with its coefficients; None where its parameters do not determine it."""
     place = finding.joints or (() if finding.name.joint is None else (finding.name.joint,))
     for family in families:
         if family.effect == finding.name.effect:
@@ -68,8 +67,8 @@ def alternative_laws(name: Name, offered: OfferedLaws) -> list[Candidate]:
     if not places:
         raise InputError(f"{name} leaves no trace in the torques of this arm")
     thinned = [[shapes[at] for at in _evenly_spaced(len(shapes))] for shapes in places]
-    found = [each for shapes in thinned for each in shapes]
-    return [each for each in found if not each.second_name] or found
+    laws = [each for shapes in thinned for each in shapes]
+    return [each for each in laws if not each.second_name] or laws
 
 
 def _offered_places(name: Name, offered: OfferedLaws) -> list[list[Candidate]]:
@@ -82,9 +81,9 @@ def _evenly_spaced(count: int) -> list[int]:
 
 
 MAX_LAWS = 3  # shapes of a rival that are kept: those that come closest
-MIN_BEYOND_NOISE = 2.0  # standard errors
+MIN_BEYOND_NOISE = 2.0  # standard errors: a smaller difference is noise
 SIZE_DRAWS = 12  # sizes that a rival may have
-SHARED_WEIGHT = 0.1  # of the weight is shared by all rivals alike: no likelihood is that sure
+SHARED_WEIGHT = 0.1  # of the weight, shared equally by all rivals, so that none is ruled out by its likelihood
 MAX_SHARE_OF_FINDING = 0.3  # of the finding's torque on rich motions: by how much a rival may differ from it
 
 
@@ -117,7 +116,10 @@ def choose_rivals(
 
 
 def _weight_rivals(rivals: tuple[Rival, ...], free: Index, seen: Moments) -> tuple[Rival, ...]:
-    """The same with what the recording says of each: likelihood, less what parameters gain by chance, and sizes."""
+    """The rivals with their weights and sizes after the recording.
+
+    A weight follows from the likelihood, less what the parameters gain by chance.
+    """
     fits = [[0.5 * explained_power(seen, free, law.columns) for law in rival.laws] for rival in rivals]
     likely = np.array([max(fit) - rival.laws[0].freedom for fit, rival in zip(fits, rivals, strict=True)])
     weights = np.exp(likely - likely.max())
@@ -127,7 +129,7 @@ def _weight_rivals(rivals: tuple[Rival, ...], free: Index, seen: Moments) -> tup
 
 
 def _draw_sizes(rival: Rival, fits: list[float], free: Index, seen: Moments) -> tuple[Array, ...]:
-    """Sizes for each law, more of those that fit better."""
+    """Draws of the coefficients of each law, more of a law that fits better."""
     share = np.exp(np.array(fits) - max(fits))
     counts = np.round(SIZE_DRAWS * share / share.sum()).astype(int).tolist()
     rng = np.random.default_rng(0)  # the same sizes for every motion that is judged
@@ -139,7 +141,7 @@ def _draw_sizes(rival: Rival, fits: list[float], free: Index, seen: Moments) -> 
 
 @dataclass(frozen=True, eq=False)
 class _FindingSignal:
-    """What the finding adds: columns times values, and its products with all columns."""
+    """The torque of the finding: its columns, their values, and its products (columns,) with all columns."""
 
     own: Index
     values: Array
@@ -147,9 +149,9 @@ class _FindingSignal:
 
 
 def _finding_signal(choices: list[RivalChoice], free: Index, seen: Moments) -> _FindingSignal:
-    found = next((each for each in choices if each.values is not None), None)
-    if found is not None and found.values is not None:
-        own, values = found.laws[0][1], found.values
+    sized = next((each for each in choices if each.values is not None), None)
+    if sized is not None and sized.values is not None:
+        own, values = sized.laws[0][1], sized.values
     else:
         own = max((columns for _, columns in choices[0].laws), key=lambda each: explained_power(seen, free, each))
         values = solve_least_squares(seen.gram, np.append(free, own), seen.vector)[len(free) :]
@@ -157,7 +159,7 @@ def _finding_signal(choices: list[RivalChoice], free: Index, seen: Moments) -> _
 
 
 def explained_power(seen: Moments, free: Index, columns: Index) -> float:
-    """What a law explains of the recording, together with what is free: standard errors squared."""
+    """Power of the recording that a law and the free columns explain together, in standard errors squared."""
     chosen = np.append(free, columns)
     return float(solve_least_squares(seen.gram, chosen, seen.vector) @ seen.vector[chosen])
 
@@ -189,10 +191,11 @@ def _build_rival(
 
 
 def _fit_size(columns: Index, free: Index, seen: Moments, rich: Array, signal: _FindingSignal, recorded: bool) -> Array:
-    """As fitted to the recording where that differs from the finding by more than noise, else its best imitation.
+    """Coefficients (columns,) of a rival that the verdict did not find.
 
-    What a poor recording hardly shows is fitted far too large: on rich motions the difference is no more than a share
-    of the finding.
+    They are fitted to the recording where this differs from the finding by more than noise. Else they imitate the
+    finding as well as they can. A recording that hardly excites the difference fits it far too large, so on rich
+    motions the difference is limited to a share of the finding.
     """
     chosen = np.append(free, columns)
     imitation = solve_least_squares(seen.gram, chosen, signal.products)[len(free) :]
@@ -207,7 +210,7 @@ def _fit_size(columns: Index, free: Index, seen: Moments, rich: Array, signal: _
 
 
 def _build_law(candidate: Candidate, columns: Index, free: Index, gram: Array, library_places: int, joints: int) -> Law:
-    """A law; what every arm has is no surprise, everything else was looked for in many places, if in any."""
+    """A law with its price: a usual effect counts as one look, any other as one of all places of the library."""
     own = count_independent(gram, columns, free) if library_places else 0
     looks = 1 if candidate.facts.usual else library_places * candidate.looks
     freedom = own + len(candidate.shape) if own else 0

@@ -52,17 +52,19 @@ class SecondMotion:
 
 def write_diagnosis(recording: Path, out: Path) -> None:
     """Writes the verdict about a recording and its model into `out`."""
-    found = diagnose(load_recording(recording))
-    write_texts(verdict_texts(found, out), out)
+    diagnosis = diagnose(load_recording(recording))
+    write_texts(verdict_texts(diagnosis, out), out)
 
 
 def suspect_rivals(verdict: Path, robot: Path, recording: Path) -> tuple[RivalGroup, ...]:
-    """Groups of names between which the recording leaves doubt, the whole library asked."""
+    """Groups of names, of the whole library, between which the recording leaves doubt."""
     arm, loaded, budget = load_arm(str(robot)), load_recording(recording), Budget()
-    plain = build_excitation_problem(arm, limits_in_force(arm, loaded), budget)
-    read = read_verdict(verdict)
+    excitation = build_excitation_problem(arm, limits_in_force(arm, loaded), budget)
+    loaded_verdict = read_verdict(verdict)
     try:
-        return choose_rival_groups(read, arm, plain, loaded, WHOLE_LIBRARY, infer_link_knowledge(read, arm), budget)
+        return choose_rival_groups(
+            loaded_verdict, arm, excitation, loaded, WHOLE_LIBRARY, infer_link_knowledge(loaded_verdict, arm), budget
+        )
     except InputError:
         return ()
 
@@ -75,23 +77,23 @@ def design_second_motion(
     All kinds share limits, duration, harmonics and number of evaluations.
     """
     arm, loaded = load_arm(str(robot)), load_recording(recording)
-    plain = build_excitation_problem(arm, limits_in_force(arm, loaded), budget)
+    excitation = build_excitation_problem(arm, limits_in_force(arm, loaded), budget)
     problem = _build_problem(verdict, arm, loaded, budget)
     if kind == "random":
-        point = random_point(plain, budget)
+        point = random_point(excitation, budget)
     elif kind == "condition":
-        point = search_motion(plain, budget)
+        point = search_motion(excitation, budget)
     elif problem is None:
         return None
     else:
         point = search_motion(problem, budget)
     return SecondMotion(
-        _sample_motion(plain, point), () if problem is None else _expected_decisions(problem, point, budget)
+        _sample_motion(excitation, point), () if problem is None else _expected_decisions(problem, point, budget)
     )
 
 
 def _build_problem(verdict: Path, arm: Arm, recording: Recording, budget: Budget) -> TellApartProblem | None:
-    """Between the rivals of the verdict, else between all names that come near; None where no motion helps."""
+    """The problem between the rivals of the verdict, else between all names near a finding; None if no motion helps."""
     for rivals in (None, WHOLE_LIBRARY):
         try:
             return tell_apart_problem(*prepare_experiment(verdict, arm, recording, rivals, budget, None))
@@ -113,7 +115,7 @@ def _expected_decisions(
     )
 
 
-def _sample_motion(plain: ExcitationProblem, point: Array) -> Array:
-    times = sample_instants(plain.duration, round(plain.duration * MOTION_RATE_HZ) + 1)
-    motion = plain.trajectory.motions(point[None], times).motion
+def _sample_motion(excitation: ExcitationProblem, point: Array) -> Array:
+    times = sample_instants(excitation.duration, round(excitation.duration * MOTION_RATE_HZ) + 1)
+    motion = excitation.trajectory.motions(point[None], times).motion
     return np.column_stack([times, motion.position[0]])

@@ -12,7 +12,8 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.formats import FindingEntry, Value, read_verdict_file
 from armlab.diagnosis.next.question import Name
-from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 from armlab.identification.model_file import read_model_file
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -96,7 +97,7 @@ def select_rival_groups(verdict: VerdictWithModel, named: str | None) -> tuple[R
     if named:
         return (_parse_rivals(verdict, named),)
     groups = [_names_of_finding(finding) for finding in verdict.findings if finding.rivals]
-    groups = [group for group in groups if len(group) > 1 and group[0].effect != "unknown"]
+    groups = [group for group in groups if len(group) > 1 and group[0].effect != UNKNOWN.id]
     unique = {frozenset(group): group for group in reversed(groups)}
     if not unique:
         raise InputError(
@@ -118,20 +119,20 @@ def _parse_rivals(verdict: VerdictWithModel, named: str) -> RivalGroup:
 
 
 def _parse_rival_name(effect: str, joint: str, place: int | None, verdict: VerdictWithModel) -> Name:
-    if effect not in EFFECT_IDS or effect == "unknown":
-        try:
-            effect_named(effect)
-        except ValueError as error:
-            raise InputError(f"--rivals: {error}") from None
-        raise InputError("--rivals: 'unknown' has no columns to design a motion for")
-    if effect_named(effect).where == "robot":
+    try:
+        facts = effect_named(effect)
+    except ValueError as error:
+        raise InputError(f"--rivals: {error}") from None
+    if facts == UNKNOWN:
+        raise InputError(f"--rivals: '{UNKNOWN.id}' has no columns to design a motion for")
+    if facts.where == "robot":
         return Name(effect, None)
     if joint:
         if not joint.isdigit() or not 1 <= int(joint) <= max(len(verdict.noise), 1):
             raise InputError(f"--rivals {effect}@{joint}: the joint should be a number from 1 to {len(verdict.noise)}")
         return Name(effect, int(joint))
     own: Sequence[int | None] = [each.name.joint for each in verdict.findings if each.name.effect == effect]
-    found = own[0] if own else place
-    if found is None:
+    chosen = own[0] if own else place
+    if chosen is None:
         raise InputError(f"--rivals: at which joint? write {effect}@2 for joint 2")
-    return Name(effect, found)
+    return Name(effect, chosen)

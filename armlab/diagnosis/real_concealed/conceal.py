@@ -10,6 +10,7 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.diagnosis.real_concealed.plan import Disturbance, Piece, PieceKind
 from armlab.effects.contract import Candidate
+from armlab.effects.library import library
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.identifier import Identifier
 from armlab.identification.real.study import Recipe
@@ -23,23 +24,22 @@ from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
 
 MIXED_LAWS = ("direction", "cube root", "square", "load")
-"""Laws of the same velocity or load that predict a little better in sums, and of which none means anything alone: a
-law that is to be named has to stand for something."""
+"""Laws of velocity or load that only improve a sum of laws. None is an effect by itself, so none can be named."""
 
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """A recording and its complete model. told: how that was chosen, in a line."""
+    """A recording and its complete model. description: how the model was chosen, in a line."""
 
     recording: Recording
     model: TorqueModel
-    told: str
+    description: str
 
 
 def identify_reference(recording: Recording, recipe: Recipe) -> Reference:
     """Components, filters and prior by blocked cross-validation; links are bodies that can exist.
 
-    A diagnosis weighs how far links may be off in the metric of their pseudo-inertias, so it wants links, not base
+    The diagnosis measures errors of links in the metric of their pseudo-inertias, so it needs links, not base
     parameters.
     """
     arm, runs = recording.arm, recording.with_role("identify")
@@ -57,28 +57,20 @@ LAWS_BY_KIND: dict[PieceKind, tuple[str, ...]] = {
     "counterbalance": ("gravity_compensator",),
     "payload": (),
 }
-FRICTION_LAWS = (
-    *LAWS_BY_KIND["friction"],
-    "stribeck_friction",
-    "asymmetric_friction",
-    "load_dependent_friction",
-    "presliding_hysteresis",
-    "friction_drift",
-)
-INSEPARABLE_EFFECTS = {  # what no motion separates, or what goes by either name
-    "payload": ("inertial_parameter_error",),
-    "gravity_compensator": ("cable_stiffness",),
-    "cable_stiffness": ("gravity_compensator",),
-}
+EQUIVALENT_NAMES = {"inertial_parameter_error": "payload", "gravity_compensator": "cable_stiffness"}
+"""What no motion separates, or what goes by either name; both count as the second one."""
+EQUIVALENT_AT_ONLY_JOINT = {"channel_skew": "time_delay", "rotor_inertia": "payload"}
+"""The same at the only joint of an arm."""
 KnownNumber = tuple[float, tuple[float, float] | None]
 
 
 @dataclass(frozen=True)
 class SoughtEffect:
-    """What should be named. effects: any of these; joints: (joint,), (link,), a coupling's pair, or () for the arm.
+    """What should be named.
 
-    numbers: by effect and parameter the true or the reference's value, and the reference's 95 % interval. identical:
-    other effects that these data cannot tell from it. laws: other effects of the same kind.
+    effects: ids, any of which answers. joints: (joint,), (link,), (joint, driving joint), or () for the whole arm.
+    numbers: by effect and parameter the value that is true or of the reference, and the 95 % interval of the reference.
+    identical: other effects that no motion separates from it. laws: other effects of the same kind.
     """
 
     label: str
@@ -87,6 +79,18 @@ class SoughtEffect:
     numbers: dict[str, dict[str, KnownNumber]]
     identical: tuple[str, ...] = ()
     laws: tuple[str, ...] = ()
+
+
+def equivalent_effects(effect: str) -> tuple[str, ...]:
+    """The other effects that count as this one at any joint."""
+    common = EQUIVALENT_NAMES.get(effect, effect)
+    alike = (common, *(name for name, other in EQUIVALENT_NAMES.items() if other == common))
+    return tuple(name for name in alike if name != effect)
+
+
+def friction_laws() -> tuple[str, ...]:
+    """All effects of the library that take energy from the motion, those of plug-ins included."""
+    return tuple(family.effect for family in library() if family.facts.dissipates)
 
 
 def withhold_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> TorqueModel:
@@ -126,11 +130,13 @@ def sought_of_pieces(model: TorqueModel, pieces: tuple[Piece, ...]) -> tuple[Sou
 
 def _sought_laws(model: TorqueModel, piece: Piece) -> tuple[SoughtEffect, ...]:
     parts = model.structure.components
-    found: dict[tuple[int, ...], dict[str, dict[str, KnownNumber]]] = {}
+    numbers_by_place: dict[tuple[int, ...], dict[str, dict[str, KnownNumber]]] = {}
     for index in _part_indices(model, piece):
-        told = dict(_known_number(each) for each in model.component_parameters(index))
-        found.setdefault(parts[index].joints, {})[parts[index].effect] = told
-    return tuple(_build_sought(_piece_label(piece, joints), joints, told) for joints, told in found.items())
+        numbers = dict(_known_number(each) for each in model.component_parameters(index))
+        numbers_by_place.setdefault(parts[index].joints, {})[parts[index].effect] = numbers
+    return tuple(
+        _build_sought(_piece_label(piece, joints), joints, numbers) for joints, numbers in numbers_by_place.items()
+    )
 
 
 def _known_number(parameter: ParameterValue) -> tuple[str, KnownNumber]:
@@ -140,12 +146,13 @@ def _known_number(parameter: ParameterValue) -> tuple[str, KnownNumber]:
     return parameter.name, (float(np.sum(parameter.value)), pair)
 
 
-def _build_sought(label: str, joints: tuple[int, ...], told: dict[str, dict[str, KnownNumber]]) -> SoughtEffect:
-    """numbers of a spring hold under either of its names."""
-    same = tuple(other for effect in told for other in INSEPARABLE_EFFECTS.get(effect, ()))
-    numbers = told | {other: told[effect] for effect in told for other in INSEPARABLE_EFFECTS.get(effect, ())}
-    laws = tuple(each for each in FRICTION_LAWS if each not in told) if set(told) <= set(FRICTION_LAWS) else ()
-    return SoughtEffect(label, tuple(told), joints, numbers, same, laws)
+def _build_sought(label: str, joints: tuple[int, ...], known: dict[str, dict[str, KnownNumber]]) -> SoughtEffect:
+    """A spring or a body keeps its numbers under each of its equivalent names. known: by effect and parameter."""
+    same = tuple(other for effect in known for other in equivalent_effects(effect))
+    numbers = known | {other: known[effect] for effect in known for other in equivalent_effects(effect)}
+    friction = friction_laws()
+    laws = tuple(each for each in friction if each not in known) if set(known) <= set(friction) else ()
+    return SoughtEffect(label, tuple(known), joints, numbers, same, laws)
 
 
 def _piece_label(piece: Piece, joints: tuple[int, ...]) -> str:
@@ -153,14 +160,17 @@ def _piece_label(piece: Piece, joints: tuple[int, ...]) -> str:
 
 
 def _sought_load(model: TorqueModel) -> tuple[SoughtEffect, ...]:
-    """The load is what the last link has more than its maker's; its interval that of the base parameter it is in."""
+    """The load: the last link as identified, less the link of its maker.
+
+    The interval of its mass is that of the base parameter which contains this mass.
+    """
     more = _model_links(model)[-10:] - model.arm.parameters[-10:]
     link, base = len(model.arm), model.structure.base
     place = int(np.flatnonzero(base.grouping[:, -10])[0])
     half = np.nan if model.covariance is None else model.factor * float(np.sqrt(model.covariance[place, place]))
     mass = float(more[0])
-    told: dict[str, dict[str, KnownNumber]] = {"payload": {"mass": (mass, (mass - half, mass + half))}}
-    return (_build_sought(f"payload, link {link}", (link,), told),)
+    numbers: dict[str, dict[str, KnownNumber]] = {"payload": {"mass": (mass, (mass - half, mass + half))}}
+    return (_build_sought(f"payload, link {link}", (link,), numbers),)
 
 
 def _model_links(model: TorqueModel) -> Array:
@@ -170,10 +180,10 @@ def _model_links(model: TorqueModel) -> Array:
 
 
 def _part_indices(model: TorqueModel, piece: Piece) -> list[int]:
-    def lost(part: Candidate) -> bool:
+    def is_withheld(part: Candidate) -> bool:
         return part.effect in LAWS_BY_KIND[piece.kind] and piece.joint in (None, part.joint)
 
-    return [index for index, part in enumerate(model.structure.components) if lost(part)]
+    return [index for index, part in enumerate(model.structure.components) if is_withheld(part)]
 
 
 MAIN_PARAMETER = {
@@ -181,6 +191,8 @@ MAIN_PARAMETER = {
     "cable_stiffness": "stiffness",
     "time_delay": "seconds",
     "viscous_friction": "coefficient",
+    "channel_skew": "seconds",
+    "rotor_inertia": "inertia",
 }
 
 
@@ -207,12 +219,12 @@ def sought_of_disturbance(what: Disturbance, joints: int) -> SoughtEffect:
     size: dict[str, KnownNumber] = {MAIN_PARAMETER[what.effect]: (what.size, None)}
     numbers: dict[str, dict[str, KnownNumber]] = {what.effect: size}
     place = () if what.joint is None else (what.joint,)
-    same: tuple[str, ...] = INSEPARABLE_EFFECTS.get(what.effect, ())
+    same = equivalent_effects(what.effect)
     numbers |= dict.fromkeys(same, size)
-    if joints == 1 and what.effect == "time_delay":
-        same, numbers["channel_skew"] = ("channel_skew",), size
-    if joints == 1 and what.effect == "payload":
-        same, numbers["rotor_inertia"] = (*same, "rotor_inertia"), {"inertia": (what.size, None)}
+    if joints == 1:
+        alike = tuple(name for name, other in EQUIVALENT_AT_ONLY_JOINT.items() if other == what.effect)
+        same += alike
+        numbers |= {name: {MAIN_PARAMETER[name]: (what.size, None)} for name in alike}
     return SoughtEffect(str(what), (what.effect,), place, numbers, same)
 
 

@@ -27,6 +27,7 @@ from armlab.diagnosis.real_concealed.conceal import (
 )
 from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.contract import UNKNOWN
 from armlab.identification.model_file import write_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Recording
@@ -54,7 +55,7 @@ class Rival:
 
 @dataclass(frozen=True)
 class ReportedFinding:
-    """A finding. joints: as in `Sought`."""
+    """A finding. joints: as in `SoughtEffect`."""
 
     effect: str
     joints: tuple[int, ...]
@@ -65,15 +66,16 @@ class ReportedFinding:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one case, on the runs that took no part, each joint's RMS in N m (N) of the filtered torque.
+    """The outcome of one case: findings, and the RMS of each joint in N m (N), on the runs that took no part.
 
-    given: error of the simulation that was handed over. named: with every named finding; found: with surrogates of what
-    is unknown as well. hidden: of the torque of what is concealed. torque: as measured. recovered: share of the hidden
-    torque that findings with a name sought for it hold, None in a control.
+    given: of the error of the simulation that was handed over. named: of the error with every named finding. found: of
+    the error with the surrogates of unknown structure, too. hidden: of the torque that is concealed. torque: of the
+    filtered torque as measured. recovered: share of the hidden torque that the findings sought explain; None in a
+    control.
     """
 
     case: str
-    said: tuple[ReportedFinding, ...]
+    findings: tuple[ReportedFinding, ...]
     given: tuple[float, ...]
     named: tuple[float, ...]
     found: tuple[float, ...]
@@ -102,9 +104,6 @@ def _joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
     return joints if len(joints) > 1 else (joint,)
 
 
-UNKNOWN_EFFECT = "unknown"
-
-
 def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> Outcome:
     """The outcome of a case. path: where the simulation that is handed over is written."""
     recording, handed = reference.recording, withhold_pieces(reference.model, case.withheld)
@@ -114,9 +113,9 @@ def examine_case(reference: Reference, case: Case, path: Path, progress: Callabl
     if case.injected is not None:
         pairs = [add_disturbance(run, recording.arm, case.injected) for run in runs]
         runs, added = tuple(run for run, _ in pairs), [torque for _, torque in pairs]
-    found = diagnose(replace(recording, runs=runs, simulation=path), "nominal", progress=progress)
+    diagnosis = diagnose(replace(recording, runs=runs, simulation=path), "nominal", progress=progress)
     return _measure_outcome(
-        case, found, _concealed_torque(found, reference.model, handed, added), sought_in_case(reference, case)
+        case, diagnosis, _concealed_torque(diagnosis, reference.model, handed, added), sought_in_case(reference, case)
     )
 
 
@@ -128,12 +127,12 @@ def sought_in_case(reference: Reference, case: Case) -> tuple[SoughtEffect, ...]
 
 
 def _concealed_torque(
-    found: Diagnosis, whole: TorqueModel, handed: TorqueModel, added: Sequence[Array] | None
+    diagnosis: Diagnosis, whole: TorqueModel, handed: TorqueModel, added: Sequence[Array] | None
 ) -> Array:
     """Torque of what is concealed at the kept rows, (rows, joints)."""
-    if found.observed is None:
-        raise InputError(f"{found.recording.name}: {found.summary}")
-    signals = found.observed.signals
+    if diagnosis.observed is None:
+        raise InputError(f"{diagnosis.recording.name}: {diagnosis.summary}")
+    signals = diagnosis.observed.signals
     if added is None:
         parts = [whole.filtered_torque(each) - handed.filtered_torque(each) for each in signals]
     else:
@@ -141,21 +140,28 @@ def _concealed_torque(
     return np.concatenate(parts)
 
 
-def _measure_outcome(case: Case, found: Diagnosis, hidden: Array, wanted: tuple[SoughtEffect, ...]) -> Outcome:
-    assert found.observed is not None
-    assert found.nominal is not None
-    assert found.final is not None
-    rows = rows_in(found.observed.of_role("validate"), found.observed.rows)
-    named = found.final + sum((each.prediction for each in found.claims if each.effect == UNKNOWN_EFFECT), np.zeros(1))
-    answers = [each.prediction for each in found.claims if is_sought_kind(each, wanted)]
-    left = hidden[rows] - sum((each[rows] for each in answers), np.zeros(1))
-    power = float(np.sum(hidden[rows] ** 2))
-    given, after, final, size, torque = (
-        _rms(each[rows]) for each in (found.nominal, named, found.final, hidden, found.observed.torque)
+def _measure_outcome(case: Case, diagnosis: Diagnosis, hidden: Array, wanted: tuple[SoughtEffect, ...]) -> Outcome:
+    assert diagnosis.observed is not None
+    assert diagnosis.nominal is not None
+    assert diagnosis.final is not None
+    rows = rows_in(diagnosis.observed.of_role("validate"), diagnosis.observed.rows)
+    named = diagnosis.final + sum(
+        (each.prediction for each in diagnosis.claims if each.effect == UNKNOWN.id), np.zeros(1)
     )
-    recovered = 1 - float(np.sum(left**2)) / power if power > 0 else None
-    said = tuple(summarise_claim(each) for each in found.claims)
-    return Outcome(case.name, said, given, after, final, size, torque, recovered, found.seconds)
+    predictions = [each.prediction for each in diagnosis.claims if is_sought_kind(each, wanted)]
+    left = hidden[rows] - sum((each[rows] for each in predictions), np.zeros(1))
+    power = float(np.sum(hidden[rows] ** 2))
+    return Outcome(
+        case=case.name,
+        findings=tuple(summarise_claim(each) for each in diagnosis.claims),
+        given=_rms(diagnosis.nominal[rows]),
+        named=_rms(named[rows]),
+        found=_rms(diagnosis.final[rows]),
+        hidden=_rms(hidden[rows]),
+        torque=_rms(diagnosis.observed.torque[rows]),
+        recovered=1 - float(np.sum(left**2)) / power if power > 0 else None,
+        seconds=diagnosis.seconds,
+    )
 
 
 def is_sought_kind(claim: Claim, wanted: tuple[SoughtEffect, ...]) -> bool:
@@ -180,7 +186,7 @@ class OutcomeStore:
     code: str
 
     def place(self, case: Case, recording: Recording) -> Path:
-        """Where an outcome stands."""
+        """The file of an outcome."""
         key = hashlib.sha256(f"{self.code} {case!r}".encode())
         for run in recording.runs:
             key.update(f"{run.name} {run.role}".encode())
@@ -189,7 +195,7 @@ class OutcomeStore:
         return self.folder / f"{case.recording}-{key.hexdigest()[:20]}.json"
 
     def read(self, case: Case, recording: Recording) -> Outcome | None:
-        """The outcome, if it is there and whole."""
+        """The stored outcome; None where there is none or its file is damaged."""
         try:
             return OUTCOME_ADAPTER.validate_json(self.place(case, recording).read_bytes())
         except (FileNotFoundError, ValidationError):

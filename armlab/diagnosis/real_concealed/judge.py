@@ -5,24 +5,27 @@ from typing import Literal
 
 import numpy as np
 
-from armlab.diagnosis.real_concealed.conceal import KnownNumber, SoughtEffect
+from armlab.diagnosis.real_concealed.conceal import (
+    EQUIVALENT_AT_ONLY_JOINT,
+    EQUIVALENT_NAMES,
+    KnownNumber,
+    SoughtEffect,
+)
 from armlab.diagnosis.real_concealed.examine import Outcome, ParameterSize, ReportedFinding, Span
 from armlab.diagnosis.real_concealed.plan import Case
 
 Answer = Literal["named", "identical", "law", "class", "cancelled", "elsewhere", "missed"]
 Findings = tuple[ReportedFinding, ...]
 MAX_CLASS_RIVALS = 3  # of a class that counts as an answer
-EQUIVALENT_NAMES = {"inertial_parameter_error": "payload", "gravity_compensator": "cable_stiffness"}
-EQUIVALENT_AT_ONLY_JOINT = {"channel_skew": "time_delay", "rotor_inertia": "payload"}  # at the only joint of an arm
 UNCOMPARED_PARAMETERS = ("exponent", "rest")  # parameters that are not compared: they mean little without the others
 
 
 @dataclass(frozen=True)
 class ComparedNumber:
-    """A number that is known and what was found of it.
+    """A known number and the one that was found.
 
-    holds: whether the interval found has it, or overlaps that of the reference; None without one, and where other laws
-    were found than were withheld, which share the torque in other ways.
+    holds: whether the interval found contains the known number, or overlaps its interval. None without an interval, and
+    where the laws found are not those withheld: other laws share the same torque in another way.
     """
 
     effect: str
@@ -33,30 +36,32 @@ class ComparedNumber:
 
 @dataclass(frozen=True)
 class JudgedPart:
-    """One thing that was sought. answer: its name at its place; a name that no motion separates from it; another law of
-    its kind there; among the rivals of a finding; what the control names there is gone, which it cancels; its name at
-    another place; or nothing of that.
+    """One thing that was sought, and how a diagnosis answered.
+
+    named: its name at its place. identical: a name that no motion separates from it. law: another law of its kind
+    there. class: among the rivals of a finding. cancelled: a finding of the control there is gone, because the two add
+    to less. elsewhere: its name at another place. missed: none of these.
     """
 
     sought: SoughtEffect
     answer: Answer
-    said: ReportedFinding | None
+    finding: ReportedFinding | None
     numbers: tuple[ComparedNumber, ...]
 
 
 @dataclass(frozen=True)
 class CaseVerdict:
-    """A case in full.
+    """A case with all its answers.
 
     laws: further laws of a kind that was withheld at that joint. others: all other findings that are neither sought nor
-    in the control. shows: the joint, from 1, where what is concealed is largest beside the error of the reference;
-    strength: how large. gap: share of the gap that named findings close
-    there, from the simulation handed over to what is left in the control.
+    in the control. joint_shown: the joint, from 1, at which the concealed torque is largest relative to the error of
+    the reference. strength: this ratio. gap: share of the error there that named findings remove, from the simulation
+    handed over (0) to what is left in the control (1).
     """
 
     case: Case
     outcome: Outcome
-    judged: tuple[JudgedPart, ...]
+    parts: tuple[JudgedPart, ...]
     others: tuple[ReportedFinding, ...]
     laws: tuple[ReportedFinding, ...]
     joint_shown: int
@@ -65,20 +70,20 @@ class CaseVerdict:
 
 
 def judge_case(case: Case, outcome: Outcome, wanted: tuple[SoughtEffect, ...], control: Outcome) -> CaseVerdict:
-    """Judges a case."""
-    court = _Judge(control, len(outcome.given))
-    fresh = tuple(each for each in outcome.said if not court.is_in_control(each))
-    free = tuple(each for each in fresh if not any(court.answers(each, one) for one in wanted))
-    judged = tuple(court.judged(each, outcome.said, fresh, free) for each in wanted)
-    used = {id(each.said) for each in judged}
-    new = [each for each in free if id(each) not in used and not court.before(each)]
-    laws = tuple(each for each in new if any(_is_same_kind(each, one) for one in wanted))
-    others = tuple(each for each in new if each not in laws)
+    """Judges a case. wanted: what should be named. control: the outcome with nothing concealed."""
+    judge = _Judge(control, len(outcome.given))
+    new = tuple(each for each in outcome.findings if not judge.is_in_control(each))
+    unsought = tuple(each for each in new if not any(judge.answers(each, one) for one in wanted))
+    parts = tuple(judge.judge_part(each, outcome.findings, new, unsought) for each in wanted)
+    used = {id(each.finding) for each in parts}
+    left = [each for each in unsought if id(each) not in used and not judge.findings_in_control(each)]
+    laws = tuple(each for each in left if any(_is_same_kind(each, one) for one in wanted))
+    others = tuple(each for each in left if each not in laws)
     over = np.array(outcome.hidden) / np.array(control.given)
     joint = int(np.argmax(over))
     before, after, floor = outcome.given[joint], outcome.named[joint], control.named[joint]
     gap = (before - after) / (before - floor) if wanted and before > floor else None
-    return CaseVerdict(case, outcome, judged, others, laws, joint + 1, float(over[joint]), gap)
+    return CaseVerdict(case, outcome, parts, others, laws, joint + 1, float(over[joint]), gap)
 
 
 @dataclass(frozen=True)
@@ -88,80 +93,89 @@ class _Judge:
     control: Outcome
     joints: int
 
-    def key(self, effect: str, joints: tuple[int, ...]) -> tuple[str, tuple[int, ...]]:
-        """The same for names that nothing separates at a place."""
+    def common_key(self, effect: str, joints: tuple[int, ...]) -> tuple[str, tuple[int, ...]]:
+        """Effect and joints, equal for two names that nothing separates at a place."""
         one = EQUIVALENT_NAMES.get(effect, effect)
         return (EQUIVALENT_AT_ONLY_JOINT.get(one, one), ()) if self.joints == 1 else (one, joints)
 
-    def before(self, said: ReportedFinding) -> list[ReportedFinding]:
+    def findings_in_control(self, finding: ReportedFinding) -> list[ReportedFinding]:
         """What the control says of the same effect at the same place."""
-        wanted = self.key(said.effect, said.joints)
-        return [each for each in self.control.said if self.key(each.effect, each.joints) == wanted]
+        wanted = self.common_key(finding.effect, finding.joints)
+        return [each for each in self.control.findings if self.common_key(each.effect, each.joints) == wanted]
 
-    def is_in_control(self, said: ReportedFinding) -> bool:
+    def is_in_control(self, finding: ReportedFinding) -> bool:
         """Whether the control says the same, its numbers within the intervals found here."""
-        old = {size.name: size.value for each in self.before(said) for size in each.sizes}
-        pairs = [(old[size.name], size.interval) for size in said.sizes if size.name in old]
-        return bool(self.before(said)) and all(span is None or span[0] <= value <= span[1] for value, span in pairs)
+        old = {size.name: size.value for each in self.findings_in_control(finding) for size in each.sizes}
+        pairs = [(old[size.name], size.interval) for size in finding.sizes if size.name in old]
+        return bool(self.findings_in_control(finding)) and all(
+            span is None or span[0] <= value <= span[1] for value, span in pairs
+        )
 
-    def answers(self, said: ReportedFinding, sought: SoughtEffect) -> bool:
+    def answers(self, finding: ReportedFinding, sought: SoughtEffect) -> bool:
         """Whether a finding has a name that is sought, at the place."""
-        keys = {self.key(effect, sought.joints) for effect in (*sought.effects, *sought.identical)}
-        return self.key(said.effect, said.joints) in keys
+        keys = {self.common_key(effect, sought.joints) for effect in (*sought.effects, *sought.identical)}
+        return self.common_key(finding.effect, finding.joints) in keys
 
-    def judged(self, sought: SoughtEffect, said: Findings, fresh: Findings, free: Findings) -> JudgedPart:
-        """The answer to one thing that is sought. fresh: what the control does not say; free: and nobody sought."""
-        own = [each for each in fresh if self.answers(each, sought)]
-        named = [each for each in own if each.effect in sought.effects]
-        if own:
+    def judge_part(self, sought: SoughtEffect, findings: Findings, new: Findings, unsought: Findings) -> JudgedPart:
+        """The answer to one thing that is sought.
+
+        findings: all of the case. new: those that the control does not have. unsought: those of them with a name that
+        is not sought at that place.
+        """
+        answering = [each for each in new if self.answers(each, sought)]
+        named = [each for each in answering if each.effect in sought.effects]
+        if answering:
             same = {each.effect for each in named} in ({*sought.effects}, set())
-            numbers = tuple(held for each in own for held in self.numbers(sought, each, same))
-            return JudgedPart(sought, "named" if named else "identical", (named or own)[0], numbers)
-        kin = [each for each in free if _is_same_kind(each, sought)]
-        if kin:
-            return JudgedPart(sought, "law", kin[0], ())
-        for each in free:
+            numbers = tuple(held for each in answering for held in self.compare_numbers(sought, each, same))
+            return JudgedPart(sought, "named" if named else "identical", (named or answering)[0], numbers)
+        same_kind = [each for each in unsought if _is_same_kind(each, sought)]
+        if same_kind:
+            return JudgedPart(sought, "law", same_kind[0], ())
+        for each in unsought:
             names = {(rival.effect, rival.joints) for rival in each.rivals}
             if len(each.rivals) <= MAX_CLASS_RIVALS and any(
                 (effect, sought.joints) in names for effect in sought.effects
             ):
                 return JudgedPart(sought, "class", each, ())
-        if self.is_cancelled(sought, said):
+        if self.is_cancelled(sought, findings):
             return JudgedPart(sought, "cancelled", None, ())
         wanted = (*sought.effects, *sought.identical)
-        away = [each for each in free if each.effect in wanted and not self.before(each)]
-        if not away:
+        elsewhere = [each for each in unsought if each.effect in wanted and not self.findings_in_control(each)]
+        if not elsewhere:
             return JudgedPart(sought, "missed", None, ())
-        return JudgedPart(sought, "elsewhere", away[0], tuple(self.numbers(sought, away[0], False)))
+        return JudgedPart(sought, "elsewhere", elsewhere[0], tuple(self.compare_numbers(sought, elsewhere[0], False)))
 
-    def is_cancelled(self, sought: SoughtEffect, said: Findings) -> bool:
+    def is_cancelled(self, sought: SoughtEffect, findings: Findings) -> bool:
         """Whether less should be left of what the control names there, and nothing of it is named now."""
-        if any(self.answers(each, sought) for each in said):
+        if any(self.answers(each, sought) for each in findings):
             return False
-        for each in (each for each in self.control.said if self.answers(each, sought)):
+        for each in (each for each in self.control.findings if self.answers(each, sought)):
             for size in each.sizes:
                 truth = sought.numbers.get(each.effect, {}).get(size.name)
                 if truth is not None and abs(size.value + truth[0]) < abs(size.value):
                     return True
         return False
 
-    def numbers(self, sought: SoughtEffect, said: ReportedFinding, same: bool) -> list[ComparedNumber]:
-        """Numbers beside what is known; what the control says already is taken off. same: if they can be judged."""
-        old = {size.name: size.value for each in self.before(said) for size in each.sizes}
-        out = []
-        for size in said.sizes:
-            truth = sought.numbers.get(said.effect, {}).get(size.name)
+    def compare_numbers(self, sought: SoughtEffect, finding: ReportedFinding, same: bool) -> list[ComparedNumber]:
+        """Numbers beside what is known, less the number of the control. same: whether their intervals can be judged."""
+        old = {size.name: size.value for each in self.findings_in_control(finding) for size in each.sizes}
+        compared = []
+        for size in finding.sizes:
+            truth = sought.numbers.get(finding.effect, {}).get(size.name)
             if truth is None or size.name in UNCOMPARED_PARAMETERS:
                 continue
-            off = old.get(size.name, 0.0)
-            span = None if size.interval is None else (size.interval[0] - off, size.interval[1] - off)
-            own = ParameterSize(size.name, size.value - off, span, size.unit)
-            out.append(ComparedNumber(said.effect, truth, own, _interval_holds(span, truth) if same else None))
-        return out
+            control_value = old.get(size.name, 0.0)
+            span = None
+            if size.interval is not None:
+                span = size.interval[0] - control_value, size.interval[1] - control_value
+            beyond = ParameterSize(size.name, size.value - control_value, span, size.unit)
+            holds = _interval_holds(span, truth) if same else None
+            compared.append(ComparedNumber(finding.effect, truth, beyond, holds))
+        return compared
 
 
-def _is_same_kind(said: ReportedFinding, sought: SoughtEffect) -> bool:
-    return said.effect in sought.laws and said.joints == sought.joints
+def _is_same_kind(finding: ReportedFinding, sought: SoughtEffect) -> bool:
+    return finding.effect in sought.laws and finding.joints == sought.joints
 
 
 def _interval_holds(span: Span | None, truth: KnownNumber) -> bool | None:

@@ -19,6 +19,7 @@ from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedN
 from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
 from armlab.diagnosis.report.words import effect_in_words, format_number, format_unit, place_in_words
+from armlab.effects.contract import UNKNOWN
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.report import LOOKS_FILE
 
@@ -33,34 +34,34 @@ ANSWER_WORDS = {
 }
 
 
-def finding_in_words(said: ReportedFinding) -> str:
+def finding_in_words(finding: ReportedFinding) -> str:
     """A finding with its place."""
-    joint = said.joints[0] if said.joints else None
-    return f"{effect_in_words(said.effect)}, {place_in_words(said.effect, joint, said.joints)}"
+    joint = finding.joints[0] if finding.joints else None
+    return f"{effect_in_words(finding.effect)}, {place_in_words(finding.effect, joint, finding.joints)}"
 
 
-def answer_in_words(judged: JudgedPart) -> str:
+def answer_in_words(part: JudgedPart) -> str:
     """The answer, and the finding where that is another."""
-    told = ANSWER_WORDS[judged.answer]
-    return told if judged.answer == "named" or judged.said is None else f"{told} ({finding_in_words(judged.said)})"
+    words = ANSWER_WORDS[part.answer]
+    return words if part.answer == "named" or part.finding is None else f"{words} ({finding_in_words(part.finding)})"
 
 
-def sizes_in_words(judged: JudgedPart) -> str:
+def sizes_in_words(part: JudgedPart) -> str:
     """True or reference's value -> found with interval, and whether they fit; the law where none is comparable."""
-    law = "–" if judged.said is None else f"`{judged.said.equation}`".replace("|", "\\|")
-    return "; ".join(_size_in_words(each) for each in judged.numbers) or law
+    law = "–" if part.finding is None else f"`{part.finding.equation}`".replace("|", "\\|")
+    return "; ".join(_size_in_words(each) for each in part.numbers) or law
 
 
-def _size_in_words(held: ComparedNumber) -> str:
-    truth, span = held.truth[1], held.size.interval
-    known = format_number(held.truth[0]) + (
+def _size_in_words(number: ComparedNumber) -> str:
+    truth, span = number.truth[1], number.size.interval
+    known = format_number(number.truth[0]) + (
         "" if truth is None else f" ({format_number(truth[0])} to {format_number(truth[1])})"
     )
-    own = format_number(held.size.value) + (
+    own = format_number(number.size.value) + (
         "" if span is None else f" ({format_number(span[0])} to {format_number(span[1])})"
     )
-    fits = {True: "", False: ", **no**", None: ""}[held.holds]
-    return f"{held.size.name} {known} → {own} {format_unit(held.size.unit)}".rstrip() + fits
+    fits = {True: "", False: ", **no**", None: ""}[number.holds]
+    return f"{number.size.name} {known} → {own} {format_unit(number.size.unit)}".rstrip() + fits
 
 
 def format_percent(outcome: Outcome, errors: Sequence[float]) -> str:
@@ -73,9 +74,9 @@ def format_share(value: float | None) -> str:
     return "–" if value is None else f"{value:.2f}".replace("-", "−")
 
 
-def list_findings(said: Sequence[ReportedFinding]) -> str:
+def list_findings(findings: Sequence[ReportedFinding]) -> str:
     """Findings in a cell."""
-    return "; ".join(finding_in_words(each) for each in said) or "–"
+    return "; ".join(finding_in_words(each) for each in findings) or "–"
 
 
 CSV_COLUMNS = (
@@ -101,27 +102,27 @@ CSV_COLUMNS = (
 
 def studies_csv(studies: Sequence[ConcealedStudy]) -> str:
     """The table as text; errors are RMS in N m (N) at the joint shown."""
-    rows = [row for found in studies for each in found.verdicts for row in _verdict_rows(found, each)]
+    rows = [row for study in studies for each in study.verdicts for row in _verdict_rows(study, each)]
     out = StringIO()
     pd.DataFrame(rows, columns=list(CSV_COLUMNS)).to_csv(out, index=False, float_format="%.4g", lineterminator="\n")
     return out.getvalue()
 
 
-def _verdict_rows(found: ConcealedStudy, verdict: CaseVerdict) -> Iterator[tuple[Any, ...]]:
+def _verdict_rows(study: ConcealedStudy, verdict: CaseVerdict) -> Iterator[tuple[Any, ...]]:
     outcome, joint = verdict.outcome, verdict.joint_shown - 1
     way = "withheld" if verdict.case.injected is None else "injected"
-    for each in verdict.judged:
+    for each in verdict.parts:
         yield (
-            found.name,
+            study.name,
             verdict.case.name,
             way,
             each.sought.label,
             each.answer,
-            "" if each.said is None else finding_in_words(each.said),
+            "" if each.finding is None else finding_in_words(each.finding),
             verdict.strength,
             verdict.joint_shown,
             outcome.given[joint],
-            found.control.given[joint],
+            study.control.given[joint],
             outcome.named[joint],
             outcome.found[joint],
             outcome.recovered,
@@ -132,11 +133,11 @@ def _verdict_rows(found: ConcealedStudy, verdict: CaseVerdict) -> Iterator[tuple
         )
 
 
-def _numbers_text(judged: JudgedPart) -> str:
+def _numbers_text(part: JudgedPart) -> str:
     return "; ".join(
         f"{one.effect} {one.size.name} {one.truth[0]:.4g} -> {one.size.value:.4g}"
         + ("" if one.size.interval is None else f" [{one.size.interval[0]:.4g} {one.size.interval[1]:.4g}]")
-        for one in judged.numbers
+        for one in part.numbers
     )
 
 
@@ -171,17 +172,17 @@ def count_lines(verdicts: Sequence[CaseVerdict], title: str) -> Iterator[str]:
     """What was sought and found, in lines."""
     if not verdicts:
         return
-    answers = [each.answer for verdict in verdicts for each in verdict.judged]
-    tally = ", ".join(f"{answers.count(name)} {told}" for name, told in ANSWER_WORDS.items() if name in answers)
-    held = [
-        each.holds for verdict in verdicts for one in verdict.judged for each in one.numbers if each.holds is not None
+    answers = [each.answer for verdict in verdicts for each in verdict.parts]
+    tally = ", ".join(f"{answers.count(name)} {words}" for name, words in ANSWER_WORDS.items() if name in answers)
+    holds = [
+        each.holds for verdict in verdicts for one in verdict.parts for each in one.numbers if each.holds is not None
     ]
     gaps = [verdict.gap for verdict in verdicts if verdict.gap is not None]
-    named = [each for verdict in verdicts for each in verdict.others if each.effect != "unknown"]
+    named = [each for verdict in verdicts for each in verdict.others if each.effect != UNKNOWN.id]
     unknown = sum(len(verdict.others) for verdict in verdicts) - len(named)
     yield (
         f"- {title}: {len(verdicts)} cases, {len(answers)} things to name: {tally}. "
-        f"{sum(held)} of {len(held)} intervals fit. Median gap closed {np.median(gaps):.2f}. "
+        f"{sum(holds)} of {len(holds)} intervals fit. Median gap closed {np.median(gaps):.2f}. "
         f"Other new findings: {len(named)} names, {unknown} unknown."
     )
 
@@ -197,27 +198,27 @@ def _all_count_lines(studies: Sequence[ConcealedStudy]) -> Iterator[str]:
     yield ""
 
 
-def _study_lines(found: ConcealedStudy) -> Iterator[str]:
-    control = found.control
-    yield f"## {found.name}\n"
-    yield f"Reference: {found.reference.told}. "
+def _study_lines(study: ConcealedStudy) -> Iterator[str]:
+    control = study.control
+    yield f"## {study.name}\n"
+    yield f"Reference: {study.reference.description}. "
     yield (
         f"Error {format_percent(control, control.given)}, {format_percent(control, control.named)} with what "
         "the control names.\n"
     )
-    said = "; ".join(finding_in_words(each) for each in control.said) or "nothing"
-    yield f"Control, nothing concealed: {said}.\n"
-    withheld = [each for each in found.verdicts if each.case.injected is None]
-    injected = [each for each in found.verdicts if each.case.injected is not None]
+    findings = "; ".join(finding_in_words(each) for each in control.findings) or "nothing"
+    yield f"Control, nothing concealed: {findings}.\n"
+    withheld = [each for each in study.verdicts if each.case.injected is None]
+    injected = [each for each in study.verdicts if each.case.injected is not None]
     yield "| withheld | strength | error handed over / reference / found | recovered | gap | further laws | others |"
     yield "|---|---:|---|---:|---:|---|---|"
     for each in withheld:
-        yield _withheld_row(each, found)
+        yield _withheld_row(each, study)
     yield ""
     yield "| withheld | sought | answer | reference → found |"
     yield "|---|---|---|---|"
     for each in withheld:
-        for one in each.judged:
+        for one in each.parts:
             yield f"| {each.case.name} | {one.sought.label} | {answer_in_words(one)} | {sizes_in_words(one)} |"
     yield ""
     yield "| injected | strength | answer | truth → found | recovered | gap | others |"
@@ -227,20 +228,20 @@ def _study_lines(found: ConcealedStudy) -> Iterator[str]:
     yield ""
 
 
-def _withheld_row(verdict: CaseVerdict, found: ConcealedStudy) -> str:
+def _withheld_row(verdict: CaseVerdict, study: ConcealedStudy) -> str:
     outcome = verdict.outcome
-    errors = (outcome.given, found.control.given, outcome.named)
-    told = " / ".join(format_percent(outcome, each) for each in errors)
+    errors = (outcome.given, study.control.given, outcome.named)
+    errors_text = " / ".join(format_percent(outcome, each) for each in errors)
     shares = f"{format_share(outcome.recovered)} | {format_share(verdict.gap)}"
     further = f"{list_findings(verdict.laws)} | {list_findings(verdict.others)}"
-    return f"| {verdict.case.name} | {verdict.strength:.1f} | {told} | {shares} | {further} |"
+    return f"| {verdict.case.name} | {verdict.strength:.1f} | {errors_text} | {shares} | {further} |"
 
 
 def _injected_row(verdict: CaseVerdict) -> str:
-    (one,) = verdict.judged
+    (one,) = verdict.parts
     shares = f"{format_share(verdict.outcome.recovered)} | {format_share(verdict.gap)}"
-    told = f"{answer_in_words(one)} | {sizes_in_words(one)}"
-    return f"| {verdict.case.name} | {verdict.strength:.1f} | {told} | {shares} | {list_findings(verdict.others)} |"
+    answer = f"{answer_in_words(one)} | {sizes_in_words(one)}"
+    return f"| {verdict.case.name} | {verdict.strength:.1f} | {answer} | {shares} | {list_findings(verdict.others)} |"
 
 
 # Okabe and Ito 2008, with a shape each: told apart by everyone, in grey too
@@ -285,15 +286,15 @@ def draw_studies(studies: Sequence[ConcealedStudy]) -> Any:
     return figure
 
 
-def _draw_panel(panel: Any, found: ConcealedStudy) -> None:
-    verdicts = found.verdicts
+def _draw_panel(panel: Any, study: ConcealedStudy) -> None:
+    verdicts = study.verdicts
     for row, verdict in enumerate(verdicts):
         counts = _answer_counts(verdict)
         for place, (answer, count) in enumerate(counts):
             colour, mark, _ = ANSWER_STYLES[answer]
             at = verdict.strength * 1.13**place
             panel.plot(at, row, mark, color=colour, markersize=6.5, markeredgewidth=2 if mark == "x" else 1)
-            if len(verdict.judged) > 1:
+            if len(verdict.parts) > 1:
                 panel.annotate(str(count), (at, row), (0, 5), textcoords="offset points", fontsize=6, ha="center")
         words = [] if verdict.gap is None else [f"gap {verdict.gap:.2f}"]
         words += [f"{len(verdict.others)} others"] if verdict.others else []
@@ -305,12 +306,12 @@ def _draw_panel(panel: Any, found: ConcealedStudy) -> None:
     panel.axvline(1, color="0.6", linestyle=":", linewidth=1, zorder=0)
     panel.grid(axis="y", color="0.92")
     panel.set_axisbelow(True)
-    panel.set_title(found.name, loc="left", fontsize=9)
+    panel.set_title(study.name, loc="left", fontsize=9)
 
 
 def _answer_counts(verdict: CaseVerdict) -> list[tuple[Answer, int]]:
-    said = np.array([each.answer for each in verdict.judged])
-    return [(answer, int(np.sum(said == answer))) for answer in ANSWER_STYLES if np.any(said == answer)]
+    answers = np.array([each.answer for each in verdict.parts])
+    return [(answer, int(np.sum(answers == answer))) for answer in ANSWER_STYLES if np.any(answers == answer)]
 
 
 OUTCOMES_FOLDER = ".concealed"

@@ -20,7 +20,7 @@ Progress = Callable[[str], None]
 
 @dataclass(frozen=True, eq=False)
 class ConcealedStudy:
-    """control: what is said of the reference model itself. verdicts: of every case with something concealed."""
+    """control: the outcome with nothing concealed. verdicts: of every case with something concealed."""
 
     reference: Reference
     control: Outcome
@@ -33,32 +33,32 @@ class ConcealedStudy:
 
 
 def study_recording(
-    name: str, recordings: Path, kept: OutcomeStore, looks: Looks, progress: Progress
+    name: str, recordings: Path, stored: OutcomeStore, looks: Looks, progress: Progress
 ) -> ConcealedStudy:
     """Conceals, diagnoses and judges. recordings: where the recording is, or will be fetched to."""
     place = recordings / name
     progress(f"{name}: the reference model")
     recording = load_recording(place if place.is_dir() else fetch_recording(name, place))
     recipe = next(each for each in RECIPES if each.name == name)
-    return study_cases(identify_reference(recording, recipe), cases_of(name), kept, looks, progress)
+    return study_cases(identify_reference(recording, recipe), cases_of(name), stored, looks, progress)
 
 
 def study_cases(
-    reference: Reference, cases: tuple[Case, ...], kept: OutcomeStore, looks: Looks, progress: Progress
+    reference: Reference, cases: tuple[Case, ...], stored: OutcomeStore, looks: Looks, progress: Progress
 ) -> ConcealedStudy:
     """The cases of a recording, the control first."""
-    kept.folder.mkdir(parents=True, exist_ok=True)
-    path = kept.folder / f"{reference.recording.name}.yaml"
+    stored.folder.mkdir(parents=True, exist_ok=True)
+    path = stored.folder / f"{reference.recording.name}.yaml"
     outcomes = []
     for number, case in enumerate(cases, 1):
-        told = f"{case.recording}, {number} of {len(cases)}: {case.name}"
-        progress(told)
-        outcome = kept.read(case, reference.recording)
+        heading = f"{case.recording}, {number} of {len(cases)}: {case.name}"
+        progress(heading)
+        outcome = stored.read(case, reference.recording)
         if outcome is None:
             for run in reference.recording.with_role("validate"):
                 looks.note(reference.recording.arm.name, run.name, f"concealed: {case.name}")
-            outcome = examine_case(reference, case, path, _progress_under(told, progress))
-            kept.write(case, reference.recording, outcome)
+            outcome = examine_case(reference, case, path, _progress_under(heading, progress))
+            stored.write(case, reference.recording, outcome)
         outcomes.append(outcome)
     control = next(each for case, each in zip(cases, outcomes, strict=True) if case.control)
     pairs = [(case, each) for case, each in zip(cases, outcomes, strict=True) if not case.control]
@@ -66,6 +66,5 @@ def study_cases(
     return ConcealedStudy(reference, control, verdicts)
 
 
-def _progress_under(told: str, progress: Progress) -> Progress:
-    """Tells what is being done under a heading."""
-    return lambda message: progress(f"{told}: {message}")
+def _progress_under(heading: str, progress: Progress) -> Progress:
+    return lambda message: progress(f"{heading}: {message}")

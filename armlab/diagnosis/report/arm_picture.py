@@ -149,7 +149,7 @@ def _draw_tube(path: str, color: str, width: float) -> str:
 
 
 def _draw_joint(centre: Array, axis: Array, mark: JointMark | None, size: float) -> str:
-    """The axle as a short bar, a ring round it where the joint is guilty."""
+    """The axle as a short bar, a ring round it where a finding is at the joint."""
     half = axis * AXLE_SHARE * size
     ends = f"M{centre[0] - half[0]:.1f} {centre[1] - half[1]:.1f}L{centre[0] + half[0]:.1f} {centre[1] + half[1]:.1f}"
     color = mark.color if mark else INNOCENT_COLOR

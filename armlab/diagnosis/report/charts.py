@@ -173,15 +173,15 @@ Layer = Line | Points | Level
 
 
 def draw_chart(
-    title: str, x: Axis, y: Axis, layers: Sequence[Layer], told: str = "", height: float = CHART_HEIGHT
+    title: str, x: Axis, y: Axis, layers: Sequence[Layer], about: str = "", height: float = CHART_HEIGHT
 ) -> str:
-    """The chart as SVG. told: what it shows in a sentence, the title if left out."""
+    """The chart as SVG. about: what it shows in a sentence, the title if left out."""
     entries = list(dict.fromkeys((layer.look, isinstance(layer, Points)) for layer in layers))
     legend, top = _draw_legend(entries)
     frame = _PlotFrame(top, height, x, y)
     heading = svg_text(shorten_text(title, CHART_WIDTH - 12, 12), 6, 14, 12, font_weight="600")
     content = heading + legend + frame.axes() + "".join(frame.draw_layer(layer) for layer in layers)
-    return svg_picture(content, CHART_WIDTH, height, told or title)
+    return svg_picture(content, CHART_WIDTH, height, about or title)
 
 
 def _draw_legend(entries: Sequence[tuple[Look, bool]]) -> tuple[str, float]:

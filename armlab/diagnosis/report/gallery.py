@@ -14,8 +14,10 @@ from armlab.diagnosis.report.torque_pictures import (
     draw_located_errors,
     draw_torques,
 )
-from armlab.diagnosis.report.words import LINK_EFFECTS, effect_in_words
+from armlab.diagnosis.report.words import effect_in_words
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 
 MAX_POSTURES = 100  # recorded ones, of which the most telling is drawn
 MAX_LOCATED_JOINTS = 4  # joints whose error is drawn against every variable
@@ -59,6 +61,8 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
     whole = [effect_in_words(claim.effect) for claim in diagnosis.claims if claim.joint is None]
     worst = [each.joint for each in diagnosis.located[:MAX_LOCATED_JOINTS]]
     located = [(joint, draw_located_errors(diagnosis, data, joint - 1)) for joint in worst]
+    motions, motion_text = draw_motion(diagnosis)
+    differences, difference_text = draw_motion_differences(diagnosis)
     return Gallery(
         data,
         draw_arm(arm, position, joint_marks(diagnosis), whole),
@@ -67,8 +71,10 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
         draw_errors(diagnosis, data),
         [(claim, draw_evidence(diagnosis, data, claim)) for claim in diagnosis.claims],
         located,
-        *draw_motion(diagnosis),
-        *draw_motion_differences(diagnosis),
+        motions,
+        motion_text,
+        differences,
+        difference_text,
     )
 
 
@@ -78,14 +84,10 @@ def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
     unknown: dict[int, bool] = {}
     for claim in diagnosis.claims:
         if claim.joint is not None:
-            name = (
-                f"{effect_in_words(claim.effect)} (link)"
-                if claim.effect in LINK_EFFECTS
-                else effect_in_words(claim.effect)
-            )
-            texts.setdefault(claim.joint, []).append(name)
-            unknown[claim.joint] = unknown.get(claim.joint, True) and claim.effect == "unknown"
-    return {joint: JointMark(_short_mark(found), unknown[joint]) for joint, found in texts.items()}
+            facts = effect_named(claim.effect)
+            texts.setdefault(claim.joint, []).append(f"{facts.words} (link)" if facts.where == "link" else facts.words)
+            unknown[claim.joint] = unknown.get(claim.joint, True) and facts == UNKNOWN
+    return {joint: JointMark(_short_mark(names), unknown[joint]) for joint, names in texts.items()}
 
 
 def _short_mark(names: list[str]) -> str:

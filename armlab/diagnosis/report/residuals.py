@@ -41,7 +41,7 @@ class ShownResiduals:
 
     @property
     def before(self) -> Array:
-        """What was to be explained: as given, or refitted where there is no simulation."""
+        """The residual before the diagnosis: of the simulation as given, else of the refitted links."""
         return self.refit if self.given is None else self.given
 
 
@@ -54,13 +54,13 @@ def select_residuals(diagnosis: Diagnosis) -> ShownResiduals | None:
 
 
 def residual_without(diagnosis: Diagnosis, claim: Claim, joint: int) -> Array:
-    """What is left at a joint (from 0) where this finding alone is taken out again, (rows,)."""
+    """Residual (rows,) at a joint (from 0) of the model found without this finding."""
     assert diagnosis.final is not None
     return np.asarray(diagnosis.final[:, joint] + claim.prediction[:, joint])
 
 
 def clearest_stretch(data: ShownResiduals, seconds: float) -> tuple[Segment, slice]:
-    """The stretch of held-out time in which the model has gained most over what was there before."""
+    """The held-out segment and its rows, `seconds` long, in which the error of the model falls most."""
     width = max(int(seconds * data.observed.rate_hz), 10)
     scale = np.maximum(data.held_out_rms(data.before), 1e-300)
     gained = np.sum((data.before / scale) ** 2 - (data.final / scale) ** 2, axis=1)
@@ -76,7 +76,7 @@ def clearest_stretch(data: ShownResiduals, seconds: float) -> tuple[Segment, sli
 
 
 def space_rows(rows: Rows, most: int) -> Rows:
-    """At most so many of the rows, evenly chosen."""
+    """At most `most` of the rows, evenly spaced."""
     return rows[np.unique(np.linspace(0, len(rows) - 1, min(most, len(rows))).astype(int))] if len(rows) else rows
 
 
@@ -90,11 +90,11 @@ def bin_means(x: Array, y: Array, bins: int) -> tuple[Array, Array, Array]:
 
 
 MAX_LAG_SECONDS = 1.0
-MAX_WHITE_RATIO = 3.0  # times the memory of noise through the filter: more is structure
+MAX_WHITE_RATIO = 3.0  # times the correlation time of noise through the filter: more is structure
 
 
 def correlation_seconds(residual: Array, joint: int, observed: Observed) -> float:
-    """Time over which the held-out error (rows,) of a joint (from 0) is tied to itself, s: half its correlations' sum.
+    """Correlation time of the held-out error (rows,) of a joint (from 0), s: half the sum of its autocorrelations.
 
     White noise of infinite bandwidth has zero; white noise through a low-pass of cut-off f has about 1 / (4 f).
     """
@@ -114,10 +114,10 @@ def correlation_seconds(residual: Array, joint: int, observed: Observed) -> floa
 
 
 def filter_correlation_seconds(observed: Observed) -> float:
-    """The same of white noise that passed the torque's filter."""
+    """Correlation time of white noise that passed the filter of the torque, s."""
     return 1 / (4 * observed.cutoff_hz)
 
 
 def is_white(residual: Array, joint: int, observed: Observed) -> bool:
-    """Whether what is left of a joint (from 0) may be noise that passed the torque's filter."""
+    """Whether the residual of a joint (from 0) may be white noise that passed the filter of the torque."""
     return correlation_seconds(residual, joint, observed) <= MAX_WHITE_RATIO * filter_correlation_seconds(observed)

@@ -55,11 +55,11 @@ def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> str:
     content += _draw_grid(axis, top, height)
     for joint in range(len(floors)):
         content += _draw_joint_row(axis, top + JOINT_ROW_HEIGHT * (joint + 0.5), joint, series, float(floors[joint]))
-    told = "; ".join(
+    values = "; ".join(
         f"joint {joint + 1}: {', '.join(f'{look.name} {format_number(float(each[joint]))}' for look, each in series)}"
         for joint in range(len(floors))
     )
-    return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {told}")
+    return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {values}")
 
 
 def _draw_marks_legend(series: Series) -> str:
@@ -108,7 +108,7 @@ def _draw_mark(x: float, y: float, look: Look) -> str:
 
 
 def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
-    """One a joint: measured torque and the models' over the most telling stretch of held-out time."""
+    """One picture a joint: measured torque and that of each model, where the held-out error falls most."""
     segment, rows = clearest_stretch(data, STRETCH_SECONDS)
     time, torque = data.observed.time[rows], data.observed.torque
     run = data.observed.names[segment.run]
@@ -129,7 +129,7 @@ def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
 
 
 def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
-    """One a joint: what each model leaves over a whole held-out run, with the noise floor."""
+    """One picture a joint: the residual of each model over a whole held-out run, with the noise floor."""
     segment, _ = clearest_stretch(data, STRETCH_SECONDS)
     rows = slice(segment.start, segment.stop)
     time, run = data.observed.time[rows], data.observed.names[segment.run]
@@ -152,22 +152,11 @@ MAX_DOTS = 700
 LAW_BINS = 48
 MAX_LAW_SCATTER = 0.2  # of the law's own range: a law that scatters less about its mean in a bin is drawn as a line
 FULL_TURN = 2 * np.pi
-VELOCITY_EFFECTS = (
-    "coulomb_friction",
-    "viscous_friction",
-    "nonlinear_viscous_friction",
-    "stribeck_friction",
-    "asymmetric_friction",
-    "presliding_hysteresis",
-    "joint_coupling",
-)
-POSITION_EFFECTS = ("gravity_compensator", "cable_stiffness", "backlash")
-TIME_EFFECTS = ("torque_offset", "external_contact", "friction_drift")
 MOTION_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "acceleration": ("rad/s²", "m/s²")}
 
 
 def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> str:
-    """Dots: measured torque that is left without the finding. Line: what the finding says of it."""
+    """Dots: residual torque of the model without the finding. Line: torque of the finding."""
     joint = claim.evidence.joint
     label, x = evidence_variable(diagnosis, data, claim)
     left, law = residual_without(diagnosis, claim, joint), claim.prediction[:, joint]
@@ -186,21 +175,16 @@ def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> s
 
 
 def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> tuple[str, Array]:
-    """Label and values (rows,) of what the finding depends on; its own torque where no single variable tells it."""
+    """Label and values (rows,) of the variable that the finding depends on; its own torque where there are several."""
     arm, observed = diagnosis.simulation.arm, data.observed
     joint = claim.evidence.joint
     moving = (claim.joints[1] if len(claim.joints) > 1 else claim.joint or 0) - 1
-    if claim.effect in VELOCITY_EFFECTS and moving >= 0:
-        return _motion_variable(diagnosis, data, "velocity", moving)
-    if claim.effect in POSITION_EFFECTS and moving >= 0:
-        return _motion_variable(diagnosis, data, "position", moving)
-    if claim.effect == "rotor_inertia" and moving >= 0:
-        return _motion_variable(diagnosis, data, "acceleration", moving)
-    if claim.effect == "torque_ripple" and moving >= 0:
-        return _ripple_variable(data, claim, moving)
-    if claim.effect in TIME_EFFECTS:
-        return "time from the start of the run, s", observed.time
-    if claim.depends_on[:1] == ("time",):
+    axis = "" if claim.candidate is None else claim.candidate.facts.axis
+    if axis in MOTION_UNITS and moving >= 0:
+        return _motion_variable(diagnosis, data, axis, moving)
+    if axis == "cycle" and moving >= 0:
+        return _cycle_variable(data, claim, moving)
+    if axis == "time" or claim.depends_on[:1] == ("time",):
         return "time from the start of the run, s", observed.time
     for name in claim.depends_on:
         kind, _, which = name.rpartition("_")
@@ -223,8 +207,8 @@ def _load_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joi
     return f"torque of the model at joint {joint + 1}, {joint_unit(diagnosis.simulation.arm, joint)}", torque
 
 
-def _ripple_variable(data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
-    """Position within one wave of a ripple."""
+def _cycle_variable(data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
+    """Position within one wave; the parameter `order` of the effect counts the waves a turn."""
     order = next((each.value for each in claim.parameters if each.name == "order"), 1.0)
     waves = float(order) if isinstance(order, float) and order else 1.0
     position = data.observed.kept("position")[:, joint]

@@ -11,10 +11,11 @@ import numpy as np
 
 from armlab.diagnosis.report.residuals import is_white, select_residuals
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Rival
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from problem.arm import Arm
 
-LINK_EFFECTS = ("payload", "inertial_parameter_error")
 MAX_NAME_LENGTH = 24  # letters
 PARAMETER_DIGITS = 4  # of a parameter
 COMPONENT_NAMES = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "xz", "yz")}
@@ -22,35 +23,34 @@ MAX_NAMED_FINDINGS = 3  # findings that the verdict names; the others are counte
 
 
 def effect_in_words(effect: str) -> str:
-    """An effect in words."""
-    special = {"coulomb_friction": "Coulomb friction", "stribeck_friction": "Stribeck friction"}
-    return special.get(effect, effect.replace("_", " "))
+    """The name of an effect in a sentence; ValueError for an id that no effect has."""
+    return effect_named(effect).words
 
 
 def place_in_words(effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
     """Where an effect is: a joint, a link, a coupling, or the whole robot."""
     if joint is None:
         return "the whole robot"
-    if effect in LINK_EFFECTS:
+    if effect_named(effect).where == "link":
         return f"link {joint}"
     return f"joint {joint} from joint {joints[1]}" if len(joints) > 1 else f"joint {joint}"
 
 
 def finding_in_words(claim: Claim | Rival) -> str:
     """An effect with its place."""
-    if claim.effect == "unknown":
+    if claim.effect == UNKNOWN.id:
         return f"something unknown at {place_in_words(claim.effect, claim.joint)}"
     where = place_in_words(claim.effect, claim.joint, claim.joints)
     return f"{effect_in_words(claim.effect)} {'of' if claim.joint is None else 'at'} {where}"
 
 
 def shorten_name(name: str) -> str:
-    """A file's name where there is little room."""
+    """The name of a file, cut to MAX_NAME_LENGTH letters."""
     return name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}…"
 
 
 def format_number(value: float, digits: int = 3) -> str:
-    """The digits that count, no needless exponent."""
+    """A number with `digits` significant digits, and with an exponent only where it is very large or small."""
     if not math.isfinite(value):
         return "none" if math.isnan(value) else ("∞" if value > 0 else "−∞")
     size = abs(value)
@@ -85,8 +85,8 @@ class ParameterRow:
 def parameter_rows(parameter: ParameterValue) -> list[ParameterRow]:
     """A parameter as rows, a vector's components one by one."""
     values = np.atleast_1d(np.array(parameter.value, dtype=float)).tolist()
-    found = parameter.interval
-    pairs = [None] * len(values) if found is None else np.array(found, dtype=float).reshape(-1, 2).tolist()
+    interval = parameter.interval
+    pairs = [None] * len(values) if interval is None else np.array(interval, dtype=float).reshape(-1, 2).tolist()
     names = [parameter.name]
     if len(values) > 1:
         names = [f"{parameter.name} {part}" for part in COMPONENT_NAMES.get(len(values), range(1, len(values) + 1))]
@@ -104,7 +104,7 @@ def _format_interval(low: float, high: float) -> str:
 
 
 def format_probability(value: float) -> str:
-    """A p-value that does not pretend to more than it knows."""
+    """A p-value with three digits; a smaller one than 1e-12 only as this bound."""
     return "below 1e−12" if value < 1e-12 else format_number(value)
 
 
@@ -127,8 +127,8 @@ def _largest_error_text(worst: JointFit, arm: Arm) -> str:
 
 
 def _list_findings(claims: Sequence[Claim]) -> str:
-    known = [_finding_with_rivals(claim) for claim in claims if claim.effect != "unknown"]
-    unknown = [f"joint {claim.joint}" for claim in claims if claim.effect == "unknown"]
+    known = [_finding_with_rivals(claim) for claim in claims if claim.effect != UNKNOWN.id]
+    unknown = [f"joint {claim.joint}" for claim in claims if claim.effect == UNKNOWN.id]
     parts = known[:MAX_NAMED_FINDINGS]
     if len(known) > MAX_NAMED_FINDINGS:
         parts.append(
@@ -145,7 +145,7 @@ def _finding_with_rivals(claim: Claim) -> str:
 
 
 def gain_sentence(diagnosis: Diagnosis) -> str:
-    """How far the held-out error falls, at the joint that gains most, and how much of the gap that is."""
+    """How far the held-out error falls at the joint that gains most, and its share of the gap to the noise."""
     data = select_residuals(diagnosis)
     refit = np.array([each.before for each in diagnosis.fit])
     start = refit if data is None or data.given is None else data.held_out_rms(data.given)
@@ -171,15 +171,15 @@ def join_words(parts: Sequence[str], last: str = "and") -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
 
 
-LINE_WIDTH = 110
+LINE_WIDTH = 110  # letters in a line of the terminal
 
 
 def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     """The verdict, each finding with its equation, errors before and after, and what to do next."""
     first, second = verdict_sentences(diagnosis)
     yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
-    for number_, claim in enumerate(diagnosis.claims, 1):
-        yield from _claim_lines(number_, claim, joint_unit(diagnosis.simulation.arm, claim.evidence.joint))
+    for number, claim in enumerate(diagnosis.claims, 1):
+        yield from _claim_lines(number, claim, joint_unit(diagnosis.simulation.arm, claim.evidence.joint))
     for each in diagnosis.unexplained:
         yield f"  unexplained: {100 * each.share:.0f} % of joint {each.joint}, by {', '.join(each.depends_on)}"
     if diagnosis.fit:
@@ -190,12 +190,12 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"  {fit.joint:>5}{errors}{closed:>13}   {joint_unit(diagnosis.simulation.arm, fit.joint - 1)}"
 
 
-def _claim_lines(number_: int, claim: Claim, size: str) -> Iterator[str]:
+def _claim_lines(number: int, claim: Claim, unit: str) -> Iterator[str]:
     evidence = claim.evidence
     lines = wrap(f"{finding_in_words(claim)}: {claim.equation}", LINE_WIDTH - 5)
-    yield f"{number_:>3}. {lines[0]}"
+    yield f"{number:>3}. {lines[0]}"
     yield from (f"     {line}" for line in lines[1:])
-    error = f"{format_number(evidence.rms_before)} to {format_number(evidence.rms_after)} {size}"
+    error = f"{format_number(evidence.rms_before)} to {format_number(evidence.rms_after)} {unit}"
     yield f"     held-out error of joint {evidence.joint + 1}: {error}; p {format_probability(evidence.corrected)}"
     rivals = ", ".join(
         f"{effect_in_words(each.effect)} ({place_in_words(each.effect, each.joint, each.joints)})"

@@ -50,10 +50,10 @@ REPORT_PAGE, FIGURES_FOLDER = "report.html", "figures"
 def report_texts(diagnosis: Diagnosis, command: str = "") -> dict[str, str]:
     """Names and content of the page and the pictures. command: that repeats it."""
     data = select_residuals(diagnosis)
-    drawn: Gallery | None = None if data is None else draw_gallery(diagnosis, data)
-    texts = {REPORT_PAGE: report_page(diagnosis, drawn, command)}
-    if drawn is not None:
-        texts |= {f"{FIGURES_FOLDER}/{name}": text + "\n" for name, text in drawn.files.items()}
+    gallery: Gallery | None = None if data is None else draw_gallery(diagnosis, data)
+    texts = {REPORT_PAGE: report_page(diagnosis, gallery, command)}
+    if gallery is not None:
+        texts |= {f"{FIGURES_FOLDER}/{name}": text + "\n" for name, text in gallery.files.items()}
     return texts
 
 
@@ -72,11 +72,11 @@ def diagnose_recording(
     changes: tuple[str, ...] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
-    """Diagnoses, writes verdict.json, report.html, model.yaml and figures into `out`, all or none; tells it in lines.
+    """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
-    without: guards that are switched off. changes: tuning numbers with other values, like `noise.max_order=8`.
-    progress: is told what is being done. Raises InputError, in one line, for a recording that cannot be used, and for
-    a guard or a tuning number that there is not.
+    out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
+    numbers with other values, like `noise.max_order=8`. progress: called with the name of each step. Raises
+    InputError, in one line, for a recording that cannot be used, an unknown guard or an unknown tuning number.
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     settings = Settings(guards=guards_without(without))
@@ -85,7 +85,7 @@ def diagnose_recording(
     recording = load_recording(folder)
     check_output_folder(out, recording)
     try:
-        found = diagnose(recording, chosen, seed, settings, progress)
+        diagnosis = diagnose(recording, chosen, seed, settings, progress)
     except ValueError as error:
         raise InputError(f"{folder}: {error}") from None
     progress("writing the report")
@@ -93,9 +93,9 @@ def diagnose_recording(
     options += [word for guard in without for word in ("--without", guard)]
     options += [word for change in changes for word in ("--set", change)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
-    texts = verdict_texts(found, out) | report_texts(found, command) | predicted_texts(found)
+    texts = verdict_texts(diagnosis, out) | report_texts(diagnosis, command) | predicted_texts(diagnosis)
     write_texts(texts, out)
-    yield from verdict_lines(found)
+    yield from verdict_lines(diagnosis)
     pictures = sum(name.startswith(FIGURES_FOLDER) for name in texts)
     files = ", ".join(name for name in texts if not name.startswith((FIGURES_FOLDER, PREDICTED_FOLDER)))
     more = f", {pictures} pictures in {FIGURES_FOLDER}" if pictures else ""
@@ -103,8 +103,8 @@ def diagnose_recording(
         f", predicted torque in {PREDICTED_FOLDER}" if any(name.startswith(PREDICTED_FOLDER) for name in texts) else ""
     )
     yield f"wrote {out}: {files}{more}"
-    if found.seconds:
-        yield f"diagnosed in {found.seconds:.1f} s once read; {_peak_memory_gb():.2f} GB of memory at most"
+    if diagnosis.seconds:
+        yield f"diagnosed in {diagnosis.seconds:.1f} s once read; {_peak_memory_gb():.2f} GB of memory at most"
 
 
 def _peak_memory_gb() -> float:
