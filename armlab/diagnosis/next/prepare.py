@@ -37,7 +37,7 @@ from armlab.diagnosis.next.rivals import (
 from armlab.diagnosis.next.sampling import SAMPLES_PER_ROW, Sampling, white_noise_sampling
 from armlab.diagnosis.next.verdict_file import Finding, RivalGroup, VerdictWithModel
 from armlab.diagnosis.settings import Settings
-from armlab.effects.contract import Candidate, Scene
+from armlab.effects.contract import UNKNOWN, Candidate, Scene
 from armlab.effects.library import effect_named, library
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
@@ -46,13 +46,6 @@ from problem.trajectories import Trajectory
 
 LinkKnowledge = Literal["exact", "near", "free"]
 NEAR_LINK_WIDTH = 0.08  # width of the links' errors: about as far as drawings are off
-DRY_FRICTION = (
-    "coulomb_friction",
-    "stribeck_friction",
-    "presliding_hysteresis",
-    "asymmetric_friction",
-    "load_dependent_friction",
-)
 RICH_MOTIONS = 3  # random motions that show what any motion could show
 
 
@@ -178,7 +171,7 @@ class _Preparation:
     def _standing_speeds(self, sampling: Sampling, groups: tuple[RivalGroup, ...]) -> tuple[float, ...]:
         """Speeds below which a joint with dry friction, found or asked for, stands still; 0 for the others."""
         named = {*self.parts, *(name for group in groups for name in group)}
-        sticky = {name.joint for name in named if name.effect in DRY_FRICTION}
+        sticky = {name.joint for name in named if effect_named(name.effect).sticks}
         return tuple(each if joint + 1 in sticky else 0.0 for joint, each in enumerate(sampling.standing))
 
     def _give_back(self, moments: Moments, candidate: Candidate, values: Array) -> Moments:
@@ -249,11 +242,6 @@ def _rich_scenes(present: PresentModel, trajectory: Trajectory, times: Array, se
 MAX_AMBIGUOUS_LEAD = 3.0  # standard errors: closer names are no more than guessed
 MAX_GROUP_SIZE = 4  # names in a group
 MAX_FINDINGS = 4  # findings that are asked about
-RESIDUAL_SEARCH_EFFECTS = (
-    "torque_ripple",
-    "external_contact",
-    "torque_saturation",
-)  # found by looking at the residual, not by columns
 
 
 def find_nearby_names(
@@ -269,7 +257,7 @@ def find_nearby_names(
     named = [
         each
         for each in verdict.findings
-        if each.parameters and each.name.effect not in (*RESIDUAL_SEARCH_EFFECTS, "unknown")
+        if each.parameters and each.name.effect != UNKNOWN.id and not effect_named(each.name.effect).scanned
     ]
     out = []
     for finding in named[:MAX_FINDINGS]:
@@ -294,8 +282,8 @@ def _candidate_names(finding: Finding, verdict: VerdictWithModel, arm: Arm) -> l
     known = {each.name for each in verdict.findings}
     out = []
     for family in library():
-        if family.effect not in RESIDUAL_SEARCH_EFFECTS:
-            robot = effect_named(family.effect).where == "robot"
+        if not family.facts.scanned:
+            robot = family.facts.where == "robot"
             out += [Name(family.effect, None)] if robot else [Name(family.effect, each) for each in joints]
     return [name for name in out if name not in known]
 

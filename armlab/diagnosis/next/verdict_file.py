@@ -12,7 +12,8 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.formats import FindingEntry, Value, read_verdict_file
 from armlab.diagnosis.next.question import Name
-from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 from armlab.identification.model_file import read_model_file
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -118,13 +119,13 @@ def _parse_rivals(verdict: VerdictWithModel, named: str) -> RivalGroup:
 
 
 def _parse_rival_name(effect: str, joint: str, place: int | None, verdict: VerdictWithModel) -> Name:
-    if effect not in EFFECT_IDS or effect == "unknown":
-        try:
-            effect_named(effect)
-        except ValueError as error:
-            raise InputError(f"--rivals: {error}") from None
+    try:
+        facts = effect_named(effect)
+    except ValueError as error:
+        raise InputError(f"--rivals: {error}") from None
+    if facts is UNKNOWN:
         raise InputError("--rivals: 'unknown' has no columns to design a motion for")
-    if effect_named(effect).where == "robot":
+    if facts.where == "robot":
         return Name(effect, None)
     if joint:
         if not joint.isdigit() or not 1 <= int(joint) <= max(len(verdict.noise), 1):

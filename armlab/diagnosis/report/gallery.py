@@ -14,8 +14,9 @@ from armlab.diagnosis.report.torque_pictures import (
     draw_located_errors,
     draw_torques,
 )
-from armlab.diagnosis.report.words import LINK_EFFECTS, effect_in_words
+from armlab.diagnosis.report.words import effect_in_words
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.library import effect_named
 
 MAX_POSTURES = 100  # recorded ones, of which the most telling is drawn
 MAX_LOCATED_JOINTS = 4  # joints whose error is drawn against every variable
@@ -78,11 +79,8 @@ def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
     unknown: dict[int, bool] = {}
     for claim in diagnosis.claims:
         if claim.joint is not None:
-            name = (
-                f"{effect_in_words(claim.effect)} (link)"
-                if claim.effect in LINK_EFFECTS
-                else effect_in_words(claim.effect)
-            )
+            effect = effect_named(claim.effect)
+            name = f"{effect.words} (link)" if effect.where == "link" else effect.words
             texts.setdefault(claim.joint, []).append(name)
             unknown[claim.joint] = unknown.get(claim.joint, True) and claim.effect == "unknown"
     return {joint: JointMark(_short_mark(found), unknown[joint]) for joint, found in texts.items()}

@@ -20,7 +20,7 @@ from armlab.diagnosis.report.words import (
     verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 
 
@@ -79,11 +79,6 @@ def findings_table(diagnosis: Diagnosis) -> str:
     return html_table(headings, rows, (1, 2, 3, 4)) if rows else ""
 
 
-def effect_meaning(effect: str) -> str:
-    """What an effect is in a line; nothing for a user's own."""
-    return effect_named(effect).meaning if effect in EFFECT_IDS else ""
-
-
 def findings_section(diagnosis: Diagnosis, gallery: Gallery) -> str:
     """Each finding with its equation, numbers, evidence and rivals; then what stays unexplained."""
     if not diagnosis.claims:
@@ -103,7 +98,7 @@ def _finding_article(diagnosis: Diagnosis, claim: Claim, picture: str) -> str:
         f"p-value {format_probability(evidence.corrected)} after correction for everything that was compared."
     )
     title = finding_in_words(claim)
-    about = effect_meaning(claim.effect)
+    about = effect_named(claim.effect).meaning
     return (
         f'<article class="finding"><h3>{escape(title[0].upper() + title[1:])}</h3>{paragraph(about, "pale")}'
         f"<p><code>{escape(claim.equation)}</code></p>"

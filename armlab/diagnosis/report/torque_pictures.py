@@ -35,6 +35,7 @@ from armlab.diagnosis.report.charts import (
 from armlab.diagnosis.report.residuals import ShownResiduals, bin_means, clearest_stretch, residual_without, space_rows
 from armlab.diagnosis.report.words import effect_in_words, format_number, joint_unit, shorten_name
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.effects.library import effect_named
 
 STRETCH_SECONDS = 4.0
 JOINT_ROW_HEIGHT = 26.0
@@ -152,17 +153,6 @@ MAX_DOTS = 700
 LAW_BINS = 48
 MAX_LAW_SCATTER = 0.2  # of the law's own range: a law that scatters less about its mean in a bin is drawn as a line
 FULL_TURN = 2 * np.pi
-VELOCITY_EFFECTS = (
-    "coulomb_friction",
-    "viscous_friction",
-    "nonlinear_viscous_friction",
-    "stribeck_friction",
-    "asymmetric_friction",
-    "presliding_hysteresis",
-    "joint_coupling",
-)
-POSITION_EFFECTS = ("gravity_compensator", "cable_stiffness", "backlash")
-TIME_EFFECTS = ("torque_offset", "external_contact", "friction_drift")
 MOTION_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "acceleration": ("rad/s²", "m/s²")}
 
 
@@ -190,15 +180,12 @@ def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) 
     arm, observed = diagnosis.simulation.arm, data.observed
     joint = claim.evidence.joint
     moving = (claim.joints[1] if len(claim.joints) > 1 else claim.joint or 0) - 1
-    if claim.effect in VELOCITY_EFFECTS and moving >= 0:
-        return _motion_variable(diagnosis, data, "velocity", moving)
-    if claim.effect in POSITION_EFFECTS and moving >= 0:
-        return _motion_variable(diagnosis, data, "position", moving)
-    if claim.effect == "rotor_inertia" and moving >= 0:
-        return _motion_variable(diagnosis, data, "acceleration", moving)
-    if claim.effect == "torque_ripple" and moving >= 0:
+    axis = effect_named(claim.effect).axis
+    if axis in MOTION_UNITS and moving >= 0:
+        return _motion_variable(diagnosis, data, axis, moving)
+    if axis == "cycle" and moving >= 0:
         return _ripple_variable(data, claim, moving)
-    if claim.effect in TIME_EFFECTS:
+    if axis == "time":
         return "time from the start of the run, s", observed.time
     if claim.depends_on[:1] == ("time",):
         return "time from the start of the run, s", observed.time

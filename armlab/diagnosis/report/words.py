@@ -11,10 +11,10 @@ import numpy as np
 
 from armlab.diagnosis.report.residuals import is_white, select_residuals
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Rival
+from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from problem.arm import Arm
 
-LINK_EFFECTS = ("payload", "inertial_parameter_error")
 MAX_NAME_LENGTH = 24  # letters
 PARAMETER_DIGITS = 4  # of a parameter
 COMPONENT_NAMES = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "xz", "yz")}
@@ -22,16 +22,15 @@ MAX_NAMED_FINDINGS = 3  # findings that the verdict names; the others are counte
 
 
 def effect_in_words(effect: str) -> str:
-    """An effect in words."""
-    special = {"coulomb_friction": "Coulomb friction", "stribeck_friction": "Stribeck friction"}
-    return special.get(effect, effect.replace("_", " "))
+    """The name of an effect in a sentence."""
+    return effect_named(effect).words
 
 
 def place_in_words(effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
     """Where an effect is: a joint, a link, a coupling, or the whole robot."""
     if joint is None:
         return "the whole robot"
-    if effect in LINK_EFFECTS:
+    if effect_named(effect).where == "link":
         return f"link {joint}"
     return f"joint {joint} from joint {joints[1]}" if len(joints) > 1 else f"joint {joint}"
 
