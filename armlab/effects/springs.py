@@ -72,12 +72,10 @@ class TorqueRipple(Term):
     size = 2
 
     def columns(self, scene: Scene) -> Array:
-        """Sine and cosine."""
         angle = self.shape[0] * scene.motion.position[:, self.own]
         return self._stacked(np.sin(angle), np.cos(angle))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Order, amplitude and phase."""
         amplitude, phase = amplitude_and_phase(coefficients)
         return {"order": self.shape[0], "amplitude": amplitude, "phase": phase}
 
@@ -86,7 +84,6 @@ class TorqueRipple(Term):
         return "rad/m" if name == "order" and self.kind == "prismatic" else super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         amplitude, phase = amplitude_and_phase(coefficients)
         sign = "-" if phase < 0 else "+"
         inner = f"{format_number(self.shape[0])} q_{self.joint} {sign} {format_number(abs(phase))}"
@@ -94,7 +91,6 @@ class TorqueRipple(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with order, amplitude and phase."""
         order = float(parameters["order"])
         ripple = cls.at(arm, joints[0], shape=(order,), bounds=((order - 1, order + 1),))
         return ripple, sine_and_cosine(float(parameters["amplitude"]), float(parameters["phase"]))
@@ -148,7 +144,6 @@ class RippleFamily(Family):
     def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
-        """The ripple with order, amplitude and phase."""
         return form_from_parameters((TorqueRipple,), arm, joints, parameters, form)
 
 
@@ -228,7 +223,6 @@ class LinearSpring(Term):
         return self._stacked(scene.motion.position[:, self.own], np.ones(len(scene.time)))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Stiffness and rest position."""
         slope, constant = (float(value) for value in coefficients)
         return {"stiffness": slope, "rest": -constant / slope if slope else 0.0}
 
@@ -239,7 +233,6 @@ class LinearSpring(Term):
         return {"stiffness": stiffness, "springref": rest} if stiffness > 0 else {}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         named = self.parameters(coefficients)
         rest = float(np.asarray(named["rest"]))
         sign = "+" if rest < 0 else "-"
@@ -249,7 +242,6 @@ class LinearSpring(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with stiffness and rest position."""
         stiffness, rest = float(parameters["stiffness"]), float(parameters["rest"])
         return cls.at(arm, joints[0]), np.array([stiffness, -stiffness * rest])
 
@@ -281,13 +273,11 @@ class HardeningSpring(Term):
         return {"stiffness": float(coefficients[0]), "rest": self.shape[0], "cubic": float(coefficients[1])}
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         if name == "cubic":
             return f"{'N.m' if self.kind == 'revolute' else 'N'}/{'rad' if self.kind == 'revolute' else 'm'}3"
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         linear, cubic = (format_number(value) for value in coefficients)
         return f"tau_{self.joint} += {linear} x + {cubic} x^3, x = q_{self.joint} - ({format_number(self.shape[0])})"
 
@@ -298,7 +288,6 @@ class HardeningSpring(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its three parameters."""
         rest = float(parameters["rest"])
         spring = cls.at(arm, joints[0], shape=(rest,), bounds=((rest - 1, rest + 1),))
         return spring, np.array([parameters["stiffness"], parameters["cubic"]], dtype=float)
@@ -314,7 +303,7 @@ LINKAGE_RATIO, LINKAGE_RATIO_RANGE = 0.6, (0.05, 0.98)
 
 @dataclass(frozen=True)
 class SpringCompensator(LinearSpring):
-    """A linear spring."""
+    """stiffness (q - rest): a linear spring that carries gravity."""
 
     facts = GRAVITY_COMPENSATOR_FACTS
     form = "linear spring"
@@ -370,24 +359,20 @@ class SineCompensator(Compensator):
         return [cls.at(arm, joint, gravity=gravity_wave(scenes, joint))] if _turns_against_gravity(arm, joint) else []
 
     def columns(self, scene: Scene) -> Array:
-        """Sine and cosine."""
         angle = scene.motion.position[:, self.own]
         return self._stacked(np.sin(angle), np.cos(angle))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Amplitude and phase."""
         amplitude, phase = amplitude_and_phase(coefficients)
         return {"amplitude": amplitude, "phase": phase}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         amplitude, phase = amplitude_and_phase(coefficients)
         sign = "-" if phase < 0 else "+"
         return f"tau_{self.joint} += {format_number(amplitude)} sin(q_{self.joint} {sign} {format_number(abs(phase))})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with amplitude and phase."""
         return cls.at(arm, joints[0]), sine_and_cosine(float(parameters["amplitude"]), float(parameters["phase"]))
 
 
@@ -434,19 +419,16 @@ class LinkageCompensator(Compensator):
         }
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         torque = "N.m" if self.kind == "revolute" else "N"
         return {"force": torque, "ratio": "1"}.get(name) or super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         phase, ratio = self.shape
         terms = format_sum((coefficients[0], ""), (coefficients[1], f"/ sqrt(1 - {format_number(ratio)} cos x)"))
         return f"tau_{self.joint} += ({terms}) sin x, x = q_{self.joint} + ({format_number(phase)})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its four parameters."""
         shape = (float(parameters["phase"]), float(parameters["ratio"]))
         linkage = cls.at(arm, joints[0], shape=shape, bounds=((-np.pi, np.pi), LINKAGE_RATIO_RANGE))
         return linkage, np.array([parameters["amplitude"], parameters["force"]], dtype=float)
