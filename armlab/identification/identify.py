@@ -94,7 +94,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
 
 
 def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[Identifier, list[str]]:
-    arm, robot = recording.arm, _robot_path(recording)
+    arm, robot = recording.arm, robot_path(recording)
     pull = Pull("nominal", options.tolerance) if options.tolerance else NO_PULL
     if not options.choose:
         return Identifier(arm, None, options.method, pull, options.cutoff_hz, robot), []
@@ -108,8 +108,8 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
     return Identifier(arm, components, method, choice.pull, *filters), [line]
 
 
-def _robot_path(recording: Recording) -> str:
-    """The robot as it can be found from the working folder."""
+def robot_path(recording: Recording) -> str:
+    """The robot file beside the recording, as a path from the working folder; a built-in name where there is none."""
     beside = recording.folder / recording.robot
     return str(beside) if beside.is_file() else recording.robot
 
