@@ -41,7 +41,6 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
         Parameter("rest", ANGLE),
         Parameter("amplitude", TORQUE),
         Parameter("phase", "rad"),
-        Parameter("offset", TORQUE),
     ),
     contains=("torque_offset",),
     axis="position",
