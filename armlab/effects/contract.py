@@ -115,10 +115,10 @@ class Candidate(ABC):
     changes. follows_closely: on the motion as the filter of the torque leaves it, noise included, and not on a calmer
     one. of_channel: it falsifies the torque of all others (a gain, a delay, a limit); `Scene.torque` leaves those out,
     or they would act on themselves. replaces: effects at the same joint that its columns contain (Stribeck friction
-    those of Coulomb's); a model has either them or it. identical: effects that no motion tells from this law.
+    those of Coulomb's); a model has either them or it. identical: effects that no motion separates from this law.
     second_name: another effect has the same columns and comes first, so a search leaves this law out.
     names: of its parameters, in the order of `parameters`. size: number of its coefficients. of_time: its columns
-    depend on the order of the samples in time, so that single instants do not tell its torque.
+    depend on the order of the samples in time, so single instants do not determine its torque.
     looks: number of alternatives from which a scan of the residual chose it, for the correction of p-values.
     """
 

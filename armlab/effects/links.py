@@ -105,7 +105,7 @@ class Body(LinkTerm):
     """Up to ten inertial parameters: those that the arm feels.
 
     felt: indices of an independent set of the ten. clear: those of them that stand for themselves, in no sum with
-    others. Where all are clear they are told as mass, centre and inertia; else each by its own name, one that is
+    others. Where all are clear they are given as mass, centre and inertia; else each by its own name, one that is
     not clear standing for the sum that the arm feels.
     """
 
@@ -314,7 +314,7 @@ INERTIAL_ERROR = LinkFamily(INERTIAL_ERROR_FACTS, (InertialError,))
 
 @dataclass(frozen=True)
 class LinkLaw:
-    """What a link has more than its simulation, as a law; rivals: effects that no motion tells from it."""
+    """What a link has more than its simulation, as a law; rivals: effects that no motion separates from it."""
 
     candidate: Candidate
     rivals: tuple[str, ...]

@@ -397,7 +397,8 @@ def _thermometer_candidates(arm: Arm, joint: int, scenes: Sequence[Scene]) -> li
     channels = [scene.temperature for scene in scenes if scene.temperature is not None]
     if len(channels) < len(scenes):
         return []
-    lows, highs = (np.array([bound(each, axis=0) for each in channels]) for bound in (np.nanmin, np.nanmax))
+    lows = np.array([np.nanmin(each, axis=0) for each in channels])
+    highs = np.array([np.nanmax(each, axis=0) for each in channels])
     spans = zip(lows.min(axis=0).tolist(), highs.max(axis=0).tolist(), strict=True)
     return [
         [ThermometerFriction.at(arm, joint, sensor=sensor, span=(low, high))]

@@ -107,7 +107,7 @@ def sine_and_cosine(amplitude: float, phase: float) -> Array:
 
 @dataclass(frozen=True)
 class RippleFamily(Family):
-    """Orders that the motion can tell apart, up to where it passes them faster than the samples follow."""
+    """Orders that the motion can separate, up to where it passes them faster than the samples follow."""
 
     facts: Effect = TORQUE_RIPPLE_FACTS
 
@@ -147,7 +147,7 @@ class RippleFamily(Family):
 
 
 def order_resolution(scenes: Sequence[Scene], joint: int) -> tuple[float, float]:
-    """Step between orders that the motion tells apart, and the highest that it can show."""
+    """Step between orders that the motion can separate, and the highest that it can show."""
     travel = max(float(np.ptp(scene.motion.position[:, joint - 1])) for scene in scenes)
     # half of the time of the slowest run the joint is slower than this: there a wave has eight samples
     pace = min(float(np.median(np.abs(scene.motion.velocity[:, joint - 1])) * scene.step) for scene in scenes)

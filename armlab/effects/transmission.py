@@ -129,7 +129,8 @@ class Transmission(Term):
         pairs = [(self.twist(scene)[0], recorded_difference(scene, self.index)) for scene in scenes]
         if any(recorded is None for _, recorded in pairs):
             return self
-        law, recorded = (np.concatenate([np.asarray(pair[side]) for pair in pairs]) for side in (0, 1))
+        law = np.concatenate([twist for twist, _ in pairs])
+        recorded = np.concatenate([np.asarray(difference) for _, difference in pairs])
         law = law - law.mean()
         factor = float(law @ recorded / (law @ law)) if law.any() else 0.0
         return replace(self, measured=factor or None)
