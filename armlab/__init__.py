@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from armlab.common.errors import InputError
     from armlab.diagnosis.compare.comparison import Comparison, compare
     from armlab.diagnosis.diagnose import diagnose
+    from armlab.diagnosis.formats import read_verdict_file as read_verdict
     from armlab.diagnosis.result import Diagnosis
     from armlab.flows import ExperimentResult, Prediction, identify, predict, run_experiment, search
     from armlab.identification.model import Model
@@ -52,6 +53,7 @@ _PLACES = {
     "read_model": "armlab.identification.model:Model.load",
     "read_recording": "armlab.recordings.load:load_recording",
     "read_robot": "problem.robot_file:load_arm",
+    "read_verdict": "armlab.diagnosis.formats:read_verdict_file",
     "run_experiment": "armlab.flows:run_experiment",
     "search": "armlab.flows:search",
 }
@@ -77,6 +79,7 @@ __all__ = [
     "read_model",
     "read_recording",
     "read_robot",
+    "read_verdict",
     "run_experiment",
     "search",
 ]

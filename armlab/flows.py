@@ -15,6 +15,7 @@ from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import Candidate
 from armlab.identification.identifier import METHODS, Identifier
+from armlab.identification.identify import robot_path
 from armlab.identification.model import Model
 from armlab.identification.validation import RunError, run_error
 from armlab.recordings.recording import Recording
@@ -122,9 +123,7 @@ def identify(
     runs = recording.with_role("identify")
     if not runs:
         raise InputError(f"{recording.name} has no run to identify from: give one of its runs the role identify")
-    beside = recording.folder / recording.robot
-    robot = str(beside) if beside.is_file() else recording.robot
-    identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot)
+    identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot_path(recording))
     try:
         model = identifier.fit(runs).model_
     except ValueError as error:

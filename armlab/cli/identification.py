@@ -15,10 +15,12 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
 )
 @click.option("--method", type=click.Choice(METHODS), default="weighted", show_default=True, help="Estimator.")
 @click.option(
-    "--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="Of the low-pass [default: from the data]."
+    "--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="Cut-off of the low-pass [default: from the data]."
 )
 @click.option(
-    "--tolerance", type=click.FloatRange(min=0, min_open=True), help="Draw links to the robot's own, so far off."
+    "--tolerance",
+    type=click.FloatRange(min=0, min_open=True),
+    help="Relative width of a prior about the robot's links.",
 )
 @click.option("--select", "choose", is_flag=True, help="Choose cut-off, components and prior by cross-validation.")
 def identify(
@@ -86,7 +88,11 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
         click.option(
             "--counterbalance", type=click.IntRange(min=1), help="Joint that has a counterbalance (a spring)."
         ),
-        click.option("--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="[default: from the data]"),
+        click.option(
+            "--cutoff-hz",
+            type=click.FloatRange(min=0, min_open=True),
+            help="Cut-off of the low-pass [default: from the data].",
+        ),
     )
     for option in reversed(options):
         command = option(command)
@@ -96,7 +102,12 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.command()
 @click.argument("loaded", type=click.Path(path_type=Path))
 @click.option("--without", type=click.Path(path_type=Path), help="Recording without the load [default: the CAD links].")
-@click.option("--centre", type=float, nargs=3, help="Where the load sits in the link's frame, m: seek its mass alone.")
+@click.option(
+    "--centre",
+    type=float,
+    nargs=3,
+    help="Known place of the load in the link's frame, m.",
+)
 @_add_load_options
 def payload(
     loaded: Path,

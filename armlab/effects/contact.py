@@ -56,7 +56,6 @@ class Contact(Term):
         return {"start": self.shape[0], "end": self.shape[1], "peak": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         start, end = (format_number(value) for value in self.shape)
         return f"tau_{self.joint} += up to {format_number(coefficients[0])} from {start} s to {end} s of {self.run}"
 
@@ -68,7 +67,7 @@ class Contact(Term):
 
 @dataclass(frozen=True)
 class Push(Contact):
-    """A push with steep ends."""
+    """peak between start and end of one run: a push with steep ends."""
 
     form = "box"
 

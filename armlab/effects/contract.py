@@ -25,7 +25,7 @@ UNITS: Mapping[Kind, Mapping[str, str]] = MappingProxyType(
         "prismatic": {"torque": "N", "position": "m", "inertia": "kg"},
     }
 )
-MAX_SCALE_RATIO = 3.0  # times the prior scale: a coefficient that no arm has (chosen by eye)
+MAX_SCALE_RATIO = 3.0  # of the prior scale; no arm has a larger coefficient (chosen by eye)
 
 
 @dataclass(frozen=True)
@@ -49,15 +49,15 @@ class Effect:
     title: its name in a sentence; the id with spaces where it is left out.
     where: `joint` for an effect at one joint, `coupling` where torque and motion are at two joints, `link` for
     parameters of a link, `robot` for an effect of the whole arm (its joint is null).
-    usual: every arm has it, so that finding it is no surprise. dissipates: it takes energy from the motion.
-    sticks: at rest it takes any value up to its level, so that a standstill tells nothing of it.
+    usual: every arm has it. dissipates: it takes energy from the motion.
+    sticks: at rest it takes any value up to its level, so data at a standstill do not determine it.
     contains: ids of simpler effects at the same joint. A law of this effect has to explain more than they do.
-    one_of: a joint has at most one effect of each set that bears a name.
+    one_of: name of a set of effects of which a joint has at most one.
     at_most_beside: ids of other effects, and how many of each may stand beside this one.
     equal_sums: pairs of effects which together are this effect exactly, for any motion.
-    prior_scale: standard deviation of its coefficients (SI units) that a fit draws them to zero with; infinite
-    where nothing is known. single_event: it happens once, in one stretch of one run, so that no other data repeat it.
-    scanned: its places are found by a look at the residual, not by columns alone.
+    prior_scale: standard deviation (SI units) of the normal prior about zero of its coefficients; infinite where
+    nothing is known. single_event: it happens once, in one stretch of one run, and no other data repeat it.
+    scanned: its places are found by a scan of the residual, not by columns alone.
     in_links: the links of a model hold it, so that it is no term beside them.
     axis: the variable against which a figure shows it; `cycle` is the position within one wave, of which a parameter
     `order` says how many there are in a turn.
@@ -118,11 +118,11 @@ class Candidate(ABC):
     changes. follows_closely: on the motion as the filter of the torque leaves it, noise included, and not on a calmer
     one. of_channel: it falsifies the torque of all others (a gain, a delay, a limit); `Scene.torque` leaves those out,
     or they would act on themselves. replaces: effects at the same joint that its columns contain (Stribeck friction
-    those of Coulomb's); a model has either them or it. identical: effects that no motion tells from this law.
-    second_name: another effect names the same columns first, so that a search does not look for this law.
+    those of Coulomb's); a model has either them or it. identical: effects that no motion separates from this law.
+    second_name: another effect has the same columns and comes first, so a search leaves this law out.
     names: of its parameters, in the order of `parameters`. size: number of its coefficients. of_time: its columns
-    depend on the order of the samples in time, so that single instants do not tell its torque.
-    looks: among how many alternatives a scan of the residual has picked it, for the correction of what was tried.
+    depend on the order of the samples in time, so single instants do not determine its torque.
+    looks: number of alternatives from which a scan of the residual chose it, for the correction of p-values.
     """
 
     facts: ClassVar[Effect]
@@ -187,7 +187,7 @@ class Candidate(ABC):
 
     @abstractmethod
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
-        """Which law of physics these coefficients break beyond their uncertainty, in a few words; else None."""
+        """The law of physics that these coefficients break beyond their uncertainty, in a few words; else None."""
 
     def absurdity(self, coefficients: Array) -> str | None:
         """Why no arm has an effect of this size, in a few words; else None."""

@@ -67,21 +67,17 @@ class JointCoupling(Term):
         }
 
     def columns(self, scene: Scene) -> Array:
-        """One column for each name."""
         parts = self._parts(scene)
         return self._stacked(*(parts[name] for name in self.names))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The coefficients by their names."""
         return dict(zip(self.names, coefficients.tolist(), strict=True))
 
     @property
     def size(self) -> int:
-        """One coefficient for each name."""
         return len(self.names)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own, other = self.joints
         side = f"sgn(qd_{other} + qd_{own})" if self.with_own else f"sgn(qd_{other})"
         texts = {"coefficient": f"qd_{other}", "level": side, "inertia": f"qdd_{other}"}
@@ -102,7 +98,7 @@ class JointCoupling(Term):
 
 @dataclass(frozen=True)
 class FrictionCoupling(JointCoupling):
-    """Viscous and Coulomb friction alone."""
+    """coefficient qd_k + level sgn(qd_k + qd_j): friction without inertia."""
 
     form = "friction"
     names = ("coefficient", "level")
@@ -110,7 +106,10 @@ class FrictionCoupling(JointCoupling):
 
 @dataclass(frozen=True)
 class CarriedCoupling(FrictionCoupling):
-    """The other joint's own friction alone; its inertia beside it would be too much like a shared motor's."""
+    """coefficient qd_k + level sgn(qd_k): the other joint's own friction.
+
+    Its inertia is left out: it would resemble that of a shared motor.
+    """
 
     form = "carried"
     with_own = False
@@ -118,7 +117,7 @@ class CarriedCoupling(FrictionCoupling):
 
 @dataclass(frozen=True)
 class ViscousCoupling(JointCoupling):
-    """Viscous friction alone."""
+    """coefficient qd_k."""
 
     form = "viscous"
     names = ("coefficient",)
@@ -126,7 +125,7 @@ class ViscousCoupling(JointCoupling):
 
 @dataclass(frozen=True)
 class CoulombCoupling(JointCoupling):
-    """Coulomb friction alone."""
+    """level sgn(qd_k + qd_j)."""
 
     form = "Coulomb"
     names = ("level",)
@@ -134,7 +133,7 @@ class CoulombCoupling(JointCoupling):
 
 @dataclass(frozen=True)
 class InertiaCoupling(JointCoupling):
-    """Inertia alone."""
+    """inertia qdd_k."""
 
     form = "inertia"
     names = ("inertia",)
@@ -157,7 +156,6 @@ class CouplingFamily(Family):
     def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
-        """The coupling with these terms."""
         return form_from_parameters(COUPLING_FORMS, arm, joints, parameters, form)
 
 

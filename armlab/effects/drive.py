@@ -55,7 +55,6 @@ class RotorInertia(Term):
     names = ("inertia",)
 
     def columns(self, scene: Scene) -> Array:
-        """The acceleration."""
         return self._stacked(scene.motion.acceleration[:, self.own])
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
@@ -67,12 +66,10 @@ class RotorInertia(Term):
         return {"armature": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau_{self.joint} += {format_number(coefficients[0])} qdd_{self.joint}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with an inertia."""
         return cls.at(arm, joints[0]), np.array([parameters["inertia"]])
 
 
@@ -95,12 +92,10 @@ class TorqueGain(Term):
         return {"gain": 1 + float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau_{self.joint} *= {format_number(1 + coefficients[0])}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a gain."""
         return cls.at(arm, joints[0]), np.array([parameters["gain"] - 1.0])
 
 
@@ -128,48 +123,41 @@ class TorqueGainBySign(Term):
         return dict(zip(self.names, (1 + coefficients).tolist(), strict=True))
 
     def unit(self, name: str) -> str:
-        """A factor has none."""
         return "1"
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         above, below = (format_number(1 + value) for value in coefficients.tolist())
         return f"tau_{self.joint} *= {above} where it is positive, {below} where it is negative"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with two gains."""
         return cls.at(arm, joints[0]), np.array([parameters[name] for name in cls.names]) - 1.0
 
 
 @dataclass(frozen=True)
 class TorqueOffset(Term):
-    """A constant."""
+    """offset: a constant torque."""
 
     facts = TORQUE_OFFSET_FACTS
     names = ("offset",)
 
     def columns(self, scene: Scene) -> Array:
-        """Ones."""
         return self._stacked(np.ones(len(scene.time)))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The constant."""
         return {"offset": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau_{self.joint} += {format_number(coefficients[0])}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a constant."""
         return cls.at(arm, joints[0]), np.array([parameters["offset"]])
 
 
 @dataclass(frozen=True)
 class TorqueSaturation(Term):
-    """Torque cut at a limit; shape: the limit. Where it is this effect, its coefficient is one."""
+    """|tau| <= limit: torque cut at a limit; shape: the limit. Its coefficient is one where the effect is real."""
 
     facts = TORQUE_SATURATION_FACTS
     names = ("limit",)
@@ -188,11 +176,9 @@ class TorqueSaturation(Term):
         return self._stacked(np.clip(torque, -limit, limit) - torque)
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The limit."""
         return {"limit": self.shape[0]}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"|tau_{self.joint}| <= {format_number(self.shape[0])}"
 
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
@@ -204,7 +190,6 @@ class TorqueSaturation(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a limit."""
         limit = float(parameters["limit"])
         return cls.at(arm, joints[0], shape=(limit,), bounds=((limit / 2, limit * 2),)), np.ones(1)
 
@@ -241,7 +226,6 @@ class TorqueBend(Term):
         return super().unit("limit")
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own, knee = self.joint, format_number(self.shape[0])
         bend = format_number(float(coefficients[0]) / self.shape[0])
         return f"tau_{own} -= {bend} sgn(tau_{own}) (|tau_{own}| - {knee})^2 where |tau_{own}| > {knee}"
@@ -253,7 +237,6 @@ class TorqueBend(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its limit and knee."""
         limit, knee = (float(parameters[name]) for name in cls.names)
         bend = 0.25 / (limit / knee - 1)
         return cls.at(arm, joints[0], shape=(knee,), bounds=((knee / 2, knee * 2),)), np.array([bend])

@@ -132,11 +132,9 @@ class CoulombFriction(Term):
     names = ("level",)
 
     def columns(self, scene: Scene) -> Array:
-        """The direction of motion."""
         return self._stacked(direction_of_motion(scene, self.own))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The level."""
         return {"level": float(coefficients[0])}
 
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
@@ -144,12 +142,10 @@ class CoulombFriction(Term):
         return {"frictionloss": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau_{self.joint} += {format_number(coefficients[0])} sgn(qd_{self.joint})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a level."""
         return cls.at(arm, joints[0]), np.array([parameters["level"]])
 
 
@@ -161,11 +157,9 @@ class ViscousFriction(Term):
     names = ("coefficient",)
 
     def columns(self, scene: Scene) -> Array:
-        """The velocity."""
         return self._stacked(scene.motion.velocity[:, self.own])
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The coefficient."""
         return {"coefficient": float(coefficients[0])}
 
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
@@ -173,12 +167,10 @@ class ViscousFriction(Term):
         return {"damping": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau_{self.joint} += {format_number(coefficients[0])} qd_{self.joint}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a coefficient."""
         return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
 
 
@@ -195,21 +187,17 @@ class PowerFriction(Term):
         return [cls.at(arm, joint, shape=(exponent,), bounds=(POWER_EXPONENT_RANGE,)) for exponent in POWER_EXPONENTS]
 
     def columns(self, scene: Scene) -> Array:
-        """The power of velocity with its sign."""
         return self._stacked(signed_power(scene.motion.velocity[:, self.own], self.shape[0]))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Coefficient and exponent."""
         return {"coefficient": float(coefficients[0]), "exponent": self.shape[0]}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own = self.joint
         return f"tau_{own} += {format_number(coefficients[0])} |qd_{own}|^{format_number(self.shape[0])} sgn(qd_{own})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a coefficient and an exponent."""
         shape = (float(parameters["exponent"]),)
         return cls.at(arm, joints[0], shape=shape, bounds=(POWER_EXPONENT_RANGE,)), np.array(
             [parameters["coefficient"]]
@@ -261,12 +249,10 @@ class StribeckFriction(Term):
         return np.asarray(np.exp(-((np.abs(velocity) / scale) ** exponent)))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Both levels, velocity and exponent."""
         level, rise = (float(value) for value in coefficients)
         return {"level": level, "static_level": level + rise, "velocity": self.shape[0], "exponent": self.shape[1]}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own, (scale, exponent) = self.joint, self.shape
         inner = f"exp(-(|qd_{own}|/{format_number(scale)})^{format_number(exponent)})"
         return f"tau_{own} += ({format_sum((coefficients[0], ''), (coefficients[1], inner))}) sgn(qd_{own})"
@@ -287,7 +273,6 @@ class StribeckFriction(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its four parameters."""
         level, static, scale, exponent = (float(parameters[name]) for name in cls.names)
         bounds = ((scale / 10, scale * 10), STRIBECK_EXPONENT_RANGE)
         return cls.at(arm, joints[0], shape=(scale, exponent), bounds=bounds), np.array([level, static - level])
@@ -306,7 +291,6 @@ class ByDirection(Term):
     exponent: ClassVar[float]
 
     def columns(self, scene: Scene) -> Array:
-        """The law forwards, and backwards."""
         if not self.exponent:
             return self._stacked(*directions_apart(scene, self.own))
         velocity = scene.motion.velocity[:, self.own]
@@ -317,14 +301,12 @@ class ByDirection(Term):
         return {"positive": float(coefficients[0]), "negative": float(coefficients[1]), "exponent": self.exponent}
 
     def unit(self, name: str) -> str:
-        """Unit of a level or a slope."""
         if name == "exponent":
             return "1"
         unit = super().unit(name)
         return f"{unit}.s/{'rad' if self.kind == 'revolute' else 'm'}" if self.exponent else unit
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         what = f"|qd_{self.joint}|" if self.exponent else ""
         forwards, backwards = format_sum((coefficients[0], what)), format_sum((-coefficients[1], what))
         return f"tau_{self.joint} += {forwards} for qd_{self.joint} > 0, {backwards} for qd_{self.joint} < 0"
@@ -352,7 +334,7 @@ class ByDirection(Term):
 
 @dataclass(frozen=True)
 class Slopes(ByDirection):
-    """Viscous friction by direction."""
+    """positive qd where qd > 0, negative qd where qd < 0: viscous friction by direction."""
 
     form = "slopes"
     exponent = 1.0
@@ -361,7 +343,7 @@ class Slopes(ByDirection):
 
 @dataclass(frozen=True)
 class Levels(ByDirection):
-    """Coulomb friction by direction."""
+    """positive where qd > 0, -negative where qd < 0: Coulomb friction by direction."""
 
     form = "levels"
     second_name = True
@@ -380,7 +362,6 @@ class LevelsAndSlopes(Term):
     replaces = ("coulomb_friction", "viscous_friction", "torque_offset")
 
     def columns(self, scene: Scene) -> Array:
-        """Both laws forwards and backwards."""
         velocity = scene.motion.velocity[:, self.own]
         forwards, backwards = np.maximum(velocity, 0), np.minimum(velocity, 0)
         return self._stacked(*directions_apart(scene, self.own), forwards, backwards)
@@ -390,13 +371,11 @@ class LevelsAndSlopes(Term):
         return dict(zip(self.names, coefficients.tolist(), strict=True))
 
     def unit(self, name: str) -> str:
-        """Unit of a level or a slope."""
         if name.endswith("slope"):
             return VISCOUS_COEFFICIENT.unit_for(self.kind)
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own = f"qd_{self.joint}"
         forwards = format_sum((coefficients[0], ""), (coefficients[2], own))
         backwards = format_sum((-coefficients[1], ""), (coefficients[3], own))
@@ -413,7 +392,6 @@ class LevelsAndSlopes(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its four parameters."""
         return cls.at(arm, joints[0]), np.array([float(parameters[name]) for name in cls.names])
 
 
@@ -434,17 +412,14 @@ class LoadFriction(Term):
         return self._stacked(load * direction_of_motion(scene, self.own))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The coefficient."""
         return {"coefficient": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         own = self.joint
         return f"tau_{own} += {format_number(coefficients[0])} |tau_rigid_{own}| sgn(qd_{own})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with a coefficient."""
         return cls.at(arm, joints[0]), np.array([parameters["coefficient"]])
 
 

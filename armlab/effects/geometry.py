@@ -57,7 +57,6 @@ class BaseTilt(Term):
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
-        """The effect of the whole robot."""
         first, second = _across(np.array(arm.gravity))
         across = (tuple(first.tolist()), tuple(second.tolist()))
         return cls(None, (), tuple(range(len(arm))), nominal=arm.gravity, across=across, **details)
@@ -74,11 +73,9 @@ class BaseTilt(Term):
         return np.asarray(left * nominal + sideways)
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Gravity in the base frame."""
         return {"gravity": tuple(self.gravity(coefficients).tolist())}
 
     def changed_gravity(self, coefficients: Array) -> Array:
-        """Gravity in the base frame."""
         return self.gravity(coefficients)
 
     def equation(self, coefficients: Array) -> str:
@@ -97,7 +94,6 @@ class BaseTilt(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The tilt with a vector of gravity."""
         tilt = cls.at(arm, 0)
         return tilt, np.array(tilt.across) @ np.array(parameters["gravity"], dtype=float)
 
@@ -109,13 +105,11 @@ class TiltFamily(Family):
     facts: Effect = BASE_TILT_FACTS
 
     def candidates(self, arm: Arm, scenes: Sequence[Scene]) -> list[list[Candidate]]:
-        """The tilt."""
         return [[BaseTilt.at(arm, 0)]]
 
     def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
-        """The tilt with a vector of gravity."""
         return form_from_parameters((BaseTilt,), arm, joints, parameters, form)
 
 
@@ -146,7 +140,6 @@ class EncoderOffset(Term):
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
-        """The effect at a joint."""
         return cls(joint, (joint,), tuple(range(len(arm))), arm.joints[joint - 1].kind, **details)
 
     def columns(self, scene: Scene) -> Array:
@@ -156,16 +149,13 @@ class EncoderOffset(Term):
         return directional_derivative(scene, Motion(*change))[:, :, None]
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The offset."""
         return {"offset": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"q_{self.joint} = recorded - {format_number(coefficients[0])}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with an offset."""
         return cls.at(arm, joints[0]), np.array([parameters["offset"]])
 
 
@@ -184,7 +174,6 @@ class GeometryError(Term):
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
-        """The error at a joint, from 1."""
         return cls(joint, (joint,), tuple(range(len(arm))), **details)
 
     @staticmethod
@@ -197,16 +186,13 @@ class GeometryError(Term):
         return geometry_derivative(scene, self.joints[0] - 1, self.changed)[:, :, None]
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The error."""
         return {"offset": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The error with its number."""
         return f"{self.what}_{self.joint} += {format_number(coefficients[0])} {self.unit('offset')}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The error with its size."""
         return cls.at(arm, joints[0]), np.array([parameters["offset"]])
 
 
@@ -262,7 +248,6 @@ class TwistError(GeometryError):
         return replace(joint, after=joint.after @ rotation_x(size))
 
     def unit(self, name: str) -> str:
-        """Radians."""
         return "rad"
 
 
@@ -289,7 +274,6 @@ class GeometryFamily(Family):
     def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
-        """The error with its size."""
         return form_from_parameters(GEOMETRY_FORMS, arm, joints, parameters, form)
 
 

@@ -106,7 +106,7 @@ class Body(LinkTerm):
     """Up to ten inertial parameters: those that the arm feels.
 
     felt: indices of an independent set of the ten. clear: those of them that stand for themselves, in no sum with
-    others. Where all are clear they are told as mass, centre and inertia; else each by its own name, one that is
+    others. Where all are clear they are given as mass, centre and inertia; else each by its own name, one that is
     not clear standing for the sum that the arm feels.
     """
 
@@ -121,7 +121,6 @@ class Body(LinkTerm):
         return super().at(arm, joint, felt=felt, clear=clear, **details)
 
     def columns(self, scene: Scene) -> Array:
-        """Torque of each felt parameter at one."""
         return torque_of_parameters(scene, self.link, np.eye(10)[list(self.felt)])
 
     def ten(self, coefficients: Array) -> Array:
@@ -142,7 +141,6 @@ class Body(LinkTerm):
         return "mass" if index == 0 and index in self.clear else PARAMETER_NAMES[index]
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         return PARAMETER_UNITS[PARAMETER_NAMES.index(name)] if name in PARAMETER_NAMES else super().unit(name)
 
     @property
@@ -155,7 +153,6 @@ class Body(LinkTerm):
         return self.ten(coefficients)
 
     def equation(self, coefficients: Array) -> str:
-        """The parameters with their numbers."""
         named = zip(self.felt, coefficients.tolist(), strict=True)
         return ", ".join(f"{PARAMETER_NAMES[index]}_{self.link} += {format_number(value)}" for index, value in named)
 
@@ -265,7 +262,6 @@ class PointPayload(LinkTerm):
         return np.array([1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Mass and centre."""
         return {"mass": float(coefficients[0]), "centre": self.shape}
 
     def added_body(self, coefficients: Array) -> Array:
@@ -283,7 +279,6 @@ class PointPayload(LinkTerm):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The mass at its centre."""
         centre = tuple(float(value) for value in parameters["centre"])
         return cls.at(arm, joints[0], shape=centre, bounds=((-MAX_CENTRE_M, MAX_CENTRE_M),) * 3), np.array(
             [parameters["mass"]]
@@ -320,7 +315,7 @@ INERTIAL_ERROR = LinkFamily(INERTIAL_ERROR_FACTS, (InertialError,))
 
 @dataclass(frozen=True)
 class LinkLaw:
-    """What a link has more than its simulation, as a law; rivals: effects that no motion tells from it."""
+    """What a link has more than its simulation, as a law; rivals: effects that no motion separates from it."""
 
     candidate: Candidate
     rivals: tuple[str, ...]

@@ -85,7 +85,6 @@ class DahlFriction(Term):
         return [cls.at(arm, joint, shape=(share * travel,), bounds=bounds) for share in PRESLIDING_WAYS]
 
     def columns(self, scene: Scene) -> Array:
-        """The state along the recorded motion."""
         return self._stacked(mean_within_samples(dahl_state(positions_within_samples(scene, self.own), self.shape[0])))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
@@ -94,14 +93,12 @@ class DahlFriction(Term):
         return {"level": level, "stiffness": level / self.shape[0]}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own = self.joint
         level, way = format_number(coefficients[0]), format_number(self.shape[0])
         return f"tau_{own} += {level} z, dz/dq_{own} = (1 - z sgn(qd_{own}))/{way}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with level and stiffness."""
         level = float(parameters["level"])
         way = level / float(parameters["stiffness"])
         return cls.at(arm, joints[0], shape=(way,), bounds=((way / 10, way * 10),)), np.array([level])
@@ -134,7 +131,6 @@ class LuGreFriction(Term):
         return [cls.at(arm, joint, shape=shape, bounds=(ways, STATIC_RATIO_RANGE, speeds)) for shape in shapes]
 
     def columns(self, scene: Scene) -> Array:
-        """The state along the recorded motion."""
         way, ratio, slow = self.shape
         velocity = scene.motion.velocity[:, self.own]
         curve = 1 + (ratio - 1) * np.exp(-((velocity / slow) ** 2))
@@ -156,7 +152,6 @@ class LuGreFriction(Term):
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own, (way, ratio, slow) = self.joint, self.shape
         curve = f"1 + {format_number(ratio - 1)} exp(-(qd_{own}/{format_number(slow)})^2)"
         level = format_number(coefficients[0])
@@ -164,7 +159,6 @@ class LuGreFriction(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its four parameters."""
         level, stiffness, static, slow = (float(parameters[name]) for name in cls.names)
         way = level / stiffness
         bounds = ((way / 10, way * 10), STATIC_RATIO_RANGE, (slow / 10, slow * 10))
@@ -246,13 +240,11 @@ class Drift(Term):
         return {"initial": cold, "final": cold + change, **dict(zip(("time_constant",), self.shape, strict=False))}
 
     def unit(self, name: str) -> str:
-        """Unit of a coefficient or a level."""
         if self.coulomb and name in ("initial", "final"):
             return "N.m" if self.kind == "revolute" else "N"
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         own = self.joint
         friction = f"sgn(qd_{own})" if self.coulomb else f"qd_{own}"
         cold, change = format_number(coefficients[0]), format_number(abs(coefficients[1]))
@@ -273,7 +265,7 @@ class Drift(Term):
 
 @dataclass(frozen=True)
 class ViscousDrift(Drift):
-    """Viscous friction over the time."""
+    """(initial + (final - initial) w) qd, w = 1 - exp(-t / time_constant)."""
 
     form = "viscous over time"
     replaces = ("viscous_friction",)
@@ -281,7 +273,7 @@ class ViscousDrift(Drift):
 
 @dataclass(frozen=True)
 class CoulombDrift(Drift):
-    """Coulomb friction over the time."""
+    """(initial + (final - initial) w) sgn(qd), w = 1 - exp(-t / time_constant)."""
 
     form = "Coulomb over time"
     coulomb = True
@@ -311,7 +303,6 @@ class HeatedFriction(Drift):
         return {**super().parameters(coefficients), "power": self.power}
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         speed = "rad" if self.kind == "revolute" else "m"
         return f"{speed}2/s2" if name == "power" else super().unit(name)
 
@@ -344,7 +335,6 @@ class ThermometerFriction(Drift):
         return levels | {"sensor": float(self.sensor + 1), "coldest": self.span[0], "warmest": self.span[1]}
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         return {"sensor": "1", "coldest": "degC", "warmest": "degC"}.get(name) or super().unit(name)
 
     def warmth(self, scene: Scene) -> Array:
@@ -360,7 +350,6 @@ class ThermometerFriction(Drift):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its parameters."""
         span = (float(parameters["coldest"]), float(parameters["warmest"]))
         return cls.at(arm, joints[0], sensor=int(parameters["sensor"]) - 1, span=span), cold_and_change(parameters)
 
@@ -408,7 +397,8 @@ def _thermometer_candidates(arm: Arm, joint: int, scenes: Sequence[Scene]) -> li
     channels = [scene.temperature for scene in scenes if scene.temperature is not None]
     if len(channels) < len(scenes):
         return []
-    lows, highs = (np.array([bound(each, axis=0) for each in channels]) for bound in (np.nanmin, np.nanmax))
+    lows = np.array([np.nanmin(each, axis=0) for each in channels])
+    highs = np.array([np.nanmax(each, axis=0) for each in channels])
     spans = zip(lows.min(axis=0).tolist(), highs.max(axis=0).tolist(), strict=True)
     return [
         [ThermometerFriction.at(arm, joint, sensor=sensor, span=(low, high))]

@@ -26,7 +26,7 @@ class ParameterValue:
 def parameter_values(
     candidate: Candidate, coefficients: Array, covariance: Array | None, factor: float
 ) -> tuple[ParameterValue, ...]:
-    """The parameters in the candidate's order; intervals are None where the covariance tells nothing of them.
+    """The parameters in the candidate's order; intervals are None where the covariance does not determine them.
 
     covariance: of the coefficients, or of the coefficients and then the shapes. factor: from a standard error to half
     an interval.

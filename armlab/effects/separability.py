@@ -1,4 +1,4 @@
-"""Which effects a motion can tell apart: angles between their columns, after all that is free was projected out."""
+"""Which effects a motion can separate: angles between their columns, after all free columns were projected out."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -41,7 +41,6 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
         Parameter("rest", ANGLE),
         Parameter("amplitude", TORQUE),
         Parameter("phase", "rad"),
-        Parameter("offset", TORQUE),
     ),
     contains=("torque_offset",),
     axis="position",
@@ -72,12 +71,10 @@ class TorqueRipple(Term):
     size = 2
 
     def columns(self, scene: Scene) -> Array:
-        """Sine and cosine."""
         angle = self.shape[0] * scene.motion.position[:, self.own]
         return self._stacked(np.sin(angle), np.cos(angle))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Order, amplitude and phase."""
         amplitude, phase = amplitude_and_phase(coefficients)
         return {"order": self.shape[0], "amplitude": amplitude, "phase": phase}
 
@@ -86,7 +83,6 @@ class TorqueRipple(Term):
         return "rad/m" if name == "order" and self.kind == "prismatic" else super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         amplitude, phase = amplitude_and_phase(coefficients)
         sign = "-" if phase < 0 else "+"
         inner = f"{format_number(self.shape[0])} q_{self.joint} {sign} {format_number(abs(phase))}"
@@ -94,7 +90,6 @@ class TorqueRipple(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with order, amplitude and phase."""
         order = float(parameters["order"])
         ripple = cls.at(arm, joints[0], shape=(order,), bounds=((order - 1, order + 1),))
         return ripple, sine_and_cosine(float(parameters["amplitude"]), float(parameters["phase"]))
@@ -112,7 +107,7 @@ def sine_and_cosine(amplitude: float, phase: float) -> Array:
 
 @dataclass(frozen=True)
 class RippleFamily(Family):
-    """Orders that the motion can tell apart, up to where it passes them faster than the samples follow."""
+    """Orders that the motion can separate, up to where it passes them faster than the samples follow."""
 
     facts: Effect = TORQUE_RIPPLE_FACTS
 
@@ -148,12 +143,11 @@ class RippleFamily(Family):
     def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
-        """The ripple with order, amplitude and phase."""
         return form_from_parameters((TorqueRipple,), arm, joints, parameters, form)
 
 
 def order_resolution(scenes: Sequence[Scene], joint: int) -> tuple[float, float]:
-    """Step between orders that the motion tells apart, and the highest that it can show."""
+    """Step between orders that the motion can separate, and the highest that it can show."""
     travel = max(float(np.ptp(scene.motion.position[:, joint - 1])) for scene in scenes)
     # half of the time of the slowest run the joint is slower than this: there a wave has eight samples
     pace = min(float(np.median(np.abs(scene.motion.velocity[:, joint - 1])) * scene.step) for scene in scenes)
@@ -228,7 +222,6 @@ class LinearSpring(Term):
         return self._stacked(scene.motion.position[:, self.own], np.ones(len(scene.time)))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Stiffness and rest position."""
         slope, constant = (float(value) for value in coefficients)
         return {"stiffness": slope, "rest": -constant / slope if slope else 0.0}
 
@@ -239,7 +232,6 @@ class LinearSpring(Term):
         return {"stiffness": stiffness, "springref": rest} if stiffness > 0 else {}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         named = self.parameters(coefficients)
         rest = float(np.asarray(named["rest"]))
         sign = "+" if rest < 0 else "-"
@@ -249,7 +241,6 @@ class LinearSpring(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with stiffness and rest position."""
         stiffness, rest = float(parameters["stiffness"]), float(parameters["rest"])
         return cls.at(arm, joints[0]), np.array([stiffness, -stiffness * rest])
 
@@ -281,13 +272,11 @@ class HardeningSpring(Term):
         return {"stiffness": float(coefficients[0]), "rest": self.shape[0], "cubic": float(coefficients[1])}
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         if name == "cubic":
             return f"{'N.m' if self.kind == 'revolute' else 'N'}/{'rad' if self.kind == 'revolute' else 'm'}3"
         return super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         linear, cubic = (format_number(value) for value in coefficients)
         return f"tau_{self.joint} += {linear} x + {cubic} x^3, x = q_{self.joint} - ({format_number(self.shape[0])})"
 
@@ -298,7 +287,6 @@ class HardeningSpring(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its three parameters."""
         rest = float(parameters["rest"])
         spring = cls.at(arm, joints[0], shape=(rest,), bounds=((rest - 1, rest + 1),))
         return spring, np.array([parameters["stiffness"], parameters["cubic"]], dtype=float)
@@ -314,7 +302,7 @@ LINKAGE_RATIO, LINKAGE_RATIO_RANGE = 0.6, (0.05, 0.98)
 
 @dataclass(frozen=True)
 class SpringCompensator(LinearSpring):
-    """A linear spring."""
+    """stiffness (q - rest): a linear spring that carries gravity."""
 
     facts = GRAVITY_COMPENSATOR_FACTS
     form = "linear spring"
@@ -370,24 +358,20 @@ class SineCompensator(Compensator):
         return [cls.at(arm, joint, gravity=gravity_wave(scenes, joint))] if _turns_against_gravity(arm, joint) else []
 
     def columns(self, scene: Scene) -> Array:
-        """Sine and cosine."""
         angle = scene.motion.position[:, self.own]
         return self._stacked(np.sin(angle), np.cos(angle))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Amplitude and phase."""
         amplitude, phase = amplitude_and_phase(coefficients)
         return {"amplitude": amplitude, "phase": phase}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         amplitude, phase = amplitude_and_phase(coefficients)
         sign = "-" if phase < 0 else "+"
         return f"tau_{self.joint} += {format_number(amplitude)} sin(q_{self.joint} {sign} {format_number(abs(phase))})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with amplitude and phase."""
         return cls.at(arm, joints[0]), sine_and_cosine(float(parameters["amplitude"]), float(parameters["phase"]))
 
 
@@ -434,19 +418,16 @@ class LinkageCompensator(Compensator):
         }
 
     def unit(self, name: str) -> str:
-        """Unit of a parameter."""
         torque = "N.m" if self.kind == "revolute" else "N"
         return {"force": torque, "ratio": "1"}.get(name) or super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its numbers."""
         phase, ratio = self.shape
         terms = format_sum((coefficients[0], ""), (coefficients[1], f"/ sqrt(1 - {format_number(ratio)} cos x)"))
         return f"tau_{self.joint} += ({terms}) sin x, x = q_{self.joint} + ({format_number(phase)})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its four parameters."""
         shape = (float(parameters["phase"]), float(parameters["ratio"]))
         linkage = cls.at(arm, joints[0], shape=shape, bounds=((-np.pi, np.pi), LINKAGE_RATIO_RANGE))
         return linkage, np.array([parameters["amplitude"], parameters["force"]], dtype=float)

@@ -61,7 +61,7 @@ class Term(Candidate):
         return self.facts.parameter(name).unit_for(self.kind)
 
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
-        """Names the parameter that should be positive and is not."""
+        """The first parameter that should be positive and is not, beyond its uncertainty; else None."""
         positive = {each.name for each in self.facts.parameters if each.positive}
         for name, value in self.parameters(coefficients).items():
             if (
@@ -73,7 +73,7 @@ class Term(Candidate):
         return None
 
     def _doubt(self, name: str, coefficients: Array, covariance: Array | None) -> float:
-        """CERTAIN standard errors of a scalar parameter, by the delta method."""
+        """SIGN_SIGMAS standard errors of a scalar parameter, by the delta method."""
         if covariance is None:
             return 0.0
         slope = np.empty(len(coefficients))
@@ -83,7 +83,7 @@ class Term(Candidate):
         return SIGN_SIGMAS * float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
 
     def _stacked(self, *columns: Array) -> Array:
-        """Columns (samples,) of one joint as the contract wants them."""
+        """Columns (samples,) of one joint, stacked to (samples, 1, coefficients)."""
         return np.stack(columns, axis=-1)[:, None, :]
 
 
@@ -136,7 +136,7 @@ def top_speed(scenes: Sequence[Scene], joint: int) -> float:
 
 
 def format_number(value: float) -> str:
-    """A number for an equation: four digits."""
+    """A number with four significant digits."""
     return f"{value:.4g}"
 
 

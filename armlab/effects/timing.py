@@ -70,7 +70,6 @@ class LateTorque(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its delay."""
         seconds = float(parameters["seconds"])
         late = cls.at(arm, joints[0] if joints else 1, shape=(1e-3,), bounds=((-LONGEST, LONGEST),))
         return late.with_shape((seconds,)), np.array([seconds])
@@ -84,11 +83,9 @@ class TimeDelay(LateTorque):
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
-        """The effect of the whole robot."""
         return cls(None, (), tuple(range(len(arm))), **details)
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau(t) = tau_model(t - {format_number(coefficients[0])} s)"
 
 
@@ -100,7 +97,6 @@ class TorqueSkew(LateTorque):
     form = "torque"
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"tau_{self.joint}(t) = tau_model_{self.joint}(t - {format_number(coefficients[0])} s)"
 
 
@@ -136,12 +132,10 @@ class PositionSkew(Term):
         return {"seconds": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         return f"q_{self.joint}(t) = q_recorded_{self.joint}(t - {format_number(coefficients[0])} s)"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The effect with its delay."""
         return cls.at(arm, joints[0]), np.array([parameters["seconds"]])
 
 
@@ -158,7 +152,6 @@ class DelayFamily(Family):
     def from_parameters(
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
-        """The delay with its seconds."""
         return form_from_parameters((TimeDelay,), arm, joints, parameters, form)
 
 

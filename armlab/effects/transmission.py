@@ -40,9 +40,7 @@ BACKLASH_FACTS = Effect(
 PHASE_STEP = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
 MAX_RESONANCE_HZ = 400.0  # of a resonance: stiffer springs follow their load at once, whatever the model's inertia is
-MIN_INERTIA_RATIO = (
-    0.01  # of the greatest inertia that the joint feels in the run: a model may be wrong enough to have less
-)
+MIN_INERTIA_RATIO = 0.01  # of the greatest inertia felt in the run; a wrong model may have less
 
 
 @dataclass(frozen=True)
@@ -131,7 +129,8 @@ class Transmission(Term):
         pairs = [(self.twist(scene)[0], recorded_difference(scene, self.index)) for scene in scenes]
         if any(recorded is None for _, recorded in pairs):
             return self
-        law, recorded = (np.concatenate([np.asarray(pair[side]) for pair in pairs]) for side in (0, 1))
+        law = np.concatenate([twist for twist, _ in pairs])
+        recorded = np.concatenate([np.asarray(difference) for _, difference in pairs])
         law = law - law.mean()
         factor = float(law @ recorded / (law @ law)) if law.any() else 0.0
         return replace(self, measured=factor or None)
@@ -155,7 +154,7 @@ class Transmission(Term):
 
 @dataclass(frozen=True)
 class JointElasticity(Transmission):
-    """A spring (Spong 1987). Coefficient: the compliance that the torque shows.
+    """q = theta + twist, stiffness twist = -load: a spring (Spong 1987). Coefficient: the compliance, 1 / stiffness.
 
     shape: the stiffness that its resonance has, N m/rad.
     """
@@ -186,7 +185,6 @@ class JointElasticity(Transmission):
         return super().unit("stiffness")
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         stiffness = format_number(1 / coefficients[0] if coefficients[0] else np.inf)
         return f"q_{self.joint} = theta_{self.joint} - tau_{self.joint} / {stiffness}"
 
@@ -201,7 +199,7 @@ class JointElasticity(Transmission):
 
 @dataclass(frozen=True)
 class Backlash(Transmission):
-    """Play between two walls that do not bounce. Coefficient: the gap that the torque shows.
+    """q = theta + twist, |twist| <= gap / 2: play between walls that do not bounce. Coefficient: the gap.
 
     shape: the gap that is crossed, rad.
     """
@@ -243,13 +241,11 @@ class Backlash(Transmission):
         return super().unit("gap")
 
     def equation(self, coefficients: Array) -> str:
-        """The law with its number."""
         own = self.joint
         return f"q_{own} = theta_{own} - {format_number(coefficients[0])}/2 sgn(tau_{own})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        """The play with its gap."""
         gap = float(parameters["gap"])
         crossed = float(parameters.get("crossed_gap", gap))
         return cls.at(arm, joints[0], shape=(crossed,), bounds=(GAP_RANGE,)), np.array([gap])

@@ -1,9 +1,9 @@
-"""Covariance of estimates whose errors are tied together in time and between joints.
+"""Covariance of estimates whose errors are correlated in time and between joints.
 
-A filter, a controller and what the model leaves out all tie neighbouring errors: intervals that take them as
-independent are far too short. Here: the larger of two variances, parameter by
-parameter. Newey and West 1987 (lag of Andrews 1991) holds for errors whose size changes with the motion, but is
-short in short runs; Hannan 1963 holds for errors of any colour whose size does not change.
+A filter, a controller and effects that the model leaves out correlate neighbouring errors. Intervals that take errors
+as independent are far too short. This module takes the larger of two variances, parameter by parameter. Newey and
+West 1987 (lag of Andrews 1991) holds for errors whose size changes with the motion, but is too small in short runs.
+Hannan 1963 holds for errors of any colour whose size does not change.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ MAX_LAG_SHARE = 0.1  # of the longest run
 class Uncertainty:
     """Covariance (columns, columns), and the factor from a standard error to half an interval.
 
-    lag_s: time over which errors are taken as tied together.
+    lag_s: time over which errors are taken as correlated.
     """
 
     covariance: Array
@@ -50,10 +50,9 @@ def uncertainty(data: Regression, estimate: Estimate) -> Uncertainty:
     stretches = data.joints * data.samples / _samples_between_independent_errors(data, estimate)
     spare = stretches / max(stretches - len(estimate.values), 1.0)
     information = np.zeros_like(uneven) if estimate.information is None else estimate.information
-    covariance, steady = (
-        estimate.bread @ (spare * meat + information) @ estimate.bread.T
-        for meat in (uneven, _stationary_score_variance(data, estimate))
-    )
+    covariance = estimate.bread @ (spare * uneven + information) @ estimate.bread.T
+    stationary = spare * _stationary_score_variance(data, estimate) + information
+    steady = estimate.bread @ stationary @ estimate.bread.T
     degrees = max(1.5 * data.samples / lag, 2.0)  # of Bartlett's kernel, Priestley 1981, table 6.2
     factor = float(student.ppf((1 + CONFIDENCE) / 2, degrees))
     raised = _standard_error_ratio(steady, covariance) * float(norm.ppf((1 + CONFIDENCE) / 2)) / factor

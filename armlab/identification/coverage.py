@@ -49,8 +49,8 @@ class Experiment:
     rate_hz: float = 250.0
     seconds: float = 20.0
 
-    def held(self, seed: int) -> tuple[NDArray[np.bool_], Array]:
-        """Whether each interval held the truth, and its half width in its parameter's unit; both (columns,)."""
+    def check_intervals(self, seed: int) -> tuple[NDArray[np.bool_], Array]:
+        """Whether each interval contains the truth, and its half width in its parameter's unit; both (columns,)."""
         run = self.run(np.random.default_rng(seed))
         model = Identifier(self.arm, self.structure.components).fit([run]).model_
         half = model.factor * self._errors(model)
@@ -99,13 +99,13 @@ NOISE_KINDS = {
 
 
 def write_coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
-    """Runs the experiments, shared among the kinds of noise, and writes `coverage.json`; tells lines."""
+    """Runs experiments with each kind of noise and writes `coverage.json`; yields a line for each kind."""
     rows = {}
     for number, (name, noise) in enumerate(NOISE_KINDS.items()):
         count = experiments // len(NOISE_KINDS) + (number < experiments % len(NOISE_KINDS))
         experiment = three_joint_experiment(noise)
         seeds = np.random.SeedSequence((seed, number)).generate_state(count)
-        held = np.array([experiment.held(int(each))[0] for each in seeds])
+        held = np.array([experiment.check_intervals(int(each))[0] for each in seeds])
         rows[name] = _coverage_row(held)
         yield f"{name}: {100 * rows[name]['coverage']:.1f} % of {held.size} intervals in {count} experiments"
     total = float(

@@ -35,7 +35,7 @@ from problem.pseudo_inertia import (
 from problem.transforms import inverse, turn_z_to
 
 MIN_EXTENT_SHARE = 1e-12  # of a body's size: simulators refuse points, rods and plates
-MAX_FLAT_SHARE = 1e-9  # of a link's size: rounding tells no more of a point or a rod
+MAX_FLAT_SHARE = 1e-9  # of a link's size: below it a point or a rod cannot be distinguished from rounding
 SPRING_FIELDS = ("stiffness", "springref")
 
 
@@ -122,9 +122,9 @@ class Body:
     armature: float
 
 
-def bodies(found: SimulatorModel) -> tuple[Body, ...]:
+def bodies(simulated: SimulatorModel) -> tuple[Body, ...]:
     """The bodies of a model; InputError where it has no links or one that no simulator takes."""
-    model = found.model
+    model = simulated.model
     if model.inertial is None:
         raise InputError("the model has base parameters only: identify it with --method physical to export links")
     origin, out = np.eye(4), []
@@ -148,7 +148,7 @@ def bodies(found: SimulatorModel) -> tuple[Body, ...]:
                 limits.position,
                 limits.velocity,
                 limits.torque,
-                *(float(found.fields.get(name, zeros)[index]) for name in ("damping", "frictionloss", "armature")),
+                *(float(simulated.fields.get(name, zeros)[index]) for name in ("damping", "frictionloss", "armature")),
             )
         )
         origin = joint.after
@@ -160,12 +160,12 @@ def format_numbers(values: Array | tuple[float, ...]) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def srdf_document(found: SimulatorModel) -> str:
+def srdf_document(simulated: SimulatorModel) -> str:
     """Rotor inertias on the joint side: `mass` is the format's word for the inertia of a rotor, kg m2 (kg)."""
-    arm = found.model.arm
+    arm = simulated.model.arm
     root = ElementTree.Element("robot", name=arm.name)
     rotors = ElementTree.SubElement(root, "rotor_params")
-    for joint, inertia in zip(arm.joints, found.fields["armature"].tolist(), strict=True):
+    for joint, inertia in zip(arm.joints, simulated.fields["armature"].tolist(), strict=True):
         ElementTree.SubElement(rotors, "joint", name=joint.name, mass=repr(inertia), gear_ratio="1.0")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -175,15 +175,15 @@ MIN_PITCH_COSINE = 1e-12  # cosine of the pitch, below which roll and yaw are on
 UNLIMITED = 1e9  # what a reader takes for no limit, where the format wants a number
 
 
-def urdf_document(found: SimulatorModel) -> str:
+def urdf_document(simulated: SimulatorModel) -> str:
     """The model as a URDF document; InputError for a model without links."""
-    root = ElementTree.Element("robot", name=found.model.arm.name)
+    root = ElementTree.Element("robot", name=simulated.model.arm.name)
     ElementTree.SubElement(root, "link", name="world")
     ElementTree.SubElement(root, "link", name="base")
     mount = ElementTree.SubElement(root, "joint", name="mount", type="fixed")
-    _add_ends(mount, "world", "base", _rotation_to_upright(found.model.arm.gravity))
+    _add_ends(mount, "world", "base", _rotation_to_upright(simulated.model.arm.gravity))
     previous = "base"
-    for index, body in enumerate(bodies(found)):
+    for index, body in enumerate(bodies(simulated)):
         previous = _add_link(root, body, previous, f"link{index + 1}")
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -240,15 +240,15 @@ def _format_finite(value: float) -> str:
 MJCF_JOINT_TYPES = {"revolute": "hinge", "prismatic": "slide"}
 
 
-def mjcf_document(found: SimulatorModel) -> str:
+def mjcf_document(simulated: SimulatorModel) -> str:
     """The model as an MJCF document; InputError for a model without links."""
-    root = ElementTree.Element("mujoco", model=found.model.arm.name)
+    root = ElementTree.Element("mujoco", model=simulated.model.arm.name)
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
-    ElementTree.SubElement(root, "option", gravity=format_numbers(found.model.arm.gravity))
+    ElementTree.SubElement(root, "option", gravity=format_numbers(simulated.model.arm.gravity))
     parent = ElementTree.SubElement(root, "worldbody")
-    for index, body in enumerate(bodies(found)):
+    for index, body in enumerate(bodies(simulated)):
         parent = _add_body(parent, body, index + 1)
-    _set_springs(root, found)
+    _set_springs(root, simulated)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -272,12 +272,12 @@ def _add_body(parent: ElementTree.Element, body: Body, number: int) -> ElementTr
     return node
 
 
-def _set_springs(root: ElementTree.Element, found: SimulatorModel) -> None:
+def _set_springs(root: ElementTree.Element, simulated: SimulatorModel) -> None:
     joints = {node.get("name", ""): node for node in root.iter("joint")}
-    for number, joint in enumerate(found.model.arm.joints):
-        if "stiffness" in found.fields and found.fields["stiffness"][number]:
+    for number, joint in enumerate(simulated.model.arm.joints):
+        if "stiffness" in simulated.fields and simulated.fields["stiffness"][number]:
             for name in SPRING_FIELDS:
-                joints[joint.name].set(name, format_numbers((found.fields[name][number],)))
+                joints[joint.name].set(name, format_numbers((simulated.fields[name][number],)))
 
 
 WRITERS = {".urdf": urdf_document, ".xml": mjcf_document}
@@ -287,19 +287,19 @@ def export_model(path: Path, out: Path) -> Iterator[str]:
     """Writes the file and says what it does not hold; InputError where the ending or the model does not fit."""
     if out.suffix not in WRITERS:
         raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
-    found = build_simulator_model(read_model(path))
-    yield from _write_text(out, WRITERS[out.suffix](found))
-    missing = list(found.missing)
+    simulated = build_simulator_model(read_model(path))
+    yield from _write_text(out, WRITERS[out.suffix](simulated))
+    missing = list(simulated.missing)
     if out.suffix == ".urdf":
-        stiffness = found.fields.get("stiffness", np.zeros(0))
+        stiffness = simulated.fields.get("stiffness", np.zeros(0))
         missing = [f"spring of joint {number}" for number, each in enumerate(stiffness, 1) if each] + missing
-        if "armature" in found.fields and found.fields["armature"].any():
-            yield from _write_text(out.with_suffix(".srdf"), srdf_document(found))
+        if "armature" in simulated.fields and simulated.fields["armature"].any():
+            yield from _write_text(out.with_suffix(".srdf"), srdf_document(simulated))
             yield "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
     if missing:
         yield "not in the file: " + "; ".join(missing)
-    if found.thickened_links:
-        yield f"given a little extent, as simulators want it: link {', '.join(map(str, found.thickened_links))}"
+    if simulated.thickened_links:
+        yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
 
 
 def _write_text(path: Path, text: str) -> Iterator[str]:

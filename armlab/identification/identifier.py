@@ -83,8 +83,8 @@ class Identifier:
     components: viscous and Coulomb friction, rotor inertia and offset at each joint if left out. method: one of
     METHODS. pull: the prior of `weighted` (joints weighted by their errors), `alike` (not) and `physical`.
     cutoff_hz: chosen from the positions if left out. position_factor: see `signals_of`.
-    After `fit`: model_, condition_number_ (columns at unit length), absorbed_ (components that no motion tells
-    from the others and that were left out), estimate_.
+    After `fit`: model_, condition_number_ (columns at unit length), absorbed_ (components that no motion separates
+    from the others, left out), estimate_.
     """
 
     arm: Arm
@@ -130,23 +130,23 @@ class Identifier:
     def _structure(self) -> Structure:
         components = usual_components(self.arm) if self.components is None else self.components
         whole = Structure(self.arm, components)
-        if self.pull.kind == "nominal":  # the prior tells apart what no motion does
+        if self.pull.kind == "nominal":  # the prior separates what no motion does
             return whole
         kept, self.absorbed_ = whole.separable()
         return kept
 
     def _keep(self, structure: Structure, data: Regression, estimate: Estimate, cutoff: float) -> None:
-        found = uncertainty(data, estimate)
+        spread = uncertainty(data, estimate)
         inertial = estimate.inertial if isinstance(estimate, PhysicalEstimate) else None
-        settings = {"method": self.method, "prior": str(self.pull), "error_correlation_s": found.lag_s}
+        settings = {"method": self.method, "prior": str(self.pull), "error_correlation_s": spread.lag_s}
         self.estimate_ = estimate
         self.condition_number_ = _column_condition(data)
         self.model_ = Model(
             self.robot or self.arm.name,
             structure,
             estimate.values,
-            found.covariance,
-            found.factor,
+            spread.covariance,
+            spread.factor,
             inertial,
             cutoff,
             self.position_factor,
@@ -166,6 +166,6 @@ class Identifier:
 
 
 def _column_condition(data: Regression) -> float:
-    """Condition number of the columns at unit length; directions that only a prior tells do not count."""
+    """Condition number of the columns at unit length; directions that only a prior determines do not count."""
     sizes = np.linalg.svd(np.linalg.qr(data.matrix / column_lengths(data.matrix))[1], compute_uv=False)
     return float(sizes[0] / sizes[sizes > RANK_TOLERANCE * sizes[0]][-1])

@@ -1,4 +1,4 @@
-"""What `armlab identify` and `armlab predict` do: from a recording folder to lines, a model file and a page."""
+"""The flows of `armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -49,7 +49,9 @@ def write_identification_page(
     return path
 
 
-NO_VALIDATION_WARNING = "no run validates: judged on the identification runs themselves, so the errors are too small"
+NO_VALIDATION_WARNING = (
+    "no run validates: these are errors on the identification runs themselves, so they are too small"
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class IdentifyOptions:
 
 
 def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Iterator[str]:
-    """Identifies, writes model.yaml and report.html into `out`, and tells parameters and errors in lines.
+    """Identifies, writes model.yaml and report.html into `out`, and yields lines with parameters and errors.
 
     Raises InputError, in one line, for a recording that cannot be used and options that do not fit it.
     """
@@ -83,7 +85,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     yield from how
     yield str(model)
-    yield from (f"{part.label}: no motion tells it from the links, left out" for part in identifier.absorbed_)
+    yield from (f"{part.label}: no motion separates it from the links, left out" for part in identifier.absorbed_)
     yield f"condition number: {identifier.condition_number_:.4g} (columns at unit length)"
     yield error_table(errors)
     if not recording.with_role("validate"):
@@ -94,7 +96,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
 
 
 def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[Identifier, list[str]]:
-    arm, robot = recording.arm, _robot_path(recording)
+    arm, robot = recording.arm, robot_path(recording)
     pull = Pull("nominal", options.tolerance) if options.tolerance else NO_PULL
     if not options.choose:
         return Identifier(arm, None, options.method, pull, options.cutoff_hz, robot), []
@@ -108,8 +110,8 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
     return Identifier(arm, components, method, choice.pull, *filters), [line]
 
 
-def _robot_path(recording: Recording) -> str:
-    """The robot as it can be found from the working folder."""
+def robot_path(recording: Recording) -> str:
+    """The robot file beside the recording, as a path from the working folder; a built-in name where there is none."""
     beside = recording.folder / recording.robot
     return str(beside) if beside.is_file() else recording.robot
 

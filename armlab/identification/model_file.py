@@ -38,8 +38,8 @@ class ParameterEntry(Settings):
 class ComponentEntry(Settings):
     """One component.
 
-    form: which of an effect's laws, where its parameters do not tell. claimed: false for what is in the model because
-    every arm has it, and is not sure enough to be a finding.
+    form: which of an effect's laws, where its parameters do not decide it. claimed: false for what is in the model
+    because every arm has it, without enough evidence for a finding.
     """
 
     effect: str
@@ -70,7 +70,7 @@ class ModelFile(Settings):
 
 
 class Numbers(Settings):
-    """What the provenance tells of the model itself: its filters, and the factor from standard errors to intervals."""
+    """What the provenance says of the model itself: its filters, and the factor from standard errors to intervals."""
 
     cutoff_hz: Annotated[float, Gt(0)] | None = None
     position_factor: Annotated[float, Gt(0)] = 1.0
@@ -198,8 +198,8 @@ def _stated_interval(entry: ParameterEntry) -> Interval | None:
         return None
     if isinstance(entry.value, tuple):
         return tuple((each[0], each[1]) for each in entry.ci95 if isinstance(each, tuple))
-    low, high = (float(np.sum(each)) for each in entry.ci95)
-    return low, high
+    low, high = entry.ci95
+    return float(np.sum(low)), float(np.sum(high))
 
 
 def _read_inertial(file: ModelFile, arm: Arm, path: Path) -> Array | None:

@@ -1,6 +1,6 @@
 """A load that some runs carry: its inertial parameters, or, where they are known, the torque gains.
 
-Links and friction are the same in all runs; only what differs between them tells about the load (Khalil, Gautier
+Links and friction are the same in all runs; only what differs between them determines the load (Khalil, Gautier
 and Lemoine 2007). A known load shows the gain of each joint's torque reading (Gautier and Briot 2014).
 
 The load is a body that can exist: its pseudo-inertia is positive semidefinite. `payload_lines` and `gains_lines` go
@@ -136,7 +136,7 @@ def identify_payload(
     """The load that some runs carry, as the body that can exist and explains them best.
 
     without: runs without it; if there are none, the arm's own links stand for them. Raises ValueError where no
-    run is loaded, or where these motions do not tell the load's parameters apart.
+    run is loaded, or where these motions do not determine the parameters of the load.
     """
     place = place or Place()
     if not loaded:
@@ -145,11 +145,11 @@ def identify_payload(
     data = _append_columns(_unloaded_regression(structure, without, loaded), columns)
     _check_load_columns(data.matrix, columns.shape[1])
     estimate = WeightedLeastSquares()(data)
-    found = uncertainty(data, estimate)
+    spread = uncertainty(data, estimate)
     weighted = data.weighted(joint_weights(data, estimate.values))
     sought = slice(len(estimate.values) - columns.shape[1], None)
     values = nearest_physical_load(weighted, estimate.values[sought], place.basis)
-    return Payload(place.basis @ values, place.basis @ found.covariance[sought, sought] @ place.basis.T, found.factor)
+    return Payload(place.basis @ values, place.basis @ spread.covariance[sought, sought] @ place.basis.T, spread.factor)
 
 
 def torque_gains(
@@ -164,13 +164,14 @@ def torque_gains(
         torque = (Place(link).columns(structure, each) @ payload.parameters).reshape(-1, joints)
         blocks.append((torque[:, :, None] * np.eye(joints)).reshape(-1, joints))
     columns = np.vstack(blocks)
-    moved = np.linalg.norm(columns, axis=0) > 0  # a joint that the load never loads tells nothing of its gain
+    moved = np.linalg.norm(columns, axis=0) > 0  # a joint that the load never loads does not determine its gain
     data = _append_columns(regression(structure, [*without, *loaded]), columns[:, moved])
     _check_load_columns(data.matrix, int(moved.sum()))
     estimate = WeightedLeastSquares()(data)
-    found = uncertainty(data, estimate)
+    spread = uncertainty(data, estimate)
     gains, half = np.full((2, joints), np.nan)
-    gains[moved], half[moved] = estimate.values[-moved.sum() :], (found.factor * found.standard_errors)[-moved.sum() :]
+    own = slice(-int(moved.sum()), None)
+    gains[moved], half[moved] = estimate.values[own], (spread.factor * spread.standard_errors)[own]
     return TorqueGains(gains, half)
 
 
@@ -204,7 +205,7 @@ def _check_load_columns(matrix: Array, count: int) -> None:
         np.linalg.qr(matrix / np.where(lengths > 0, lengths, 1))[1][-count:, -count:], compute_uv=False
     )
     if values[-1] < MIN_SINGULAR_VALUE_SHARE:
-        raise ValueError("these motions do not tell the load's parameters apart: move more joints, and faster")
+        raise ValueError("these motions do not determine the parameters of the load: move more joints, and faster")
 
 
 CENTRE_NAMES = ("centre x", "centre y", "centre z")
@@ -266,22 +267,21 @@ def _payload_structure(arm: Arm, setting: PayloadSetting, nominal: bool) -> Stru
 
 
 def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -> Iterator[str]:
-    """The load of a recording, with intervals; InputError, in one line, where the recordings do not tell it."""
+    """The load of a recording, with intervals; InputError, in one line, where the recordings do not determine it."""
     task = _PayloadTask.of(loaded, without, setting)
     try:
-        found = identify_payload(task.structure, task.without, task.loaded, setting.place)
+        payload = identify_payload(task.structure, task.without, task.loaded, setting.place)
     except ValueError as error:
         raise InputError(f"{loaded}: {error}") from None
-    yield from _payload_table(found, mass_alone=setting.place.centre is not None)
+    yield from _payload_table(payload, mass_alone=setting.place.centre is not None)
 
 
-def _payload_table(found: Payload, mass_alone: bool) -> Iterator[str]:
-    rows = list(zip(PARAMETER_NAMES, found.parameters, found.half_widths, PARAMETER_UNITS, strict=True))
+def _payload_table(payload: Payload, mass_alone: bool) -> Iterator[str]:
+    rows = list(zip(PARAMETER_NAMES, payload.parameters, payload.half_widths, PARAMETER_UNITS, strict=True))
     yield from (_interval_line(*row) for row in rows[: 1 if mass_alone else 10])
-    if not mass_alone and found.parameters[0] > 0:
-        yield from (
-            _interval_line(*row, "m") for row in zip(CENTRE_NAMES, found.centre, found.centre_half_widths, strict=True)
-        )
+    if not mass_alone and payload.parameters[0] > 0:
+        centre = zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, strict=True)
+        yield from (_interval_line(*row, "m") for row in centre)
 
 
 def _interval_line(name: str, value: float, half: float, unit: str) -> str:
@@ -293,13 +293,13 @@ def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSettin
     task = _PayloadTask.of(loaded, without, setting)
     load = link_from_centre_of_mass(mass, np.array(setting.place.centre or (0.0, 0.0, 0.0)), np.zeros((3, 3)))
     try:
-        found = torque_gains(task.structure, task.without, task.loaded, load, setting.place.link)
+        gains = torque_gains(task.structure, task.without, task.loaded, load, setting.place.link)
     except ValueError as error:
         raise InputError(f"{loaded}: {error}") from None
-    yield from _gains_table(found)
+    yield from _gains_table(gains)
 
 
-def _gains_table(found: TorqueGains) -> Iterator[str]:
-    for joint, (gain, half) in enumerate(zip(found.gains, found.half_widths, strict=True), 1):
+def _gains_table(gains: TorqueGains) -> Iterator[str]:
+    for joint, (gain, half) in enumerate(zip(gains.gains, gains.half_widths, strict=True), 1):
         unknown = "the load does not load it" if np.isnan(gain) else ""
         yield f"joint {joint}: {unknown}" if unknown else _interval_line(f"joint {joint}: gain", gain, half, "")

@@ -80,7 +80,7 @@ def _scaled_inverse(spread: Array) -> Array:
 
 
 def _without_direction(precision: Array, direction: Array) -> Array:
-    """Precision that tells nothing about one direction: the limit of a variance without bound along it."""
+    """Precision without information along one direction: the limit of an infinite variance there."""
     known = precision @ direction
     rest = precision - np.outer(known, known) / (direction @ known)
     return np.asarray((rest + rest.T) / 2)

@@ -32,7 +32,7 @@ from problem.arm import Arm
 
 Groups = Mapping[str, tuple[Candidate, ...]]
 USUAL_GROUPS = ("viscous", "coulomb", "rotor", "offset")
-EXCLUSIVE_GROUPS = {  # one holds the other's columns, or what a few seconds of motion cannot tell from them
+EXCLUSIVE_GROUPS = {  # one has the other's columns, or columns that short motions cannot separate from them
     "direction": "viscous",
     "viscous": "direction",
     "spring": "crank",

@@ -70,9 +70,9 @@ class Structure:
         return replace(self, components=components)
 
     def separable(self) -> tuple["Structure", tuple[Candidate, ...]]:
-        """The structure without components that no motion tells from what stands before, and those.
+        """The structure without components that no motion separates from the columns before them, and those components.
 
-        Such as the rotor inertia of a first joint, which acts like the link's own inertia about it.
+        An example is the rotor inertia of a first joint, which acts like the inertia of the link about its axis.
         """
         kept, absorbed = list[Candidate](), list[Candidate]()
         motion = Motion(*(np.random.default_rng(1).uniform(-2, 2, (3, PROBE_STATES, len(self.arm)))))

@@ -116,8 +116,8 @@ class TorqueModel:
             return self.stated[index]
         part, place = self.structure.components[index], self.structure.slices[index]
         covariance = None if self.covariance is None else self.covariance[place, place]
-        found = parameter_values(part, self.values[place], covariance, self.factor)
-        return tuple(replace(each, interval=None) if _is_held(each) else each for each in found)
+        parameters = parameter_values(part, self.values[place], covariance, self.factor)
+        return tuple(replace(each, interval=None) if _is_held(each) else each for each in parameters)
 
     def __repr__(self) -> str:
         """The robot, how many parameters of which components, and the cut-off of the identification."""

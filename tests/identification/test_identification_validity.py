@@ -37,7 +37,7 @@ from problem.robot_file import load_arm
 
 def test_intervals_hold_the_truth_in_about_95_percent_of_experiments() -> None:
     experiment = three_joint_experiment(Noise())
-    held = np.array([experiment.held(seed)[0] for seed in range(20)])
+    held = np.array([experiment.check_intervals(seed)[0] for seed in range(20)])
     assert 0.90 < held.mean() < 0.99
 
 

@@ -118,7 +118,7 @@ def test_a_load_is_a_body_that_can_exist_even_where_noise_says_otherwise() -> No
     [
         (PayloadSetting(Place(4, CENTRE)), "--link 4 should be one from 1 to 3"),
         (PayloadSetting(ON_LINK_2, counterbalanced=5), "--counterbalance 5 should be one from 1 to 3"),
-        (PayloadSetting(Place(1)), "do not tell the load's parameters apart"),
+        (PayloadSetting(Place(1)), "do not determine the parameters of the load"),
     ],
 )
 def test_what_cannot_be_told_is_refused_in_one_line(

@@ -42,7 +42,7 @@ def test_identify_tells_parameters_condition_number_and_errors_and_writes_model_
     out = tmp_path / "out"
     text = invoke(identify, recording, "--out", out)
     assert "viscous_friction, joint 1: coefficient = " in text
-    assert "rotor_inertia, joint 1: no motion tells it from the links" in text
+    assert "rotor_inertia, joint 1: no motion separates it from the links" in text
     assert "condition number" in text
     assert "run-1.csv             validate" in text
     model = Model.load(out / "model.yaml")

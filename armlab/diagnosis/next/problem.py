@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -19,7 +19,7 @@ from armlab.diagnosis.next.motion import Budget, build_excitation_problem
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, prepare_questions
 from armlab.diagnosis.next.question import Name
 from armlab.diagnosis.next.verdict_file import Finding, VerdictWithModel
-from armlab.effects.library import EFFECT_IDS
+from armlab.effects.library import effect_named
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem, ShiftedProblem, shift_randomly
 from problem.motion import Motion
@@ -90,13 +90,18 @@ def tell_apart_problem(
     )
 
 
+def _check_effect(name: str) -> str:
+    effect_named(name)
+    return name
+
+
 class RivalSettings(Settings):
     """A name that may be right; joint from 1, left out for an effect of the whole robot.
 
     parameters: [name, value] of the vocabulary, SI units; of the first rival, which the others imitate.
     """
 
-    effect: Literal[EFFECT_IDS]  # type: ignore[valid-type]
+    effect: Annotated[str, AfterValidator(_check_effect)]
     joint: Annotated[int, Ge(1)] | None = None
     parameters: tuple[tuple[str, float | tuple[float, ...]], ...] = ()
 

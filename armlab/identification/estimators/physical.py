@@ -53,7 +53,7 @@ def dissipation_rows(structure: Structure, fastest: Array) -> Array:
 
 
 MIN_BODY_EIGENVALUE = 1e-9  # of the largest nominal or fitted body: the solver's rounding stays on the physical side
-WEAK_TOLERANCE = 10.0  # tolerance where none is given: it settles what the data do not tell, and little else
+WEAK_TOLERANCE = 10.0  # tolerance where none is given: it settles what the data do not determine, and little else
 TYPICAL_BODY = (0.3, 0.3, 0.3, 1.0)  # m and sqrt(kg): the body that stands for a link without a nominal one
 
 

@@ -45,19 +45,19 @@ class PeerResult:
     remark: str = ""
 
 
-def compare_peers(found: Study, python: Path, folder: Path, looks: Looks) -> Iterator[PeerResult]:
+def compare_peers(study: Study, python: Path, folder: Path, looks: Looks) -> Iterator[PeerResult]:
     """This package and the peers on the runs of a recording, fitted on the run that identifies."""
-    model = found.models[-1].identifier.model_
-    signals = [model.signals(run) for run in found.recording.runs]
-    for each in found.models[1:]:
-        yield from _own_results(found, each.name, signals)
-    _write_inputs(found.recording.arm, signals, folder)
+    model = study.models[-1].identifier.model_
+    signals = [model.signals(run) for run in study.recording.runs]
+    for each in study.models[1:]:
+        yield from _own_results(study, each.name, signals)
+    _write_inputs(study.recording.arm, signals, folder)
     for package, (script, arm) in PEERS.items():
-        yield from _peer_results(found, package, [str(python), script, arm], signals, folder, looks)
+        yield from _peer_results(study, package, [str(python), script, arm], signals, folder, looks)
 
 
-def _own_results(found: Study, name: str, signals: list[Signals]) -> Iterator[PeerResult]:
-    known = next(model.identifier for model in found.models if model.name == name)
+def _own_results(study: Study, name: str, signals: list[Signals]) -> Iterator[PeerResult]:
+    known = next(model.identifier for model in study.models if model.name == name)
     started = time.process_time()
     identifier = Identifier(
         known.arm,
@@ -67,11 +67,11 @@ def _own_results(found: Study, name: str, signals: list[Signals]) -> Iterator[Pe
         known.cutoff_hz,
         known.robot,
         known.position_factor,
-    ).fit(found.recording.with_role("identify"))
+    ).fit(study.recording.with_role("identify"))
     seconds = time.process_time() - started
     for each in signals:
         percent = relative_percent(each.torque - identifier.model_.filtered_torque(each), each.torque)
-        yield PeerResult(found.recipe.name, f"armlab, {name}", each.run.name, percent, seconds)
+        yield PeerResult(study.recipe.name, f"armlab, {name}", each.run.name, percent, seconds)
 
 
 def _write_inputs(arm: Arm, signals: list[Signals], folder: Path) -> None:
@@ -111,24 +111,24 @@ def _peer_run(signals: Signals) -> PeerRun:
 
 
 def _peer_results(
-    found: Study, package: str, call: list[str], signals: list[Signals], folder: Path, looks: Looks
+    study: Study, package: str, call: list[str], signals: list[Signals], folder: Path, looks: Looks
 ) -> Iterator[PeerResult]:
     python, script, arm = call
     out = folder / f"{Path(script).stem}.npz"
     out.unlink(missing_ok=True)
-    for run in found.recording.with_role("validate"):
-        looks.note(found.recording.arm.name, run.name, package)
+    for run in study.recording.with_role("validate"):
+        looks.note(study.recording.arm.name, run.name, package)
     try:
         _run_script(
             [python, str(Path(__file__).parent / script), *(str(folder / name) for name in ("runs.npz", arm)), str(out)]
         )
     except InputError as error:
-        yield PeerResult(found.recipe.name, package, "", None, None, str(error))
+        yield PeerResult(study.recipe.name, package, "", None, None, str(error))
         return
     content = np.load(out)
     for each in signals:
         percent = relative_percent(each.torque - content[each.run.name], each.torque)
-        yield PeerResult(found.recipe.name, package, each.run.name, percent, float(content["seconds"]))
+        yield PeerResult(study.recipe.name, package, each.run.name, percent, float(content["seconds"]))
 
 
 def _run_script(command: list[str]) -> None:

@@ -26,7 +26,7 @@ MAX_PARAMETER = (
 
 def sysid_parameters(spec: Any, model: Any, torque: Array) -> Any:
     """All parameters of the arm and its joints, wide bounds."""
-    found, joints = sysid.ParameterDict(), model.nv
+    parameters, joints = sysid.ParameterDict(), model.nv
     for number in range(1, joints + 1):
         body = sysid.body_inertia_param(
             spec,
@@ -39,13 +39,13 @@ def sysid_parameters(spec: Any, model: Any, torque: Array) -> Any:
             shear_bound_off=np.array([-2.0, 2.0]),
             modifier=partial(_set_body, name=f"link{number}"),
         )
-        found.add(body)
+        parameters.add(body)
     size = float(np.sqrt(np.mean(torque**2)))
     for name, least in (("armature", 0.0), ("viscous", 0.0), ("coulomb", 0.0), ("offset", -MAX_PARAMETER * size)):
         start, low, high = np.full(joints, 0.02 * size), np.full(joints, least), np.full(joints, MAX_PARAMETER * size)
         modify = _set_armatures if name == "armature" else None
-        found.add(sysid.Parameter(name, start, low, high, modifier=modify))
-    return found
+        parameters.add(sysid.Parameter(name, start, low, high, modifier=modify))
+    return parameters
 
 
 def _set_body(spec: Any, parameter: Any, name: str) -> None:
@@ -93,9 +93,9 @@ def main(runs_file: str, mjcf: str, out: str) -> None:
             return [error(vectors, values)], None, None
         return [np.column_stack([error(vector, values) for vector in vectors.T])], None, None
 
-    found, _ = sysid.optimize(start, residual, optimizer="mujoco", verbose=False, max_iters=MAX_ITERATIONS)
+    fitted, _ = sysid.optimize(start, residual, optimizer="mujoco", verbose=False, max_iters=MAX_ITERATIONS)
     seconds = time.process_time() - started
-    write_answer({run.name: torque_of(spec, found, run) for run in runs}, seconds, Path(out))
+    write_answer({run.name: torque_of(spec, fitted, run) for run in runs}, seconds, Path(out))
 
 
 if __name__ == "__main__":

@@ -68,7 +68,7 @@ def fit_published_structure(recording: Recording, cutoff_hz: float, position_fac
 def sum_weights(model: Model, expression: str) -> Array:
     """Weights (columns,) of a sum of standard parameters like `my4 + 1.0*mz5`.
 
-    Raises ValueError for a sum that the torques of this arm do not tell.
+    Raises ValueError for a sum that the torques of this arm do not determine.
     """
     structure = model.structure
     phi, weights = np.zeros(10 * len(model.arm)), np.zeros(structure.size)

@@ -43,9 +43,9 @@ def write_report(studies: Sequence[Study], looks: Looks, folder: Path) -> tuple[
 def error_frame(studies: Sequence[Study]) -> pd.DataFrame:
     """recording, model, run, relative_error_percent: one row for each model on each run."""
     rows = [
-        (found.recipe.name, model.name, error.run, error.relative_percent)
-        for found in studies
-        for model in found.models
+        (study.recipe.name, model.name, error.run, error.relative_percent)
+        for study in studies
+        for model in study.models
         for error in model.errors
     ]
     return pd.DataFrame(rows, columns=["recording", "model", "run", "relative_error_percent"])
@@ -55,34 +55,34 @@ def _page_body(studies: Sequence[Study], looks: Looks) -> Iterator[str]:
     yield "<h1>Real arms</h1><p>Percent of ||tau - tau_hat|| / ||tau|| over all joints. Cut-off, components and prior "
     yield "are chosen by blocked cross-validation inside the identification data; validation data are looked at "
     yield "afterwards, and every look is logged.</p>"
-    for found in studies:
-        yield from _study_section(found, looks)
+    for study in studies:
+        yield from _study_section(study, looks)
 
 
-def _study_section(found: Study, looks: Looks) -> Iterator[str]:
-    yield f"<h2>{escape(found.recipe.name)}</h2><p>{escape(describe_study(found))}. "
-    yield f"{len(found.selection.tried)} alternatives were compared inside the identification data.</p>"
+def _study_section(study: Study, looks: Looks) -> Iterator[str]:
+    yield f"<h2>{escape(study.recipe.name)}</h2><p>{escape(describe_study(study))}. "
+    yield f"{len(study.selection.tried)} alternatives were compared inside the identification data.</p>"
     yield "<table><tr><th>model</th><th>run</th><th>role</th><th>percent, filtered</th><th>percent, as recorded</th>"
     yield "<th>best known</th><th>looks at the run</th></tr>"
-    for model in found.models:
+    for model in study.models:
         for error in model.errors:
-            yield _error_row(found, model.name, error, looks)
+            yield _error_row(study, model.name, error, looks)
     yield "</table>"
-    chosen = found.models[-1].identifier
+    chosen = study.models[-1].identifier
     yield f"<p>Condition number of the chosen columns at unit length: {chosen.condition_number_:.3g}.</p>"
-    if found.recipe.name == "staubli-tx40":
-        choice = found.selection.choice
-        same = fit_published_structure(found.recording, choice.cutoff_hz, choice.position_factor)
+    if study.recipe.name == "staubli-tx40":
+        choice = study.selection.choice
+        same = fit_published_structure(study.recording, choice.cutoff_hz, choice.position_factor)
         yield from _published_section(compare_with_published(same))
-    for run in found.recording.with_role("validate"):
+    for run in study.recording.with_role("validate"):
         picture = png_data_url(chosen.model_.plot(run))
         yield f'<img alt="torque and model on {escape(run.name)}" src="{picture}">'
 
 
-def _error_row(found: Study, name: str, error: RunError, looks: Looks) -> str:
+def _error_row(study: Study, name: str, error: RunError, looks: Looks) -> str:
     judged = error.role == "validate"
-    known = found.recipe.best_known.get(error.run, float("nan")) if judged else float("nan")
-    count = looks.count(found.recording.arm.name, error.run) if judged else 0
+    known = study.recipe.best_known.get(error.run, float("nan")) if judged else float("nan")
+    count = looks.count(study.recording.arm.name, error.run) if judged else 0
     cells = (
         name,
         error.run,
@@ -115,7 +115,7 @@ LOOKS_FILE = "validation_looks.jsonl"
 def identify_public(
     results: Path, recordings: Path, only: Sequence[str] = (), peers: Path | None = None
 ) -> Iterator[str]:
-    """Lines that tell what was found and written; InputError for an unknown name.
+    """Lines about what was identified and written; InputError for an unknown name.
 
     peers: an interpreter with figaroh and mujoco.sysid, which then take part.
     """
@@ -125,10 +125,10 @@ def identify_public(
             raise InputError(f"unknown recording '{name}': {suggest_name(name, names)}")
     looks, studies = Looks(results / LOOKS_FILE), []
     for recipe in (each for each in RECIPES if not only or each.name in only):
-        found = study_recording(recipe, recordings, looks)
-        studies.append(found)
-        yield describe_study(found)
-        for error in found.models[-1].errors:
+        study = study_recording(recipe, recordings, looks)
+        studies.append(study)
+        yield describe_study(study)
+        for error in study.models[-1].errors:
             known = recipe.best_known.get(error.run) if error.role == "validate" else None
             beside = f" (best known {known:g} %)" if known else ""
             recorded = f"{error.recorded_percent:.2f} % of the torque as recorded"

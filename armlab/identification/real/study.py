@@ -139,8 +139,8 @@ def _look_at_errors(identifier: Identifier, recording: Recording, name: str, loo
     return tuple(run_error(model, model.signals(run)) for run in recording.runs)
 
 
-def describe_study(found: Study) -> str:
+def describe_study(study: Study) -> str:
     """The choice in a line."""
-    choice = found.selection.choice
-    method = found.models[-1].identifier.method
-    return f"{found.recipe.name}: {describe_choice(choice)}; {method}; held-out error {100 * choice.held_out:.2f} %"
+    choice = study.selection.choice
+    method = study.models[-1].identifier.method
+    return f"{study.recipe.name}: {describe_choice(choice)}; {method}; held-out error {100 * choice.held_out:.2f} %"
