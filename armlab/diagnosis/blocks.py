@@ -173,9 +173,9 @@ def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> G
     count as share the prediction's power.
     """
     predicted, places = without - with_it, np.unique(blocks)
-    better, power, carried = (
-        np.bincount(blocks, each)[places] for each in (without**2 - with_it**2, predicted**2, with_it * predicted)
-    )
+    better = np.bincount(blocks, without**2 - with_it**2)[places]
+    power = np.bincount(blocks, predicted**2)[places]
+    carried = np.bincount(blocks, with_it * predicted)[places]
     gain = float(np.sum(better))
     spread = float(np.std(better, ddof=1)) * np.sqrt(len(better)) if len(better) > 2 else 0.0
     p_value = float(student.sf(gain / spread, len(better) - 1)) if spread > 0 else 1.0

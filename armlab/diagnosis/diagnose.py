@@ -175,7 +175,8 @@ def _joint_fits(refit: Array, final: Array, floor: Array, observed: Observed, mi
     out = []
     for joint, noise in enumerate(floor.tolist()):
         rows = rows_in(observed.of_role("validate", joint), observed.rows)
-        before, after = (float(np.sqrt(np.mean(each[rows, joint] ** 2))) for each in (refit, final))
+        before = float(np.sqrt(np.mean(refit[rows, joint] ** 2)))
+        after = float(np.sqrt(np.mean(final[rows, joint] ** 2)))
         gap = before - noise
         closed = (before - after) / gap if gap > min_gap * noise else None
         out.append(JointFit(joint + 1, before, after, noise, closed))

@@ -121,7 +121,8 @@ def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array
     moving_s = float(np.sum(moving)) / observed.rate_hz
     if moving_s <= tuning.min_push_s or moving.sum() <= tuning.min_push_moving_share * pushed.sum():
         return "the joint hardly moves during it"
-    position, velocity = (observed.kept(name)[:, joint] for name in ("position", "velocity"))
+    position = observed.kept("position")[:, joint]
+    velocity = observed.kept("velocity")[:, joint]
     others = push == 0
     for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(torque))):
         low, high = values[others].min(), values[others].max()
@@ -211,7 +212,8 @@ class Judge:
 
     def _off(self, without: Widths, joints: int, looks: int) -> Evidence:
         """Evidence for the present widths against others."""
-        fit, less = (self.model.solver.fit(each) for each in (self.state, State(self.state.groups, without)))
+        fit = self.model.solver.fit(self.state)
+        less = self.model.solver.fit(State(self.state.groups, without))
         score = fit.score - less.score
         p_value = float(np.exp(-np.clip(score, 0, 700)))  # a Bayes factor bounds the p-value from above
         gains = {joint: self.compared.validation_gain(fit, less, joint) for joint in range(joints)}
@@ -285,7 +287,8 @@ class Judge:
 
     def _against(self, less: State, tested: tuple[float, int], rows: tuple[int, ...], score: float) -> Evidence:
         """Evidence for the state against a smaller one."""
-        fit, other = (self.model.solver.fit(each) for each in (self.state, less))
+        fit = self.model.solver.fit(self.state)
+        other = self.model.solver.fit(less)
         return self._evidence(fit, other, self.compared.gains(fit, other, rows), tested, score)
 
     def _tested(self, fit: Fit, spread: BlockCovariance, group: int) -> float:
@@ -325,7 +328,8 @@ class Judge:
         held_p = min(each.p_value for each in (validated, inside) if each.share >= certain)
         p_value, looks = tested
         corrected = min(1.0, p_value * (looks if self.model.design.settings.guards.correction else 1))
-        before, after = (self.compared.validation_rms(each, joint) for each in (less, fit))
+        before = self.compared.validation_rms(less, joint)
+        after = self.compared.validation_rms(fit, joint)
         return Evidence(
             joint,
             p_value,

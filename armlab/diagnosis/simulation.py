@@ -118,9 +118,8 @@ def _torque_gains(observed: Observed, simulation: Simulation) -> tuple[Array, Ar
     gains, shares = [], []
     for joint in range(observed.joints):
         friction = np.column_stack([velocity[:, joint], np.sign(velocity[:, joint]), np.ones(observed.rows)])
-        column, torque = (
-            each - friction @ np.linalg.lstsq(friction, each)[0] for each in (simulated[:, joint], measured[:, joint])
-        )
+        column = simulated[:, joint] - friction @ np.linalg.lstsq(friction, simulated[:, joint])[0]
+        torque = measured[:, joint] - friction @ np.linalg.lstsq(friction, measured[:, joint])[0]
         power = float(column @ column)
         gain = float(column @ torque) / power if power > 0 else 0.0
         gains.append(gain)

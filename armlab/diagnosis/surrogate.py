@@ -109,7 +109,9 @@ class Features:
 
 def flexible_features(observed: Observed, joint: int, rng: np.random.Generator, tuning: SurrogateTuning) -> Features:
     """Features for one joint at the kept rows."""
-    position, velocity, acceleration = (observed.kept(name) for name in ("position", "velocity", "acceleration"))
+    position = observed.kept("position")
+    velocity = observed.kept("velocity")
+    acceleration = observed.kept("acceleration")
     hats, waves = tuning.hats, tuning.waves if observed.joints <= tuning.few_joints else tuning.waves // 2
     parts: list[Part] = []
 
@@ -154,7 +156,9 @@ def feature_banks(observed: Observed, joint: int, load: Array, tuning: Surrogate
 
     What depends on little drowns in the noise of what does not matter where hundreds of features are taught at once.
     """
-    position, velocity, acceleration = (observed.kept(name) for name in ("position", "velocity", "acceleration"))
+    position = observed.kept("position")
+    velocity = observed.kept("velocity")
+    acceleration = observed.kept("acceleration")
     signals = ("torque", "position", "velocity", "acceleration")
     torque, place, speed, change = (f"{name}_{joint + 1}" for name in signals)
     own, signs = velocity[:, joint], _smooth_signs(velocity[:, joint], tuning.sign_widths)
@@ -283,7 +287,8 @@ def find_structure(
     noise would pass for structure, it counts only if validation runs have it, too.
     """
     plain = Noise(tuple(np.ones(1) for _ in noise.taps), tuple(1.0 for _ in noise.taps), noise.resting)
-    whitened, raw = (_find_structure(residual, joint, made, each, observed, tuning) for each in (noise, plain))
+    whitened = _find_structure(residual, joint, made, noise, observed, tuning)
+    raw = _find_structure(residual, joint, made, plain, observed, tuning)
     least = tuning.min_structure_gain
     ways = [whitened, raw] if raw.validation_gain > least else [whitened]
     return min(ways, key=lambda each: (each.gain <= least, each.p_value))

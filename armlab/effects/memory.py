@@ -121,10 +121,8 @@ class LuGreFriction(Term):
         """Short and longer ways with slow and faster Stribeck velocities."""
         travel = max(float(np.ptp(scene.motion.position[:, joint - 1])) for scene in scenes)
         top = top_speed(scenes, joint)
-        ways, speeds = (
-            tuple(size * x for x in pair)
-            for size, pair in ((travel, PRESLIDING_WAY_RANGE), (top, STRIBECK_SPEED_RANGE))
-        )
+        ways = tuple(travel * x for x in PRESLIDING_WAY_RANGE)
+        speeds = tuple(top * x for x in STRIBECK_SPEED_RANGE)
         shapes = [
             (way * travel, STATIC_RATIO, share * top) for way in PRESLIDING_WAYS[:3] for share in STRIBECK_SPEEDS[1:]
         ]

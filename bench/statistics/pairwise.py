@@ -96,7 +96,8 @@ def _weighted_superiority(subject: Array, rival: Array, counts: Array) -> Array:
     """A12 (m,) where each repetition counts as often as the rows of counts (m, n) say; sums of halves, so exact."""
     n = len(subject)
     order = np.argsort(rival)
-    below, up_to = (np.searchsorted(rival[order], subject, side=side) for side in ("left", "right"))
+    below = np.searchsorted(rival[order], subject, side="left")
+    up_to = np.searchsorted(rival[order], subject, side="right")
     passed = np.pad(counts[:, order].cumsum(axis=1), ((0, 0), (1, 0)))
     won = n - (passed[:, up_to] + passed[:, below]) / 2
     return np.asarray((counts * won).sum(axis=1) / n**2)

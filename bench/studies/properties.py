@@ -64,7 +64,8 @@ def properties_of_algorithms(names: Sequence[str]) -> list[AlgorithmProperties]:
     overhead = measure_overheads(names)
     found = []
     for name, algorithm in algorithms.items():
-        clip, reflect = (measure_properties(algorithm, bounds=bounds) for bounds in ("clip", "reflect"))
+        clip = measure_properties(algorithm, bounds="clip")
+        reflect = measure_properties(algorithm, bounds="reflect")
         found.append(
             AlgorithmProperties(
                 algorithm=name,

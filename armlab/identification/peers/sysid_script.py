@@ -68,7 +68,9 @@ def torque_of(spec: Any, values: Any, run: PeerRun) -> Array:
         data.qpos[:], data.qvel[:], data.qacc[:] = q, qd, qdd
         mujoco.mj_inverse(model, data)
         out[row] = data.qfrc_inverse
-    viscous, coulomb, offset = (values[name].value for name in ("viscous", "coulomb", "offset"))
+    viscous = values["viscous"].value
+    coulomb = values["coulomb"].value
+    offset = values["offset"].value
     return run.low_pass(out + viscous * run.velocity + coulomb * np.sign(run.velocity) + offset)
 
 

@@ -78,7 +78,8 @@ def judge_specimen(specimen: Specimen, panel: Jury, seed: int, repetitions: int)
 def criterion_values(problem: ExcitationProblem, point: Array) -> dict[str, float]:
     """Every criterion of a point (dimension,)."""
     motion = problem.trajectory.motions(point[None], problem.times).motion
-    plain, unit = (singular_values(problem.arm, motion, problem.base.columns, scaled) for scaled in (False, True))
+    plain = singular_values(problem.arm, motion, problem.base.columns, False)
+    unit = singular_values(problem.arm, motion, problem.base.columns, True)
     values = (
         condition_number(plain),
         condition_number(unit),
@@ -123,7 +124,8 @@ def correlation_ceiling(frame: pd.DataFrame, kind: str, error: str) -> float:
 
 def spearman_correlations(criteria: Array, errors: Array) -> Array:
     """Spearman's correlations (c, e) between columns of criteria (n, c) and of errors (n, e)."""
-    one, other = (_standard_ranks(values) for values in (criteria, errors))
+    one = _standard_ranks(criteria)
+    other = _standard_ranks(errors)
     return np.asarray(one.T @ other)
 
 

@@ -39,7 +39,8 @@ def comparison_claims(evidence: Evidence) -> list[Claim]:
 
 def _number_claims(evidence: Evidence) -> Iterator[Claim]:
     spans = _convention_spans(evidence.frames["ranking"])
-    average, total = (evidence.column("table3", name) for name in ("average_seconds", "total_seconds"))
+    average = evidence.column("table3", "average_seconds")
+    total = evidence.column("table3", "total_seconds")
     columns = {statistic: evidence.column("table3", statistic) for statistic in _STATISTICS}
     for name, row in evidence.paper.table3.rows.items():
         for statistic in _STATISTICS:
@@ -139,7 +140,8 @@ def _best_claims(evidence: Evidence) -> Iterator[Claim]:
             verdict_if(rank == 1),
             "by the default conventions; feasible ends only",
         )
-    better, worse = (sum(standing.count(outcome) for standing in usable) for outcome in ("better", "worse"))
+    better = sum(standing.count("better") for standing in usable)
+    worse = sum(standing.count("worse") for standing in usable)
     pairs = sum(len(standing.duels) for standing in usable)
     yield Claim(
         "abstract",

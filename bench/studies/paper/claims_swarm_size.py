@@ -34,7 +34,8 @@ def swarm_size_claims(evidence: Evidence) -> list[Claim]:
 
 
 def _cost_claims(evidence: Evidence) -> Iterator[Claim]:
-    minimum, median = (evidence.column("figure2", statistic) for statistic in ("minimum", "median"))
+    minimum = evidence.column("figure2", "minimum")
+    median = evidence.column("figure2", "median")
     for size, cost in evidence.paper.figure2.best_cost.items():
         pairs = {name: (minimum[size, name], median[size, name]) for name in _SWARM_ALGORITHMS}
         ours = "; ".join(f"{display_name(n)} minimum {low:.3g}, median {mid:.3g}" for n, (low, mid) in pairs.items())

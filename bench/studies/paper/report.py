@@ -113,7 +113,8 @@ def _main_findings(evidence: Evidence) -> list[str]:
     medians = evidence.column("table3", "median")
     rank = sorted(medians, key=medians.__getitem__).index(SUBJECT) + 1
     usable = [standing for standing in evidence.ranking if standing.usable]
-    worse, better = (sum(standing.count(outcome) for standing in usable) for outcome in ("worse", "better"))
+    worse = sum(standing.count("worse") for standing in usable)
+    better = sum(standing.count("better") for standing in usable)
     base = evidence.best.problem.base
     mutating = sum(bool(life.mutations) for life in next(iter(evidence.mutation_histories.values())))
     repetitions = len(next(iter(evidence.mutation_histories.values())))

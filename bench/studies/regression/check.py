@@ -163,7 +163,9 @@ def _describe_direction(comparison: CellComparison) -> str:
 
 
 def _format_quartiles(ends: Array) -> str:
-    lower, median, upper = (quantile(ends, share) for share in (0.25, 0.5, 0.75))
+    lower = quantile(ends, 0.25)
+    median = quantile(ends, 0.5)
+    upper = quantile(ends, 0.75)
     return f"{median:.2f} [{lower:.2f}, {upper:.2f}]"
 
 

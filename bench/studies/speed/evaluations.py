@@ -37,7 +37,8 @@ def compare_with_pinocchio(arm_name: str = "irb120-arm") -> dict[str, float]:
     ours, theirs = _armlab_task(arm, motion, columns), _pinocchio_task(arm, motion, columns)
     single = _armlab_task(arm, motion.select(np.arange(POPULATION_SIZE) == 0), columns)
     seconds = median_seconds({"armlab": ours, "single": single, "pinocchio": theirs}, PIPELINE_ROUNDS)
-    armlab, pinocchio = (1e6 * seconds[name] / POPULATION_SIZE for name in ("armlab", "pinocchio"))
+    armlab = 1000000.0 * seconds["armlab"] / POPULATION_SIZE
+    pinocchio = 1000000.0 * seconds["pinocchio"] / POPULATION_SIZE
     return {
         "armlab_us": armlab,
         "armlab_one_at_a_time_us": 1e6 * seconds["single"],
