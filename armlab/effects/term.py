@@ -78,8 +78,8 @@ class Term(Candidate):
             return 0.0
         slope = np.empty(len(coefficients))
         for index, change in enumerate(np.diag(DERIVATIVE_STEP * np.maximum(np.abs(coefficients), 1e-12))):
-            more = self.parameters(coefficients + 1 * change)[name]
-            less = self.parameters(coefficients + -1 * change)[name]
+            more = self.parameters(coefficients + change)[name]
+            less = self.parameters(coefficients - change)[name]
             slope[index] = (np.asarray(more) - np.asarray(less)) / (2 * change[index])
         return SIGN_SIGMAS * float(np.sqrt(max(float(slope @ covariance @ slope), 0.0)))
 
