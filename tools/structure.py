@@ -139,8 +139,8 @@ def effect_ids(sources: dict[Path, str]) -> list[str]:
 
 
 def modules_of_a_diagnosis(tree: Path) -> int:
-    """Modules of the project that `diagnose` needs, its report and command line left out."""
-    place = "armlab.diagnosis.diagnose" if (tree / "armlab").is_dir() else "diagnosis.run"
+    """Modules of the project that `armlab diagnose` loads, its report included, package files left out."""
+    place = "armlab.diagnosis.report.write" if (tree / "armlab").is_dir() else "diagnosis.command"
     code = (
         f"import sys, {place}; from collections import Counter; "
         f"print(sum(name.split('.')[0] in {ROOTS!r} and hasattr(module, '__file__') "
