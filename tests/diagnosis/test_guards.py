@@ -31,24 +31,17 @@ def _told(found: Diagnosis) -> list[tuple[str, int | None, str]]:
     return [(each.effect, each.joint, each.equation) for each in found.claims]
 
 
-def test_stages_that_a_guard_has_no_part_in_need_not_be_done_again() -> None:
+def test_stages_that_a_guard_or_a_number_has_no_part_in_need_not_be_done_again() -> None:
     recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
-    found = dict(diagnose_without_each(recording))
-    assert list(found) == [ALL_ON, *GUARDS]
+    late, early = "pruning.least_gain=1e9", "data.rows_per_cutoff=3"  # used after the search, and before it
+    found = dict(diagnose_without_each(recording, (late, early)))
+    assert list(found) == [ALL_ON, *GUARDS, late, early]
+    assert all(each.effect == "unknown" for each in found[late].claims)
+    assert _told(found[early]) == _told(diagnose(recording, settings=vary(Settings(), *parse_change(early))))
     assert _told(found[ALL_ON]) == _told(diagnose(recording))
     for guard in (GUARDS_AFTER_SEARCH[2], GUARDS_IN_SEARCH[0]):
         alone = diagnose(recording, settings=Settings(guards=guards_without([guard])))
         assert _told(found[guard]) == _told(alone), guard
-
-
-def test_a_changed_number_is_one_more_diagnosis_beside_the_guards() -> None:
-    recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
-    changes = ("pruning.least_gain=0.9", "data.rows_per_cutoff=3")  # used after the search, and before it
-    found = dict(diagnose_without_each(recording, changes))
-    assert list(found) == [ALL_ON, *GUARDS, *changes]
-    for change in changes:
-        alone = diagnose(recording, settings=vary(Settings(), *parse_change(change)))
-        assert _told(found[change]) == _told(alone) != _told(found[ALL_ON]), change
 
 
 def test_an_ablation_refuses_a_number_that_there_is_not_before_it_starts(tmp_path: Path) -> None:
