@@ -234,7 +234,7 @@ class Judge:
     def _in_wider_links(self, group: int) -> float:
         """P-value of a group where the links may be off far more than was found; 0 for links as simulated.
 
-        What shows only because the links are thought to be off by so little is no evidence: nobody knows that width.
+        The width of the links' errors is an estimate: what is significant with that width alone is not claimed.
         """
         solver, state = self.model.solver, self.state
         if not state.widths or not any(state.widths):
@@ -262,7 +262,7 @@ class Judge:
     def _in_place_of_usual(self, group: int) -> bool:
         """Whether one law stands where usual friction would need as many numbers, and is surely likelier than that.
 
-        A law without a shape is usual friction by direction, and has to be better than it as others have.
+        A law without nonlinear parameters is usual friction by direction; it is compared as other special laws are.
         """
         solver, state, simpler = self.model.solver, self.state, self.simpler(group)
         candidate = solver.groups[group].candidate

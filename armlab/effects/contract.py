@@ -114,12 +114,15 @@ class Candidate(ABC):
     torque appears, where the motion is) for a coupling. rows: the joints, from 0, whose torque its columns change.
     form: which of the effect's laws, where it has several. shape: values of the nonlinear parameters, in their order;
     bounds: one (lowest, highest) a value.
-    follows_model: its columns depend on `Scene.torque` or `Scene.inertial` and have to be computed anew when the model
-    changes. follows_closely: on the motion as the filter of the torque leaves it, noise included, and not on a calmer
-    one. of_channel: it falsifies the torque of all others (a gain, a delay, a limit); `Scene.torque` leaves those out,
-    or they would act on themselves. replaces: effects at the same joint that its columns contain (Stribeck friction
-    those of Coulomb's); a model has either them or it. identical: effects that no motion separates from this law.
-    second_name: another effect has the same columns and comes first, so a search leaves this law out.
+    follows_model: its columns depend on `Scene.torque` or `Scene.inertial` and are made anew when the model changes.
+    follows_closely: a law that follows the model and needs the motion at the bandwidth of the torque. Other such laws
+    get a motion that is smoothed further, so that encoder noise in their columns does not explain itself.
+    of_channel: a fault of the torque's channel (a gain, a delay, a limit). It acts on the torque of all other effects,
+    which is what `Scene.torque` holds.
+    replaces: effects at the same joint whose columns are among its own, as Coulomb friction is in Stribeck friction. A
+    model has either them or this law. (`Effect.contains` is about what a law has to explain better, and does not
+    exclude.) identical: effects that no motion separates from this law.
+    second_name: another effect has the same columns and is searched for instead; the columns carry its name first.
     names: of its parameters, in the order of `parameters`. size: number of its coefficients. of_time: its columns
     depend on the order of the samples in time, so single instants do not determine its torque.
     looks: number of alternatives from which a scan of the residual chose it, for the correction of p-values.
@@ -199,9 +202,10 @@ class Candidate(ABC):
         return self.facts.prior_scale
 
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
-        """Fields of a simulator's joint that hold this law exactly, in SI units; empty where none does.
+        """Fields of a simulator's joint that stand for this law, in SI units; empty where none comes near enough.
 
-        Names as in MJCF: damping, frictionloss, armature, stiffness, springref.
+        A field may replace a part of the law (friction that is smooth at a reversal); the documentation of the effect
+        says so. Names as in MJCF: damping, frictionloss, armature, stiffness, springref.
         """
         return {}
 
@@ -214,7 +218,10 @@ class Candidate(ABC):
         return None
 
     def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> "Candidate":
-        """The law under the name that comes first for these coefficients; itself where there is no other."""
+        """This law, or the law of another effect with the same columns that fits these coefficients better in name.
+
+        A linear spring that carries gravity is a compensator, not a cable.
+        """
         return self
 
 
