@@ -26,6 +26,7 @@ from problem.robot_file import BUILT_IN_FOLDER
 from problem.suite import InstanceSettings, definition_of
 
 _ROOT = "bench.execute"
+_SOURCE_FOLDER = Path(__file__).resolve().parents[1]
 _OUR_PACKAGES = frozenset({"problem", "algorithms", "bench", "armlab"})
 # these find code by its name; what they find is a root of its own
 _LOOK_UPS = frozenset({"algorithms.registry", "problem.registry", "armlab"})
@@ -102,7 +103,16 @@ def _read_module(name: str) -> _Module:
 
 
 def _module_file(name: str) -> Path | None:
-    """The file of a module; imports nothing but the packages that it is in."""
+    """The file of a module; imports nothing but the packages that it is in.
+
+    Ours are looked for beside this package: where another folder of the path has one of their names, Python may take
+    both for one namespace, which has no file.
+    """
+    if _top_package(name) in _OUR_PACKAGES:
+        stem = _SOURCE_FOLDER.joinpath(*name.split("."))
+        compiled = sorted(stem.parent.glob(f"{stem.name}.*.so"))
+        places = (stem.with_suffix(".py"), stem / "__init__.py", *compiled)
+        return next((place for place in places if place.is_file()), None)
     found = find_spec(name)
     return Path(found.origin) if found and found.origin else None
 
