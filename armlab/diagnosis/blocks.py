@@ -124,6 +124,10 @@ class Folds:
 
     def errors(self, chosen: Sequence[int]) -> list[Array]:
         """Held-out errors of a fit with the chosen parameters only, (rows,) for each joint."""
+        return self.errors_of(self.solutions(chosen))
+
+    def solutions(self, chosen: Sequence[int]) -> Array:
+        """Parameters fitted without each fold, (parameters, folds); zeros where they are not chosen."""
         count = len(self.grams)
         place, values = np.ix_(chosen, chosen), np.zeros((len(self.precision), count))
         whole, towards = np.sum(self.grams, axis=0), np.sum(self.products, axis=0)
@@ -131,6 +135,11 @@ class Folds:
             gram = (whole - self.grams[fold] + self.precision)[place]
             inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
             values[chosen, fold] = inverse @ (towards - self.products[fold])[chosen]
+        return values
+
+    def errors_of(self, values: Array) -> list[Array]:
+        """Errors (rows,) for each joint, where each fold is predicted by its own parameters (parameters, folds)."""
+        count = len(self.grams)
         return [
             target - (design @ values)[np.arange(len(block)), block % count]
             for target, design, block in zip(self.targets, self.rows.designs, self.rows.blocks, strict=True)

@@ -14,13 +14,10 @@ from armlab.diagnosis.blocks import (
     block_covariance,
     block_numbers,
     held_out_gain,
-    split_folds,
-    whitened_rows,
 )
 from armlab.diagnosis.data import Observed, rows_in
-from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.refine import prior_precision
 from armlab.diagnosis.search import contained_groups
 from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.tuning import EvidenceTuning
@@ -42,29 +39,19 @@ class Comparison:
     @cached_property
     def folds(self) -> Folds:
         """Whitened rows of the wide fit, in folds."""
-        found, fit = self.model, self.wide
-        lengths, tuning = found.moments.lengths, found.design.settings.tuning.blocks
-        rows = whitened_rows(found.columns, {}, fit, lengths, found.noise, found.design.observed, tuning)
-        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
-        values = np.concatenate([links, fit.coefficients[fit.columns]])
-        precision = prior_precision(found.solver, fit, len(fit.inverse))
-        return split_folds(rows, values, precision, tuning.folds)
+        return split_fit(self.model, self.wide, self.model.noise)
 
     def covariance_of(self, state: State) -> BlockCovariance:
         """Robust covariance of the parameters of a state within the wide fit."""
         chosen = self._chosen(state)
         rows, fit = self.folds.rows, self.model.solver.fit(state)
         errors = [
-            target - design[:, chosen] @ self._values(fit)
+            target - design[:, chosen] @ fit_values(fit)
             for target, design in zip(self.folds.targets, rows.designs, strict=True)
         ]
         own = type(rows)(tuple(design[:, chosen] for design in rows.designs), tuple(errors), rows.blocks)
         precision = self.folds.precision[np.ix_(chosen, chosen)]
         return block_covariance(own, precision, self.model.design.settings.guards.robust_variance)
-
-    def _values(self, fit: Fit) -> Array:
-        links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
-        return np.concatenate([links, fit.coefficients[fit.columns]])
 
     def _chosen(self, state: State) -> list[int]:
         """Where the parameters of a smaller state stand among those of the wide fit."""

@@ -6,11 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.blocks import Folds, split_folds, whitened_rows
 from armlab.diagnosis.columns import Columns, Moments
 from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.noise import Noise, fit_noise
-from armlab.diagnosis.refine import refine_shapes
+from armlab.diagnosis.noise import Noise, choose_noise, fit_noise
+from armlab.diagnosis.refine import prior_precision, refine_shapes
 from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import Fit, Solver, State
 from armlab.diagnosis.surrogate import flexible_features, predict_structure
@@ -144,13 +145,45 @@ def _search_state(
 
 
 def fit_coloured_noise(model: FittedModel) -> Noise:
-    """Noise of what a round leaves and no surrogate predicts."""
+    """Noise of what a round leaves and no surrogate predicts: coloured where colour does not cost predictions.
+
+    Where physics is missing, the autoregression learns it, and least squares that are whitened by it neglect the
+    frequencies of the motion. Noise cannot be told from that by its looks, but by what it does: were it noise, the
+    whitened fit would predict held-out stretches of the torque at least as well as the plain one does (the idea of
+    Hausman 1978). A joint where it predicts them worse has white errors.
+    """
     observed, settings = model.design.observed, model.design.settings
     left = model.residual(model.fit)
     for joint, each in enumerate(model.design.features):
         left[:, joint] -= predict_structure(left[:, joint], joint, each, observed, settings.tuning.surrogate)
-    fitted = len(model.fit.inverse) / observed.joints
-    return fit_noise(left, observed, fitted, settings.tuning.noise, settings.guards.prewhitening)
+    fitted, tuning = len(model.fit.inverse) / observed.joints, settings.tuning.noise
+    white = fit_noise(left, observed, fitted, tuning, colour=False)
+    if not settings.guards.prewhitening:
+        return white
+    coloured = fit_noise(left, observed, fitted, tuning)
+    losses = _whitening_losses(model, coloured, white)
+    return choose_noise(coloured, white, losses > tuning.max_prediction_loss)
+
+
+def _whitening_losses(model: FittedModel, coloured: Noise, white: Noise) -> Array:
+    """Share by which a fit under coloured noise predicts held-out stretches worse than a plain one, (joints,)."""
+    plain, whitened = (split_fit(model, model.fit, each) for each in (white, coloured))
+    everything = range(len(plain.precision))
+    pairs = zip(plain.errors_of(whitened.solutions(everything)), plain.errors(everything), strict=True)
+    return np.array([float(worse @ worse) / max(float(better @ better), 1e-300) - 1 for worse, better in pairs])
+
+
+def split_fit(model: FittedModel, fit: Fit, noise: Noise) -> Folds:
+    """The rows of a fit under some noise, in folds."""
+    tuning = model.design.settings.tuning.blocks
+    rows = whitened_rows(model.columns, {}, fit, model.moments.lengths, noise, model.design.observed, tuning)
+    return split_folds(rows, fit_values(fit), prior_precision(model.solver, fit, len(fit.inverse)), tuning.folds)
+
+
+def fit_values(fit: Fit) -> Array:
+    """Parameters of a fit: those of the links' factor, then the effects'."""
+    links = np.linalg.lstsq(fit.links, fit.coefficients[: len(fit.links)])[0]
+    return np.concatenate([links, fit.coefficients[fit.columns]])
 
 
 def _white_noise(residual: Array, design: DesignMatrix) -> Noise:

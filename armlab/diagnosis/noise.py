@@ -50,6 +50,16 @@ class Noise:
         return len(self.taps[joint]) - 1
 
 
+def choose_noise(coloured: Noise, white: Noise, plain: NDArray[np.bool_]) -> Noise:
+    """The noise of each joint: white where `plain` (joints,) says so."""
+    pick = [white if each else coloured for each in plain]
+    return Noise(
+        tuple(each.taps[joint] for joint, each in enumerate(pick)),
+        tuple(each.scales[joint] for joint, each in enumerate(pick)),
+        tuple(each.resting[joint] for joint, each in enumerate(pick)),
+    )
+
+
 def _prediction_errors(rows: Array, taps: Array) -> Array:
     order = len(taps) - 1
     out = rows[order:].copy()

@@ -141,6 +141,11 @@ class NoiseTuning:
     min_free_share: float = tuned(
         0.2, unit="of the rows", meaning="least degrees of freedom in the variance of the noise", least=0.01, most=1.0
     )
+    max_prediction_loss: float = tuned(
+        0.02,
+        unit="of the held-out squared error",
+        meaning="a joint where a whitened fit predicts held-out stretches so much worse than a plain one has white errors",
+    )
     filter_correlation_rows: float = tuned(
         1.5, unit="rows", meaning="rows at rest that the filter ties together", least=0.1
     )
