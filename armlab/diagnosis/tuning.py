@@ -144,7 +144,7 @@ class NoiseTuning:
     max_prediction_loss: float = tuned(
         0.02,
         unit="of the held-out squared error",
-        meaning="a joint where a whitened fit predicts held-out stretches so much worse than a plain one has white errors",
+        meaning="loss of the whitened fit on held-out stretches, against a plain one, above which errors are white",
     )
     filter_correlation_rows: float = tuned(
         1.5, unit="rows", meaning="rows at rest that the filter ties together", least=0.1
