@@ -10,6 +10,7 @@ from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes
 from armlab.diagnosis.links import Widths
+from armlab.diagnosis.prediction import Prediction
 from armlab.diagnosis.result import Claim, Rival
 from armlab.diagnosis.search import Search
 from armlab.diagnosis.solver import State
@@ -18,12 +19,17 @@ from armlab.effects.links import LinkLaw, felt_values, link_law
 from armlab.effects.parameters import parameter_values
 
 
-def make_claims(model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence]) -> tuple[Claim, ...]:
-    """All claims of a model, the strongest first."""
+def make_claims(
+    model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence], prediction: Prediction
+) -> tuple[Claim, ...]:
+    """All claims of a model, the strongest first.
+
+    Names, evidence and rivals are of the model on which they were tested; numbers are of the model that predicts.
+    """
     if not effects and not links:
         return ()
-    wide = extend_with_shapes(model)
-    claims = [_effect_claim(model, wide, group, evidence) for group, evidence in effects.items()]
+    wide = extend_with_shapes(prediction.model)
+    claims = [_effect_claim(model, wide, group, prediction.named[group], each) for group, each in effects.items()]
     claims += _link_claims(model, wide, links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
     most = model.design.settings.tuning.claims.max_rivals
@@ -51,10 +57,12 @@ def _with_equal_sums(claim: Claim, claims: Sequence[Claim], known: Sequence[Effe
     return replace(claim, rivals=rivals, next_experiment=next_experiment(claim.candidate.facts, rivals))
 
 
-def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, evidence: Evidence) -> Claim:
+def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, evidence: Evidence) -> Claim:
+    """group: of the model; place: of the same law in the model that predicts."""
     solver = model.solver
     columns = solver.groups[group].columns
-    coefficients, covariance = solver.values(model.fit, group), wide.covariance(group)
+    coefficients = wide.model.solver.values(wide.model.fit, place)
+    covariance = wide.covariance(place)
     candidate = solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
     own = np.zeros(model.moments.size)
     own[columns] = coefficients
@@ -72,6 +80,7 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, evidence: Evi
         candidate=candidate,
         coefficients=coefficients,
         covariance=covariance,
+        group=place,
     )
 
 

@@ -70,8 +70,11 @@ class DesignMatrix:
     def block(self, candidate: Candidate, variant: int) -> Block:
         """A candidate's filtered columns."""
         same = self.settings.guards.same_filter
-        scenes = self.calm if candidate.follows_model and not candidate.follows_closely else self.scenes
-        return Block(candidate, variant, filtered_columns(candidate, scenes, self.observed, same))
+        return Block(candidate, variant, filtered_columns(candidate, self.scenes_of(candidate), self.observed, same))
+
+    def scenes_of(self, candidate: Candidate) -> tuple[Scene, ...]:
+        """The scenes that a candidate sees."""
+        return self.calm if candidate.follows_model and not candidate.follows_closely else self.scenes
 
     def with_candidates(self, families: Iterable[Family], left: Sequence[Array] | None = None) -> "DesignMatrix":
         """With the columns of every candidate that the families offer here, shape by shape.

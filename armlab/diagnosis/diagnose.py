@@ -10,11 +10,11 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from armlab.common.arrays import Array
 from armlab.diagnosis.claims import make_claims
-from armlab.diagnosis.data import Observed, observe, rows_in
+from armlab.diagnosis.data import observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.evidence import Evidence, count_looks
+from armlab.diagnosis.fits import joint_fits
 from armlab.diagnosis.fitted_model import (
     FittedModel,
     Progress,
@@ -24,10 +24,12 @@ from armlab.diagnosis.fitted_model import (
     search_effects,
 )
 from armlab.diagnosis.formats import Status
+from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
+from armlab.diagnosis.prediction import Prediction, choose_smoothing, filtered_residual, fit_prediction
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
-from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
+from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State
@@ -86,16 +88,18 @@ def prepare(
 
 
 def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
-    """Tests what a search found, withdraws names that do not hold, and states the rest with numbers."""
+    """Tests what a search found, withdraws names that do not hold, fits the model that predicts, and states numbers."""
     progress("testing claims")
     named = name_effects(prune(searched))
     model, tuning = named.model, named.model.design.settings.tuning
+    progress("fitting the model that predicts")
+    prediction = fit_prediction(model)
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
-    claims = make_claims(model, named.effects, named.links)
+    claims = make_claims(model, named.effects, named.links, prediction)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
-    return _assemble(recording, model, claims, unknowns, remains)
+    return _assemble(recording, model, prediction, claims, unknowns, remains)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,31 +129,47 @@ def name_effects(pruned: Pruned) -> NamedEffects:
 def _assemble(
     recording: Recording,
     model: FittedModel,
+    prediction: Prediction,
     claims: tuple[Claim, ...],
     unknowns: Sequence[Structure],
     remains: Sequence[Structure],
 ) -> Diagnosis:
     """The diagnosis of a model. unknowns: structure that is a finding `unknown`; remains: all structure."""
     design, observed, tuning = model.design, model.design.observed, model.design.settings.tuning
-    final = model.residual(model.fit)
-    for each in unknowns:
-        final[:, each.joint] -= each.prediction
+    simulation, settings = design.simulation, _settings_used(design.settings)
+    named = {each.group: each for each in claims if each.group is not None}
+    notes = {
+        "settings": settings,
+        "unknown": [each.equation for each in claims if each.candidate is None],
+        "in_links": [f"{each.effect}: {each.equation}" for each in claims if each.in_links],
+    }
+    found = choose_smoothing(
+        build_model(recording, simulation, prediction.model, named, notes), observed, tuning.prediction
+    )
+    alone = build_model(recording, simulation, prediction.with_names_alone(named), named, {})
+    alone = choose_smoothing(alone, observed, tuning.prediction)
+    final = filtered_residual(found, observed)
     refit = model.residual(model.solver.fit(State((), None)))
-    start = refit if design.simulation.kind == "refit" else design.target
-    floor = noise_floor(final, design.features, observed, tuning.surrogate)
-    fits = _joint_fits(refit, final, floor, observed, tuning.claims.min_gap)
+    start = refit if simulation.kind == "refit" else design.target
+    noise = final.copy()
+    for each in unknowns:
+        noise[:, each.joint] -= each.prediction
+    floor = noise_floor(noise, design.features, observed, tuning.surrogate)
+    fits = joint_fits(refit, found, alone, floor, observed, tuning)
     status: Status = "mismatch" if claims else "none"
-    base, covariance = model.base_parameters()
+    base, covariance = prediction.model.base_parameters()
     return Diagnosis(
         recording=recording,
-        simulation=design.simulation,
+        simulation=simulation,
         status=status,
         summary=summarise(status, claims, fits),
         observed=observed,
         nominal=design.target,
         refit=refit,
         final=final,
-        inertial=inertial_parameters(model),
+        inertial=inertial_parameters(prediction.model),
+        model=found,
+        named_model=alone,
         base_values=base,
         base_covariance=covariance,
         claims=claims,
@@ -160,7 +180,7 @@ def _assemble(
         fit=fits,
         steps=model.steps,
         looks=count_looks(model),
-        settings=_settings_used(design.settings),
+        settings=settings,
     )
 
 
@@ -169,15 +189,3 @@ def _settings_used(settings: Settings) -> dict[str, float | str | bool]:
     changed = changed_numbers(settings.tuning)
     shown = {name: str(list(each)) if isinstance(each, tuple) else each for name, each in changed.items()}
     return {**asdict(settings.guards), "cutoff_hz": settings.tuning.data.cutoff_hz, **shown}
-
-
-def _joint_fits(refit: Array, final: Array, floor: Array, observed: Observed, min_gap: float) -> tuple[JointFit, ...]:
-    out = []
-    for joint, noise in enumerate(floor.tolist()):
-        rows = rows_in(observed.of_role("validate", joint), observed.rows)
-        before = float(np.sqrt(np.mean(refit[rows, joint] ** 2)))
-        after = float(np.sqrt(np.mean(final[rows, joint] ** 2)))
-        gap = before - noise
-        closed = (before - after) / gap if gap > min_gap * noise else None
-        out.append(JointFit(joint + 1, before, after, noise, closed))
-    return tuple(out)

@@ -200,7 +200,12 @@ def _fit_model(
 
 def _follow_model(model: FittedModel) -> DesignMatrix:
     """The design with columns that follow the model of a round."""
-    design, fit = model.design, model.fit
+    return follow_model(model.design, model)
+
+
+def follow_model(design: DesignMatrix, model: FittedModel) -> DesignMatrix:
+    """A design with columns that follow a model."""
+    fit = model.fit
     inertial = inertial_parameters(model)
     nominal = design.simulation.inertial
     change = inertial if nominal is None else inertial - nominal

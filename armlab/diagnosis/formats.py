@@ -133,12 +133,22 @@ class UnexplainedEntry(Entry):
     depends_on: tuple[str, ...]
 
 
-class FitEntry(Entry):
-    """Held-out error of a joint, N m (N): before, with the model found, and of the noise alone.
+class RecordedEntry(Entry):
+    """The same four errors against the torque as recorded, which passed no filter, N m (N)."""
 
-    gap_closed: 1 where the model reaches the noise; null where there was no gap. named: with the named effects alone,
-    without a surrogate of an unknown. identify: of a plain identification of the same recording. replay: error of the
-    position, rad (m), when the commands are sent through the simulation.
+    heldout_rms_before: float
+    heldout_rms_after: float
+    heldout_rms_named: float
+    heldout_rms_identify: float
+
+
+class FitEntry(Entry):
+    """Held-out error of a joint against the filtered torque, N m (N).
+
+    before: of the refitted rigid body. after: with the model found, surrogates of unknowns left out. named: with the
+    named effects alone. identify: of a plain identification of the same recording (friction, offset and rotor inertia
+    of each joint). noise_floor: of the noise alone. gap_closed: 1 where the model reaches the noise; null where there
+    was no gap. replay: error of the position, rad (m), when the commands are sent through the simulation.
     """
 
     joint: JointNumber
@@ -148,6 +158,7 @@ class FitEntry(Entry):
     heldout_rms_identify: float | None = None
     noise_floor: float
     gap_closed: float | None
+    recorded: RecordedEntry | None = None
     replay_rms_before: float | None = None
     replay_rms_after: float | None = None
 

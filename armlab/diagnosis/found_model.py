@@ -1,21 +1,28 @@
-"""The model that a diagnosis found: links as fitted, the simulation's own terms, every named effect."""
+"""The model that a diagnosis writes: links as fitted, the simulation's own terms, named effects, and parts that are
+present without a claim.
+"""
 
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.fitted_model import FittedModel, inertial_parameters
+from armlab.diagnosis.intervals import extend_with_shapes
+from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import Candidate
 from armlab.effects.drive import RotorInertia
 from armlab.effects.parameters import ParameterValue, parameter_values
 from armlab.identification.model_file import base_covariance
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.recording import Recording
 from problem.robot_file import built_in_arms
 
-Terms = list[tuple[Candidate, Array, tuple[ParameterValue, ...]]]
+Term = tuple[Candidate, Array, tuple[ParameterValue, ...], bool]  # the last: whether it is claimed
 
 
 def model_found(diagnosis: Diagnosis) -> TorqueModel:
@@ -24,59 +31,81 @@ def model_found(diagnosis: Diagnosis) -> TorqueModel:
     What could not be named is no component: its surrogate belongs to this recording, and the provenance tells of it,
     as of what the links hold already.
     """
-    inertial = diagnosis.inertial
-    if inertial is None:
+    return _existing(diagnosis.model)
+
+
+def named_model(diagnosis: Diagnosis) -> TorqueModel:
+    """The same fitted with the named effects alone, without what is only present; ValueError as for `model_found`."""
+    return _existing(diagnosis.named_model)
+
+
+def _existing(model: TorqueModel | None) -> TorqueModel:
+    if model is None:
         raise ValueError("the diagnosis fitted nothing: it has no model")
-    arm = diagnosis.simulation.arm
-    terms = _simulated_terms(diagnosis) + _named_terms(diagnosis)
-    structure = Structure(arm, tuple(candidate for candidate, _, _ in terms), load=inertial)
+    return model
+
+
+def build_model(
+    recording: Recording,
+    simulation: Simulation,
+    fitted: FittedModel,
+    claims: Mapping[int, Claim],
+    notes: dict[str, Any],
+) -> TorqueModel:
+    """The model of a fit. claims: by group; what has none is present without a claim. notes: for the provenance."""
+    inertial = inertial_parameters(fitted)
+    terms = [*_simulated_terms(simulation), *_fitted_terms(fitted, claims)]
+    structure = Structure(simulation.arm, tuple(term[0] for term in terms), load=inertial)
     base = structure.base.values(inertial)
-    covariance = diagnosis.base_covariance
+    covariance = fitted.base_parameters()[1]
     return TorqueModel(
-        robot=_robot_path(diagnosis),
+        robot=_robot_path(recording),
         structure=structure,
-        values=np.concatenate([base, *(coefficients for _, coefficients, _ in terms)]),
-        covariance=None if covariance is None else base_covariance(covariance, structure),
-        inertial=inertial if diagnosis.simulation.inertial is not None else None,
-        cutoff_hz=None if diagnosis.observed is None else diagnosis.observed.cutoff_hz,
-        provenance=_provenance(diagnosis),
-        stated=tuple(parameters for _, _, parameters in terms),
+        values=np.concatenate([base, *(term[1] for term in terms)]),
+        covariance=base_covariance(covariance, structure),
+        inertial=inertial if simulation.inertial is not None else None,
+        cutoff_hz=fitted.design.observed.cutoff_hz,
+        provenance=_provenance(recording, notes),
+        stated=tuple(term[2] for term in terms),
+        unclaimed=frozenset(number for number, term in enumerate(terms) if not term[3]),
     )
 
 
-def _named_terms(diagnosis: Diagnosis) -> Terms:
-    return [
-        (claim.candidate, claim.coefficients, claim.parameters)
-        for claim in diagnosis.claims
-        if claim.candidate is not None and claim.coefficients is not None and not claim.in_links
-    ]
+def _fitted_terms(fitted: FittedModel, claims: Mapping[int, Claim]) -> Iterator[Term]:
+    """The effects of a fit, those with a claim by its name."""
+    wide = extend_with_shapes(fitted) if fitted.state.groups else None
+    for group in fitted.state.groups:
+        assert wide is not None
+        claim = claims.get(group)
+        candidate = fitted.solver.groups[group].candidate
+        if claim is not None and claim.candidate is not None:
+            candidate = claim.candidate
+        coefficients = fitted.solver.values(fitted.fit, group)
+        stated = parameter_values(candidate, coefficients, wide.covariance(group), wide.factor)
+        yield candidate, coefficients, stated, claim is not None
 
 
-def _simulated_terms(diagnosis: Diagnosis) -> Terms:
+def _simulated_terms(simulation: Simulation) -> list[Term]:
     """What the simulation has beside its links: components of a model, or the rotor inertias of a robot file."""
-    model, arm = diagnosis.simulation.model, diagnosis.simulation.arm
+    model, arm = simulation.model, simulation.arm
     if model is not None:
         return [
-            (each.candidate, each.coefficients, model.component_parameters(index))
+            (each.candidate, each.coefficients, model.component_parameters(index), index not in model.unclaimed)
             for index, each in enumerate(model.effects)
         ]
     rotors = [(RotorInertia.at(arm, joint), np.array([value])) for joint, value in enumerate(arm.rotor_inertia, 1)]
-    return [(rotor, value, parameter_values(rotor, value, None, 1.0)) for rotor, value in rotors if value[0]]
+    return [(rotor, value, parameter_values(rotor, value, None, 1.0), True) for rotor, value in rotors if value[0]]
 
 
-def _provenance(diagnosis: Diagnosis) -> dict[str, Any]:
-    unknown = [claim.equation for claim in diagnosis.claims if claim.candidate is None]
-    in_links = [f"{claim.effect}: {claim.equation}" for claim in diagnosis.claims if claim.in_links]
+def _provenance(recording: Recording, notes: dict[str, Any]) -> dict[str, Any]:
     out: dict[str, Any] = {
-        "recording": diagnosis.recording.name,
-        "runs": [run.name for run in diagnosis.recording.runs if run.role == "identify"],
-        "settings": dict(diagnosis.settings),
+        "recording": recording.name,
+        "runs": [run.name for run in recording.runs if run.role == "identify"],
         "version": version("armlab"),
     }
-    return out | ({"unknown": unknown} if unknown else {}) | ({"in_links": in_links} if in_links else {})
+    return out | {key: value for key, value in notes.items() if value}
 
 
-def _robot_path(diagnosis: Diagnosis) -> str:
+def _robot_path(recording: Recording) -> str:
     """The robot as a built-in name, or the path of its file."""
-    robot = diagnosis.recording.robot
-    return robot if robot in built_in_arms() else str(diagnosis.recording.folder / robot)
+    return recording.robot if recording.robot in built_in_arms() else str(recording.folder / recording.robot)

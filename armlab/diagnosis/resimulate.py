@@ -159,10 +159,8 @@ def _simulate_windows(body: Body, observed: Observed, residual: Array, rows: NDA
 def _new_body(diagnosis: Diagnosis) -> Body:
     """Links and rotors of the model found."""
     assert diagnosis.inertial is not None
-    rotors = _given_rotors(diagnosis)
-    for claim in diagnosis.claims:
-        if claim.candidate is not None and claim.coefficients is not None:
-            rotors[claim.candidate.rows[0]] += claim.candidate.joint_fields(claim.coefficients).get("armature", 0.0)
+    assert diagnosis.model is not None
+    rotors = joint_fields(diagnosis.model).get("armature", np.zeros(len(diagnosis.simulation.arm)))
     return Body(diagnosis.simulation.arm, diagnosis.inertial, rotors)
 
 

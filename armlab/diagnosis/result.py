@@ -10,6 +10,7 @@ from armlab.diagnosis.search import Step
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import Candidate
 from armlab.effects.parameters import ParameterValue
+from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Recording
 
 
@@ -33,7 +34,7 @@ class Claim:
 
     candidate, coefficients, covariance: the terms that add to the model, None for `unknown`. prediction: (rows,
     joints), N m, its torque at the kept rows. depends_on: variables of an unknown. in_links: whether the links of the
-    model found hold it already.
+    model found hold it already. group: its number in the model that predicts.
     """
 
     effect: str
@@ -50,6 +51,7 @@ class Claim:
     covariance: Array | None = None
     depends_on: tuple[str, ...] = ()
     in_links: bool = False
+    group: int | None = None
 
 
 @dataclass(frozen=True)
@@ -74,14 +76,39 @@ class Unexplained:
 
 
 @dataclass(frozen=True)
-class JointFit:
-    """Held-out error of a joint, N m: of the refitted rigid arm, of the model found, and of the noise alone."""
+class HeldOutErrors:
+    """Held-out error of a joint, N m (N): of the refitted rigid arm, of the model found, of the named effects alone,
+    and of a plain identification with friction, offset and rotor inertia of every joint.
+    """
 
-    joint: int
     before: float
     after: float
+    named: float
+    identified: float
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """Held-out errors of a joint against the filtered torque and the torque as recorded.
+
+    noise_floor: N m (N), of the filtered torque's noise. gap_closed: from the refitted rigid arm to the noise.
+    """
+
+    joint: int
+    filtered: HeldOutErrors
+    recorded: HeldOutErrors
     noise_floor: float
     gap_closed: float | None
+
+    @property
+    def before(self) -> float:
+        """Of the refitted rigid arm, filtered torque."""
+        return self.filtered.before
+
+    @property
+    def after(self) -> float:
+        """Of the model found, filtered torque."""
+        return self.filtered.after
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +116,8 @@ class Diagnosis:
     """Everything that the verdict, the model and the report are made of.
 
     nominal, refit, final: residuals (rows, joints), N m, of the simulation as it is, of its links refitted, and of
-    the model found. inertial: (10 * joints,) of the model found. held_out: (rows,) what took no part in the fit.
+    the model found, without surrogates of what is unknown. inertial: (10 * joints,) of the model found. model: the
+    same to predict with; named_model: fitted with the named effects alone.
     steps: the log of the search. looks: how many candidates and shapes were compared.
     """
 
@@ -102,6 +130,8 @@ class Diagnosis:
     refit: Array | None = None
     final: Array | None = None
     inertial: Array | None = None
+    model: TorqueModel | None = None
+    named_model: TorqueModel | None = None
     base_values: Array | None = None
     base_covariance: Array | None = None
     claims: tuple[Claim, ...] = ()

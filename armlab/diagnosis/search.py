@@ -90,15 +90,19 @@ class Search:
 
     def with_group(self, state: State, group: int) -> State:
         """The state with a group, without those that it replaces, or that break a law of physics at its joint then."""
-        for other in self._replaced(state, group):
-            state = state.minus(other)
-        state = state.plus(group)
+        state = self.in_place(state, group)
         joint = self.solver.groups[group].candidate.joint
         for other in state.groups:
             beside = other != group and self.solver.groups[other].candidate.joint == joint
             if beside and self.objection(state, other) is not None:
                 state = state.minus(other)
         return state
+
+    def in_place(self, state: State, group: int) -> State:
+        """The state with a group, without those that it replaces."""
+        for other in self._replaced(state, group):
+            state = state.minus(other)
+        return state.plus(group)
 
     def _replaced(self, state: State, group: int) -> list[int]:
         groups, candidate = self.solver.groups, self.solver.groups[group].candidate

@@ -14,7 +14,7 @@ from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.geometry_check import check_torque_fit
-from armlab.recordings.recording import Recording
+from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
 from problem.regressor import rigid_body_torque
 
@@ -49,9 +49,15 @@ class Simulation:
 
     def filtered(self, signals: Signals) -> Array:
         """Simulated torque through the filter of the measured one, (kept, joints)."""
-        if self.kind == "simulated" and signals.run.simulated_torque is not None:
-            return np.asarray(signals.filter(signals.run.simulated_torque))
-        return np.asarray(signals.filter(self.torque(scene_of(signals.run, signals.motion, self.arm))))
+        return np.asarray(
+            signals.filter(self.torque_as_recorded(scene_of(signals.run, signals.motion, self.arm), signals.run))
+        )
+
+    def torque_as_recorded(self, scene: Scene, run: Run) -> Array:
+        """Simulated torque at every sample of a run, (samples, joints): that of the file, or that of its motion."""
+        if self.kind == "simulated" and run.simulated_torque is not None:
+            return run.simulated_torque
+        return self.torque(scene)
 
 
 def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulation:

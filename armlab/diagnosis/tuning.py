@@ -247,6 +247,42 @@ class BlockTuning:
 
 
 @dataclass(frozen=True)
+class PredictionTuning:
+    """The model that predicts: its cut-off, and what it holds beside the named effects."""
+
+    folds: int = tuned(6, unit="blocks", meaning="blocks of time of the identification runs, held out in turn", least=2)
+    cutoff_shares: tuple[float, ...] = tuned(
+        (0.35, 0.5, 0.7, 1.0),
+        unit="of the cut-off that the positions suggest",
+        meaning="lower cut-offs that are tried, as `identify` tries them",
+        least=0.01,
+    )
+    least_change: float = tuned(0.8, unit="of the present cut-off", meaning="higher cut-offs are not tried", most=1.0)
+    min_cutoff_gain: float = tuned(
+        0.02, unit="of the held-out error", meaning="a lower cut-off has to lower the error by more", most=1.0
+    )
+    min_gain: float = tuned(
+        0.01,
+        unit="logarithm of the joints' errors",
+        meaning="a part that is present has to lower the errors by more",
+        source="1 % of the error of one joint, as the choice of `identify` asks",
+    )
+    min_standard_errors: float = tuned(
+        2.0,
+        unit="standard errors between blocks",
+        meaning="a part that is present has to lower the errors by more",
+        source="the best of many parts is taken; one is the rule of Breiman et al. 1984 for a single choice",
+    )
+    smoothing_shares: tuple[float, ...] = tuned(
+        (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8),
+        unit="of the cut-off that the positions suggest",
+        meaning="cut-offs of the positions that are tried for predictions",
+        least=0.01,
+    )
+    max_changes: int = tuned(60, unit="changes", meaning="most parts that are added or left out", least=0)
+
+
+@dataclass(frozen=True)
 class EvidenceTuning:
     """The evidence for each effect."""
 
@@ -514,6 +550,7 @@ class Tuning:
     search: SearchTuning = SearchTuning()
     refine: RefineTuning = RefineTuning()
     blocks: BlockTuning = BlockTuning()
+    prediction: PredictionTuning = PredictionTuning()
     evidence: EvidenceTuning = EvidenceTuning()
     pruning: PruningTuning = PruningTuning()
     surrogate: SurrogateTuning = SurrogateTuning()

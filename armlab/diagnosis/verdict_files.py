@@ -17,6 +17,7 @@ from armlab.diagnosis.formats import (
     FitEntry,
     LocatedEntry,
     ParameterEntry,
+    RecordedEntry,
     RivalEntry,
     UnexplainedEntry,
     VerdictFile,
@@ -109,10 +110,18 @@ def _unexplained_entry(each: Unexplained) -> UnexplainedEntry:
 def _fit_entry(each: JointFit) -> FitEntry:
     return FitEntry(
         joint=each.joint,
-        heldout_rms_before=each.before,
-        heldout_rms_after=each.after,
+        heldout_rms_before=each.filtered.before,
+        heldout_rms_after=each.filtered.after,
+        heldout_rms_named=each.filtered.named,
+        heldout_rms_identify=each.filtered.identified,
         noise_floor=each.noise_floor,
         gap_closed=each.gap_closed,
+        recorded=RecordedEntry(
+            heldout_rms_before=each.recorded.before,
+            heldout_rms_after=each.recorded.after,
+            heldout_rms_named=each.recorded.named,
+            heldout_rms_identify=each.recorded.identified,
+        ),
     )
 
 

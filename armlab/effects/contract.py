@@ -49,7 +49,8 @@ class Effect:
     title: its name in a sentence; the id with spaces where it is left out.
     where: `joint` for an effect at one joint, `coupling` where torque and motion are at two joints, `link` for
     parameters of a link, `robot` for an effect of the whole arm (its joint is null).
-    usual: every arm has it. dissipates: it takes energy from the motion.
+    usual: every arm has it. common: many arms have some of it, so that a model may hold it where the evidence is too
+    little for a claim. dissipates: it takes energy from the motion.
     sticks: at rest it takes any value up to its level, so data at a standstill do not determine it.
     contains: ids of simpler effects at the same joint. A law of this effect has to explain more than they do.
     one_of: name of a set of effects of which a joint has at most one.
@@ -70,6 +71,7 @@ class Effect:
     title: str = ""
     where: Literal["joint", "coupling", "link", "robot"] = "joint"
     usual: bool = False
+    common: bool = False
     dissipates: bool = False
     sticks: bool = False
     contains: tuple[str, ...] = ()

@@ -15,6 +15,7 @@ ROTOR_INERTIA_FACTS = Effect(
     "rotor_inertia",
     "inertia of the motor behind the gear",
     (Parameter("inertia", INERTIA, positive=True),),
+    common=True,
     axis="acceleration",
     experiment="compare with the motor's data sheet: no motion tells rotor inertia from the link's own",
 )
@@ -30,6 +31,7 @@ TORQUE_OFFSET_FACTS = Effect(
     "constant torque",
     (Parameter("offset", TORQUE),),
     usual=True,
+    common=True,
     axis="time",
     experiment="hold a variety of poses, each reached from both directions",
 )

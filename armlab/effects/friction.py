@@ -19,6 +19,7 @@ COULOMB_FACTS = Effect(
     usual=True,
     dissipates=True,
     sticks=True,
+    common=True,
     axis="velocity",
     experiment="record several constant speeds in both directions, slow ones too, with many reversals",
 )
@@ -28,6 +29,7 @@ VISCOUS_FACTS = Effect(
     (VISCOUS_COEFFICIENT,),
     usual=True,
     dissipates=True,
+    common=True,
     axis="velocity",
     experiment="record the same speeds at different frequencies of motion, and several constant speeds",
 )
@@ -41,6 +43,7 @@ NONLINEAR_VISCOUS_FACTS = Effect(
     dissipates=True,
     contains=("coulomb_friction", "viscous_friction"),
     one_of="friction laws",
+    common=True,
     axis="velocity",
     experiment="record constant speeds up to the top of the speed range",
 )
@@ -70,6 +73,7 @@ ASYMMETRIC_FACTS = Effect(
     contains=("coulomb_friction", "viscous_friction"),
     one_of="friction laws",
     equal_sums=(("coulomb_friction", "torque_offset"), ("coulomb_friction", "cable_stiffness")),
+    common=True,
     axis="velocity",
     experiment="pass the same poses in both directions at the same speeds",
 )
@@ -81,6 +85,7 @@ LOAD_DEPENDENT_FACTS = Effect(
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),
     prior_scale=0.3,
+    common=True,
     experiment="repeat one motion with two payloads, or one speed in two poses of different load",
 )
 

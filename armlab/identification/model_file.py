@@ -123,6 +123,7 @@ def _component_entries(model: TorqueModel) -> list[dict[str, Any]]:
             "joints": list(part.joints),
             "parameters": {each.name: _parameter_entry(each) for each in model.component_parameters(index)},
             **({"form": part.form} if part.form else {}),
+            **({"claimed": False} if index in model.unclaimed else {}),
         }
         for index, part in enumerate(model.structure.components)
     ]
@@ -173,6 +174,7 @@ def model_of(file: ModelFile, path: Path) -> TorqueModel:
         position_factor=numbers.position_factor,
         provenance={key: value for key, value in file.provenance.items() if key not in NUMBER_KEYS},
         stated=tuple(_stated_parameters(entry) for entry in file.components),
+        unclaimed=frozenset(index for index, entry in enumerate(file.components) if not entry.claimed),
     )
 
 

@@ -27,7 +27,8 @@ class TorqueModel:
     robot: as recordings name it. values: (columns,), covariance: (columns, columns) or None; NaN where nothing is
     known. factor: from a standard error to half an interval. inertial: (10 * joints,) of physically consistent links,
     or None. cutoff_hz, position_factor: of the filters that it was identified with, see `signals_of`.
-    stated: the parameters of each component as a file states them; empty for a model that was fitted.
+    stated: the parameters of each component as a file states them; empty for a model that was fitted. unclaimed:
+    components that the model has because many arms have them, without enough evidence for a finding.
     """
 
     robot: str
@@ -40,6 +41,7 @@ class TorqueModel:
     position_factor: float = 1.0
     provenance: dict[str, Any] = field(default_factory=dict)
     stated: tuple[tuple[ParameterValue, ...], ...] = ()
+    unclaimed: frozenset[int] = frozenset()
 
     @property
     def arm(self) -> Arm:

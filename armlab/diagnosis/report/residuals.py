@@ -54,9 +54,10 @@ def select_residuals(diagnosis: Diagnosis) -> ShownResiduals | None:
 
 
 def residual_without(diagnosis: Diagnosis, claim: Claim, joint: int) -> Array:
-    """Residual (rows,) at a joint (from 0) of the model found without this finding."""
+    """Residual (rows,) at a joint (from 0) of the model found without this finding; an unknown is not in it."""
     assert diagnosis.final is not None
-    return np.asarray(diagnosis.final[:, joint] + claim.prediction[:, joint])
+    left = diagnosis.final[:, joint]
+    return left if claim.candidate is None else np.asarray(left + claim.prediction[:, joint])
 
 
 def clearest_stretch(data: ShownResiduals, seconds: float) -> tuple[Segment, slice]:

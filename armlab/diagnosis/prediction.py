@@ -1,0 +1,333 @@
+"""The model that predicts: what is named, what every arm has, and what else helps on stretches that are held out.
+
+To name an effect asks what is sure; to predict asks what helps. The names of a search are the start. Friction and
+offset of every joint stand beside them, and what many arms have (other laws of friction, rotor inertia) is added part
+by part where it lowers the error on blocks of time of the identification runs that are held out in turn. These blocks
+also choose the cut-off. Validation runs take no part.
+"""
+
+from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.blocks import WhitenedRows, whitened_rows
+from armlab.diagnosis.columns import Block, Columns, base_columns, filtered_columns, stack_columns
+from armlab.diagnosis.data import Observed, observe, rows_in
+from armlab.diagnosis.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.fitted_model import FittedModel, fit_values, follow_model
+from armlab.diagnosis.noise import Noise, fit_noise
+from armlab.diagnosis.refine import prior_precision
+from armlab.diagnosis.search import Search
+from armlab.diagnosis.solver import State
+from armlab.diagnosis.tuning import PredictionTuning
+from armlab.effects.contract import Candidate
+from armlab.effects.scene import scene_of
+from armlab.identification.regression import suggested_cutoff
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.recording import Run
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A model that predicts. named: its group for each group of the model that was named; the others are present, and
+    not claimed. held_out: ||tau - tau_hat|| / ||tau|| of the torque as recorded on blocks held out in turn.
+    """
+
+    model: FittedModel
+    named: dict[int, int]
+    held_out: float
+
+    def with_names_alone(self, names: Iterable[int]) -> FittedModel:
+        """The model fitted with some of its groups alone."""
+        return replace(self.model, state=State(tuple(sorted(names)), self.model.state.widths))
+
+
+def fit_prediction(named: FittedModel) -> Prediction:
+    """The model that predicts, from one with the names that hold."""
+    tuning = named.design.settings.tuning.prediction
+    groups = named.solver.groups
+    own = named.state.groups
+    more = [number for number, group in enumerate(groups) if number not in own and group.candidate.facts.common]
+    numbers = (*own, *more)
+    candidates = [groups[number].candidate for number in numbers]
+    start = tuple(range(len(own)))
+    best = _Trial.of(_smaller_design(named, numbers), start, named.state, named.noise)
+    error = best.held_out(best.begin)
+    for cutoff in _lower_cutoffs(named, tuning):
+        trial = _Trial.of(_design_at(named, candidates, cutoff), start, named.state, None)
+        best, error = _better(best, error, trial, tuning)
+    best, error = _better(best, error, best.with_noise(_alike(best.model.noise)), tuning)
+    state = best.improve(tuning)
+    model = replace(best.model, state=state)
+    places = {group: place for place, group in enumerate(own) if place in state.groups}
+    return Prediction(model, places, best.held_out(state))
+
+
+def _better(best: "_Trial", error: float, other: "_Trial", tuning: PredictionTuning) -> tuple["_Trial", float]:
+    """The other trial with its held-out error where that is lower by enough."""
+    changed = other.held_out(other.begin)
+    return (other, changed) if changed < (1 - tuning.min_cutoff_gain) * error else (best, error)
+
+
+def _alike(noise: Noise) -> Noise:
+    """White noise of one size on all joints: each newton metre counts the same."""
+    scale = float(np.sqrt(np.mean(np.square(noise.scales))))
+    ratios = [scale / each for each in noise.scales]
+    resting = tuple(rest * ratio for rest, ratio in zip(noise.resting, ratios, strict=True))
+    return Noise(tuple(np.ones(1) for _ in noise.taps), (scale,) * len(noise.scales), resting)
+
+
+def _lower_cutoffs(model: FittedModel, tuning: PredictionTuning) -> list[float]:
+    """Cut-offs below the present one that the positions suggest, Hz."""
+    suggested = max(suggested_cutoff(run) for run in identification_runs(model.design.observed))
+    present = model.design.observed.cutoff_hz
+    return [each * suggested for each in tuning.cutoff_shares if each * suggested < tuning.least_change * present]
+
+
+def _smaller_design(model: FittedModel, numbers: Sequence[int]) -> DesignMatrix:
+    """The design with some of its blocks."""
+    return replace(model.design, blocks=tuple(model.design.blocks[number] for number in numbers))
+
+
+def _design_at(model: FittedModel, candidates: Sequence[Candidate], cutoff_hz: float) -> DesignMatrix:
+    """The design of these candidates with another cut-off; columns follow the model as it is fitted."""
+    design = model.design
+    data = replace(design.settings.tuning.data, cutoff_hz=cutoff_hz, min_cutoff_hz=cutoff_hz)
+    settings = replace(design.settings, tuning=replace(design.settings.tuning, data=data))
+    runs = [each.run for each in design.observed.signals]
+    observed = observe(runs, design.simulation.arm, design.simulation.inertial, settings)
+    fresh = build_design_matrix(observed, design.simulation, design.base, design.prior, settings)
+    moved = follow_model(fresh, model)
+    return replace(moved, blocks=tuple(moved.block(each, 0) for each in candidates))
+
+
+def _recorded_columns(design: DesignMatrix) -> Columns:
+    """The columns of a design and its torque as recorded, without the filter of the torque."""
+    observed, simulation = design.observed, design.simulation
+    rigid = [base_columns(simulation.arm, design.base, each, same_filter=False) for each in observed.signals]
+    blocks = []
+    for block in design.blocks:
+        scenes = design.scenes_of(block.candidate)
+        values = filtered_columns(block.candidate, scenes, observed, same_filter=False)
+        blocks.append(Block(block.candidate, block.variant, values))
+    target = []
+    for each in observed.signals:
+        simulated = simulation.torque_as_recorded(scene_of(each.run, each.motion, simulation.arm), each.run)
+        target.append((each.run.torque - simulated)[each.filter.rows])
+    return stack_columns(design.base, rigid, blocks, np.concatenate(target))
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A design on which structures are compared. begin: named effects and the usual ones of every joint.
+
+    rows, recorded: of all columns, whitened and as recorded, the identification rows of each joint.
+    """
+
+    model: FittedModel
+    names: tuple[int, ...]
+    begin: State
+    rows: WhitenedRows
+    recorded: WhitenedRows
+
+    def with_noise(self, noise: Noise) -> "_Trial":
+        """The same columns under another noise."""
+        return _Trial.of(self.model.design, self.names, self.begin, noise)
+
+    @classmethod
+    def of(cls, design: DesignMatrix, names: tuple[int, ...], state: State, noise: Noise | None) -> "_Trial":
+        """noise: white with the scatter that the named and usual effects leave, where it is left out."""
+        if noise is None:
+            plain = fit_noise(design.target, design.observed, 0.0, design.settings.tuning.noise, colour=False)
+            first = _fitted(design, plain, state.widths)
+            begin = _with_usual(first, names)
+            left = first.residual(first.solver.fit(begin))
+            noise = fit_noise(left, design.observed, 0.0, design.settings.tuning.noise, colour=False)
+        model = _fitted(design, noise, state.widths)
+        everything = model.solver.fit(State(tuple(range(len(model.solver.groups))), state.widths))
+        unit = Noise(
+            tuple(np.ones(1) for _ in noise.taps),
+            tuple(1.0 for _ in noise.taps),
+            tuple(np.ones(design.observed.rows) for _ in noise.taps),
+        )
+        lengths, blocks = model.moments.lengths, design.settings.tuning.blocks
+        rows = whitened_rows(design.columns, {}, everything, lengths, noise, design.observed, blocks)
+        raw = whitened_rows(_recorded_columns(design), {}, everything, lengths, unit, design.observed, blocks)
+        values = fit_values(everything)
+        return cls(model, names, _with_usual(model, names), _targets(rows, values), _targets(raw, values))
+
+    def _folds(self, rows: WhitenedRows) -> list[NDArray[np.intp]]:
+        """The fold of each row of each joint: the stretches of time, in order, cut into blocks."""
+        stretches = np.unique(np.concatenate(self.recorded.blocks))
+        return [np.searchsorted(stretches, each) * self._tuning.folds // len(stretches) for each in rows.blocks]
+
+    @property
+    def _tuning(self) -> PredictionTuning:
+        return self.model.design.settings.tuning.prediction
+
+    @cached_property
+    def _normal(self) -> tuple[Array, Array]:
+        """Normal equations without each fold: (folds, parameters, parameters) and (folds, parameters)."""
+        count, size = self._tuning.folds, self.rows.designs[0].shape[1]
+        grams, products = np.zeros((count, size, size)), np.zeros((count, size))
+        for design, target, fold in zip(self.rows.designs, self.rows.errors, self._folds(self.rows), strict=True):
+            for number in range(count):
+                own = fold == number
+                grams[number] += design[own].T @ design[own]
+                products[number] += design[own].T @ target[own]
+        return grams.sum(axis=0) - grams + self._precision, products.sum(axis=0) - products
+
+    @cached_property
+    def _precision(self) -> Array:
+        everything = self.model.solver.fit(State(tuple(range(len(self.model.solver.groups))), self.begin.widths))
+        return prior_precision(self.model.solver, everything, self.rows.designs[0].shape[1])
+
+    @cached_property
+    def _judged(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
+        """Per joint and fold the own columns and their products, the recorded torque last."""
+        out = []
+        for design, target, fold in zip(
+            self.recorded.designs, self.recorded.errors, self._folds(self.recorded), strict=True
+        ):
+            used = np.flatnonzero(np.any(design != 0, axis=0))
+            both = np.column_stack([design[:, used], target])
+            out.append([(used, both[fold == number].T @ both[fold == number]) for number in range(self._tuning.folds)])
+        return out
+
+    def errors(self, state: State) -> Array:
+        """Squared error of the recorded torque on each fold as it is held out, (folds, joints)."""
+        grams, products = self._normal
+        rank = self.model.solver.fit(self.begin).links.shape[1]
+        own = [np.arange(rank), *(self._columns(group, rank) for group in state.groups)]
+        columns = np.concatenate(own).astype(np.intp)
+        out = np.empty((len(grams), len(self._judged)))
+        for number in range(len(grams)):
+            gram = grams[number][np.ix_(columns, columns)]
+            values = np.zeros(grams.shape[1])
+            if len(columns):
+                values[columns] = cho_solve(cho_factor(gram, lower=True), products[number][columns])
+            for joint, parts in enumerate(self._judged):
+                used, judged = parts[number]
+                full = np.append(-values[used], 1.0)
+                out[number, joint] = full @ judged @ full
+        return out
+
+    def _columns(self, group: int, rank: int) -> NDArray[np.intp]:
+        return self.model.solver.groups[group].columns - len(self.model.design.base) + rank
+
+    @cached_property
+    def power(self) -> Array:
+        """Squared length of the torque as recorded, (joints,)."""
+        observed = self.model.design.observed
+        rows = np.concatenate([np.arange(each.start, each.stop) for each in observed.of_role("identify")])
+        torque = np.concatenate([each.run.torque[each.filter.rows] for each in observed.signals])
+        return np.asarray(np.sum(torque[rows] ** 2, axis=0))
+
+    def held_out(self, state: State) -> float:
+        """||tau - tau_hat|| / ||tau|| over all joints on the folds held out in turn."""
+        return float(np.sqrt(np.sum(self.errors(state)) / np.sum(self.power)))
+
+    def _scores(self, state: State) -> Array:
+        """Sum of the logarithms of the joints' errors on each fold, (folds,): a small joint counts as a large one."""
+        return np.asarray(0.5 * np.sum(np.log(np.maximum(self.errors(state), 1e-300)), axis=1))
+
+    def improve(self, tuning: PredictionTuning) -> State:
+        """The best of the changes, one after the other, until none lowers the errors enough, and surely enough."""
+        state, scores = self.begin, self._scores(self.begin)
+        search = Search(self.model.solver, self.model.design.settings, True, 0)
+        absurd = {group for group in state.groups if search.objection(state, group) is not None}
+        for _ in range(tuning.max_changes):
+            changes = [(scores - self._scores(other), other) for other in self._changes(search, state)]
+            worth = [each for each in changes if _is_sure(each[0], tuning)]
+            worth.sort(key=lambda each: -float(np.mean(each[0])))
+            better = next((each for each in worth if self._is_physical(search, each[1], absurd)), None)
+            if better is None:
+                break
+            scores, state = scores - better[0], better[1]
+        return state
+
+    @staticmethod
+    def _is_physical(search: Search, state: State, absurd: Container[int]) -> bool:
+        """Whether no group breaks a law of physics; absurd: those that did so before."""
+        return all(search.objection(state, group) is None for group in state.groups if group not in absurd)
+
+    def _changes(self, search: Search, state: State) -> Iterator[State]:
+        for group in range(len(self.model.solver.groups)):
+            if group in state.groups:
+                if group not in self.names:
+                    yield state.minus(group)
+            elif not search.excluded(state, group):
+                other = search.in_place(state, group)
+                if set(self.names) <= set(other.groups):
+                    yield other
+
+
+def _is_sure(gains: Array, tuning: PredictionTuning) -> bool:
+    """Whether gains (folds,) are large, and larger than their scatter between folds would make them."""
+    error = float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
+    return bool(np.mean(gains) > max(tuning.min_gain, tuning.min_standard_errors * error))
+
+
+def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None) -> FittedModel:
+    moments, solver = design.solver(noise)
+    return FittedModel(design, noise, moments, solver, State((), widths))
+
+
+def _with_usual(model: FittedModel, names: tuple[int, ...]) -> State:
+    """Named effects, and the usual ones that none of them replaces and that physics allows."""
+    search = Search(model.solver, model.design.settings, True, 0)
+    state = State(names, model.state.widths)
+    for number, group in enumerate(model.solver.groups):
+        if group.candidate.facts.usual and number not in names and not search.excluded(state, number):
+            state = state.plus(number)
+    for number in set(state.groups) - set(names):
+        if search.objection(state, number) is not None:
+            state = state.minus(number)
+    return state
+
+
+def _targets(rows: WhitenedRows, values: Array) -> WhitenedRows:
+    """The rows with the torque in the place of the errors of a fit."""
+    targets = tuple(error + design @ values for error, design in zip(rows.errors, rows.designs, strict=True))
+    return replace(rows, errors=targets)
+
+
+def identification_runs(observed: Observed) -> list[Run]:
+    """The stretches of the runs that identify, even in time, as runs."""
+    out, start = [], 0
+    for index, each in enumerate(observed.signals):
+        kept = np.arange(each.run.samples)[each.filter.rows]
+        for part in observed.of_role("identify"):
+            if part.run == index:
+                first, last = kept[part.start - start], kept[part.stop - start - 1]
+                out.append(each.run.rows(slice(int(first), int(last) + 1)))
+        start += len(each.torque)
+    return out
+
+
+def choose_smoothing(model: TorqueModel, observed: Observed, tuning: PredictionTuning) -> TorqueModel:
+    """The model with the cut-off of positions that predicts the torque of the identification runs best, as recorded."""
+    if model.cutoff_hz is None:
+        return model
+    suggested = max(suggested_cutoff(run) for run in identification_runs(observed))
+    factors = [share * suggested / model.cutoff_hz for share in tuning.smoothing_shares]
+    rows = rows_in(observed.of_role("identify"), observed.rows)
+    tried = [replace(model, position_factor=factor) for factor in factors]
+    return min(tried, key=lambda each: float(np.sum(recorded_residual(each, observed)[rows] ** 2)))
+
+
+def filtered_residual(model: TorqueModel, observed: Observed) -> Array:
+    """Measured torque less that of a model through the same filter, (rows, joints), N m (N)."""
+    parts = [each.torque - each.filter(model.predict(each.run)) for each in observed.signals]
+    return np.concatenate(parts)
+
+
+def recorded_residual(model: TorqueModel, observed: Observed) -> Array:
+    """Torque as recorded less that of a model at the kept rows, (rows, joints), N m (N)."""
+    parts = [(each.run.torque - model.predict(each.run))[each.filter.rows] for each in observed.signals]
+    return np.concatenate(parts)
