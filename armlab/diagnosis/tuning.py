@@ -259,7 +259,10 @@ class PredictionTuning:
     )
     least_change: float = tuned(0.8, unit="of the present cut-off", meaning="higher cut-offs are not tried", most=1.0)
     min_cutoff_gain: float = tuned(
-        0.02, unit="of the held-out error", meaning="a lower cut-off has to lower the error by more", most=1.0
+        0.02,
+        unit="of the held-out error",
+        meaning="another cut-off or weighting of the joints has to lower the error by more",
+        most=1.0,
     )
     min_gain: float = tuned(
         0.01,
@@ -271,7 +274,7 @@ class PredictionTuning:
         2.0,
         unit="standard errors between blocks",
         meaning="a part that is present has to lower the errors by more",
-        source="the best of many parts is taken; one is the rule of Breiman et al. 1984 for a single choice",
+        source="the best of many parts is taken; one is the rule of Breiman and others 1984 for a single choice",
     )
     smoothing_shares: tuple[float, ...] = tuned(
         (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8),
