@@ -59,13 +59,24 @@ def fit_prediction(named: FittedModel) -> Prediction:
     best = _Trial.of(_smaller_design(named, numbers), start, named.state, named.noise)
     error = best.held_out(best.begin)
     for cutoff in _lower_cutoffs(named, tuning):
-        trial = _Trial.of(_design_at(named, candidates, cutoff), start, named.state, None)
-        best, error = _better(best, error, trial, tuning)
+        design = _design_at(named, candidates, cutoff)
+        if _has_rows(design.observed, tuning):
+            best, error = _better(best, error, _Trial.of(design, start, named.state, None), tuning)
     best, error = _better(best, error, best.with_noise(_alike(best.model.noise)), tuning)
     state = best.improve(tuning)
     model = replace(best.model, state=state)
     places = {group: place for place, group in enumerate(own) if place in state.groups}
     return Prediction(model, places, best.held_out(state))
+
+
+def _has_rows(observed: Observed, tuning: PredictionTuning) -> bool:
+    """Whether rows in motion are left on every joint for each block that is held out, and some that validate."""
+    return all(
+        sum(part.stop - part.start for part in observed.of_role("identify", joint))
+        >= tuning.folds * observed.min_segment_rows
+        and observed.of_role("validate", joint)
+        for joint in range(observed.joints)
+    )
 
 
 def _better(best: "_Trial", error: float, other: "_Trial", tuning: PredictionTuning) -> tuple["_Trial", float]:
