@@ -168,7 +168,7 @@ def test_a_blank_folder_of_local_copies_is_read_as_unset(
     copy.touch()  # in the current folder, which a blank name would mean
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(LOCAL_COPIES_VARIABLE, blank)
-    monkeypatch.setattr("armlab.recordings.public._download", lambda recording, file: Path("downloaded"))
+    monkeypatch.setattr("armlab.recordings.public._download", lambda recording, address, file: Path("downloaded"))
     assert local_copies() is None
     assert find_raw_file(recording, recording.files[0]) == Path("downloaded")
 
