@@ -12,11 +12,11 @@ CODE_FOLDERS = ("problem", "armlab/common", "armlab/recordings", "armlab/effects
 CODE_SUFFIXES = (".py", ".c", ".yaml")  # robots are YAML
 
 
-def code_digest(own: Path) -> str:
-    """SHA-256 of everything that an outcome follows from but data. own: the folder of the study itself."""
+def code_digest(*own: Path) -> str:
+    """SHA-256 of everything that an outcome follows from but data. own: the files of the study itself."""
     below = [path for folder in CODE_FOLDERS for path in (REPOSITORY / folder).rglob("*")]
     sources = [path for path in below if path.suffix in CODE_SUFFIXES]
-    sources += [*Path(__file__).parent.glob("*.py"), *own.glob("*.py")]
+    sources += [*Path(__file__).parent.glob("*.py"), *own]
     code = hashlib.sha256()
     for path in sorted(set(sources)):
         code.update(path.read_bytes())

@@ -206,7 +206,7 @@ def leave_arms_out(
         raise InputError(f"--leave-one-out needs at least two of {', '.join(ARMS)}")
     study = LeaveOneOut(
         {name: open_public_recording(name, recordings) for name in names},
-        Diagnoses(recordings / OUTCOMES_FOLDER, code_digest(Path(__file__).parent)),
+        Diagnoses(recordings / OUTCOMES_FOLDER, code_digest(Path(__file__), Path(__file__).with_name("judged_run.py"))),
         Looks(results / LOOKS_FILE),
         TRIED_VALUES,
     )

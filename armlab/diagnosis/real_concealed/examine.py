@@ -204,4 +204,4 @@ class OutcomeStore:
 
 def open_outcomes(folder: Path) -> OutcomeStore:
     """Outcomes of the code as it stands."""
-    return OutcomeStore(folder, code_digest(Path(__file__).parent))
+    return OutcomeStore(folder, code_digest(*Path(__file__).parent.glob("*.py")))
