@@ -4,7 +4,7 @@ BIN := .venv/bin
 COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real test lint structure speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real real-leave-one-out test lint structure speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -53,8 +53,11 @@ study: .venv/run ## the comparison where the paper stops: results/study/
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
 	$(BIN)/armlab best-known
 
-real: .venv/dev ## identify and diagnose the public recordings of real arms: results/real/
+real: .venv/dev ## identify and diagnose the public recordings of real arms: results/real/arms.md
 	$(BIN)/armlab real
+
+real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
+	$(BIN)/armlab real --leave-one-out
 
 prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
 	$(BIN)/armlab prove

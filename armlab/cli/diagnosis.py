@@ -2,11 +2,8 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import click
-
-from armlab.cli.identification import real as identify_real
 
 _FILE = click.Path(path_type=Path)
 
@@ -133,23 +130,37 @@ def export_model(model: Path, out: Path) -> None:
         click.echo(line)
 
 
-def _identify_and_diagnose(results: Path, recordings: Path, only: tuple[str, ...], **others: Any) -> None:
-    from armlab.diagnosis.real_arms import diagnose_public_recordings
+@click.command()
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--only", multiple=True, help="Name of a public recording [default: all].")
+@click.option(
+    "--peers", type=click.Path(path_type=Path), help="Python that has figaroh and mujoco[sysid]: adds peers.md."
+)
+@click.option(
+    "--leave-one-out", is_flag=True, help="Choose settings of the diagnosis on all arms but one, and judge them on it."
+)
+def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None, leave_one_out: bool) -> None:
+    """Identify and diagnose public recordings of real arms.
 
-    assert identify_real.callback is not None
-    identify_real.callback(results=results, recordings=recordings, only=only, **others)
+    Writes arms.md, arms.csv and arms.svg; with --leave-one-out leave_one_out.md and .csv instead, and an interrupted
+    command continues.
+    """
+    from armlab.common.errors import InputError
+    from armlab.diagnosis.real_arms.bench import bench_real_arms
+    from armlab.diagnosis.real_arms.leave_one_out import leave_arms_out
+
+    if leave_one_out and peers is not None:
+        raise InputError("--peers has no part in --leave-one-out: give one of them")
     with ProgressLine() as progress:
-        for line in diagnose_public_recordings(results, recordings, only, progress.tell):
+        lines = (
+            leave_arms_out(results, recordings, only, progress.tell)
+            if leave_one_out
+            else bench_real_arms(results, recordings, only, peers, progress.tell)
+        )
+        for line in lines:
             progress.clear()
             click.echo(line)
-
-
-real = click.Command(
-    "real",
-    params=identify_real.params,
-    callback=_identify_and_diagnose,
-    help="Identify and diagnose public recordings of real arms.\n\nWrites tables and pages into results/real.",
-)
 
 
 @click.command("real-concealed")

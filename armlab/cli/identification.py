@@ -1,4 +1,4 @@
-"""The commands `identify`, `predict`, `real`, `coverage`, `payload` and `gains`: options only, no logic."""
+"""The commands `identify`, `predict`, `coverage`, `payload` and `gains`: options only, no logic."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -48,21 +48,6 @@ def predict(model: Path, recording: Path, out: Path | None) -> None:
     from armlab.identification.identify import predict_recording
 
     for line in predict_recording(model, recording, out):
-        click.echo(line)
-
-
-@click.command()
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
-@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
-@click.option("--only", multiple=True, help="Name of a public recording [default: all].")
-@click.option(
-    "--peers", type=click.Path(path_type=Path), help="Python that has figaroh and mujoco[sysid]: adds peers.md."
-)
-def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None) -> None:
-    """Identify the public recordings of real arms: identification.csv and a page with pictures."""
-    from armlab.identification.real.report import identify_public
-
-    for line in identify_public(results, recordings, only, peers):
         click.echo(line)
 
 

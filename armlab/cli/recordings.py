@@ -9,7 +9,17 @@ import click
 
 from armlab.common.errors import InputError
 
-PUBLIC_RECORDING_NAMES = ("kuka-kr300", "emps", "staubli-tx40", "unisa-ur10", "unisa-panda")
+PUBLIC_RECORDING_NAMES = (
+    "kuka-kr300",
+    "emps",
+    "staubli-tx40",
+    "unisa-ur10",
+    "unisa-panda",
+    "friction-damper-20-lb",
+    "friction-damper-25-lb",
+    "friction-damper-35-lb",
+    "friction-damper-80-lb",
+)
 ASKED_SIGNALS = ("time", "position", "torque")
 OPTIONAL_SIGNALS = (
     "velocity",

@@ -15,7 +15,8 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros import read_bag
-from armlab.recordings.recording import Role
+from armlab.recordings.load import load_recording
+from armlab.recordings.recording import Recording, Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 
 GITHUB = "https://raw.githubusercontent.com"
@@ -23,14 +24,18 @@ KUKA = f"{GITHUB}/JonasWeigand/Robot_Identification/454c8e6d4f6f9a9ec0b2fcb10b4c
 EMPS = f"{GITHUB}/forgi86/sysid-neural-continuous/93afc131780fb1d5477472935a18ac8405683890/examples/EMPS/data"
 STAUBLI = f"{GITHUB}/thanhndv212/figaroh-plus/53d6517a3dcbf383bff864b54132b9ce25f7f3e7/examples/staubli_TX40/data"
 UNISA = f"{GITHUB}/unisa-acg/inverse-dynamics-solver/e67a57eceefa7db7959eba076b6afbce12fa2cd6"
+FRICTION_DAMPER = "ARTS-Laboratory/Dataset-Friction-Damper-with-Backlash @ 0e09aa9, data/dataset-1"
 
 
 @dataclass(frozen=True)
 class RemoteFile:
-    """One public file: the name of its local copy, where it is, and the SHA-256 of its content."""
+    """One public file: the name of its local copy, where it is, and the SHA-256 of its content.
+
+    address: None for a file that its source holds in another form, so that it cannot be downloaded.
+    """
 
     name: str
-    address: str
+    address: str | None
     sha256: str
 
 
@@ -42,6 +47,17 @@ class PublicRecording:
     source: str
     licence: str
     files: tuple[RemoteFile, ...]
+
+
+def _friction_damper(tension: str, identify_sha256: str, validate_sha256: str) -> PublicRecording:
+    """The damper at one band tension: its source has JSON, these are converted files (see docs/recordings.md)."""
+    files = (RemoteFile("run-1-hz.csv", None, identify_sha256), RemoteFile("run-0p5-hz.csv", None, validate_sha256))
+    return PublicRecording(
+        f"friction-damper/tension-{tension}",
+        FRICTION_DAMPER,
+        "CC-BY-SA-4.0 (share alike: so is what is made of it)",
+        files,
+    )
 
 
 PUBLIC_RECORDINGS = {
@@ -124,6 +140,26 @@ PUBLIC_RECORDINGS = {
                 "6794c9dc89628d775bd77bfaee3ed73e0a7d7716401886e17e06d81ea3b7f299",
             ),
         ),
+    ),
+    "friction-damper-20-lb": _friction_damper(
+        "20-lb",
+        "b1910aa6762e335931fea5034a114375233b8a306f930ae84d4a73a54bbbed5d",
+        "55b5aa5063b0d61be1d6943adc82c69d796d10c9af25c24fc904aba4a3607879",
+    ),
+    "friction-damper-25-lb": _friction_damper(
+        "25-lb",
+        "8f5e5c7e8773fafe851514e0996f7591d5f1faebee5a9587d88df2ced0266cff",
+        "2fc3bcefbd979d1c820b090cdd51c626902bc0131a6e1c86526e58f1c6fb5025",
+    ),
+    "friction-damper-35-lb": _friction_damper(
+        "35-lb",
+        "ab71ce448777fc0e2cd0bffce2af5399ea1e2b89788878a0192d2f9632d92e34",
+        "6e1cf264ebf058a2b2cd78e673adefdf3bd2898cc76210b029e62d6ce5afd4bf",
+    ),
+    "friction-damper-80-lb": _friction_damper(
+        "80-lb",
+        "791c68774f082d618125dbc69823982ba563b8b09ee025bb10edccdcab03bcd9",
+        "efeeb5fd20df5ebe110edc06ecc951b7d974f53f93fddfc500e5d859964ec4b3",
     ),
 }
 
@@ -217,6 +253,18 @@ def convert_unisa(name: str, path: Path) -> Draft:
     return Draft(name, columns, units, _split_run(table.names, table.values), others, _source_comment(name))
 
 
+def convert_friction_damper(name: str, identify: Path, validate: Path) -> Draft:
+    """Friction damper: position and velocity of its rod, and the force that drives it; the bands' forces stay out."""
+    columns: Keys = {"time": "t", "position": ("x",), "velocity": ("v",), "torque": ("F",)}
+    units: Keys = {"time": "s", "position": "m", "velocity": "m/s", "torque": "N"}
+    names = _column_names(columns)
+    files: tuple[tuple[Path, Role], ...] = ((identify, "identify"), (validate, "validate"))
+    runs = tuple(
+        DraftRun(path.name, role, names, pd.read_csv(path)[list(names)].to_numpy(float)) for path, role in files
+    )
+    return Draft("friction-damper", columns, units, runs, {"sample_rate_hz": 512.0}, _source_comment(name))
+
+
 def _split_run(names: tuple[str, ...], values: Array) -> tuple[DraftRun, DraftRun]:
     """The first part of a single run to identify, the rest to validate."""
     cut = round(IDENTIFY_SHARE * len(values))
@@ -244,6 +292,11 @@ CONVERTERS: dict[str, Callable[..., Draft]] = {
     "staubli-tx40": convert_staubli_tx40,
     "unisa-ur10": partial(convert_unisa, "unisa-ur10"),
     "unisa-panda": partial(convert_unisa, "unisa-panda"),
+    **{
+        name: partial(convert_friction_damper, name)
+        for name in PUBLIC_RECORDINGS
+        if name.startswith("friction-damper-")
+    },
 }
 
 
@@ -269,12 +322,38 @@ def fetch_recording(name: str, folder: Path) -> Path:
     return write_recording(CONVERTERS[name](*files), folder)
 
 
+def open_public_recording(name: str, folder: Path) -> Recording:
+    """The public recording in `folder` / `name`, fetched into it if there is no such folder yet."""
+    place = folder / name
+    return load_recording(place if place.is_dir() else fetch_recording(name, place))
+
+
 def find_raw_file(recording: PublicRecording, file: RemoteFile) -> Path:
-    """Path of one raw file whose content is as registered; from the local copies, else downloaded."""
+    """Path of one raw file whose content is as registered; from the local copies, else downloaded.
+
+    What cannot be downloaded is looked for in the local copies, then in the cache.
+    """
+    if file.address is None:
+        return _check_content(_find_converted_file(recording, file), file)
     folder = local_copies()
     if folder is None:
-        return _download(recording, file)
-    path = folder / recording.folder / file.name
+        return _download(recording, file.address, file)
+    return _check_content(folder / recording.folder / file.name, file)
+
+
+def _find_converted_file(recording: PublicRecording, file: RemoteFile) -> Path:
+    folders = [folder / recording.folder for folder in (local_copies(), cache_folder()) if folder is not None]
+    found = [folder / file.name for folder in folders if (folder / file.name).is_file()]
+    if found:
+        return found[0]
+    place = str(folders[0]) if folders else f"a folder {recording.folder} below one that {LOCAL_COPIES_VARIABLE} names"
+    raise InputError(
+        f"no {file.name} in {place}: it cannot be downloaded, convert it from {recording.source} (docs/recordings.md "
+        "says how) and put it there"
+    )
+
+
+def _check_content(path: Path, file: RemoteFile) -> Path:
     try:
         found = hashlib.sha256(path.read_bytes()).hexdigest()
     except OSError as error:
@@ -286,8 +365,14 @@ def find_raw_file(recording: PublicRecording, file: RemoteFile) -> Path:
 
 def is_available(recording: PublicRecording) -> bool:
     """True if all raw files are on this machine: in the folder that ARMLAB_RECORDINGS names, else in the cache."""
-    folder = local_copies() or cache_folder()
-    return folder is not None and all((folder / recording.folder / file.name).is_file() for file in recording.files)
+    folders = [folder for folder in (local_copies(), cache_folder()) if folder is not None]
+    return bool(folders) and all(
+        any(
+            (folder / recording.folder / file.name).is_file()
+            for folder in (folders if not file.address else folders[:1])
+        )
+        for file in recording.files
+    )
 
 
 def cache_folder() -> Path | None:
@@ -299,7 +384,7 @@ def cache_folder() -> Path | None:
     return Path(pooch.os_cache("armlab"))
 
 
-def _download(recording: PublicRecording, file: RemoteFile) -> Path:
+def _download(recording: PublicRecording, address: str, file: RemoteFile) -> Path:
     cache = cache_folder()
     if cache is None:
         raise InputError("to download recordings install pooch: pip install 'armlab[recordings]'")
@@ -307,9 +392,7 @@ def _download(recording: PublicRecording, file: RemoteFile) -> Path:
 
     try:
         folder = cache / recording.folder
-        return Path(pooch.retrieve(file.address, f"sha256:{file.sha256}", file.name, folder))
+        return Path(pooch.retrieve(address, f"sha256:{file.sha256}", file.name, folder))
     except (OSError, ValueError) as error:  # no connection; another content than registered
         reason = " ".join(str(error).split())[:200]
-        raise InputError(
-            f"cannot fetch {file.address}: {reason}; or set {LOCAL_COPIES_VARIABLE} to a local copy"
-        ) from None
+        raise InputError(f"cannot fetch {address}: {reason}; or set {LOCAL_COPIES_VARIABLE} to a local copy") from None

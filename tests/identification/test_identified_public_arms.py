@@ -1,18 +1,16 @@
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from numpy.testing import assert_allclose
 from public_copies import needs_copies
 
 from armlab.identification.components import usual_components, wrist_couplings
 from armlab.identification.model import Model
 from armlab.identification.real.published import Comparison, sum_weights
-from armlab.identification.real.report import LOOKS_FILE, identify_public
-from armlab.identification.real.study import RECIPES
+from armlab.identification.real.study import RECIPES, recipe_named, study_recording
 from armlab.identification.structure import Structure
-from armlab.recordings.public import PUBLIC_RECORDINGS
+from armlab.identification.validation import run_error
+from armlab.recordings.public import PUBLIC_RECORDINGS, open_public_recording
 from problem.robot_file import load_arm
 
 
@@ -64,14 +62,14 @@ def test_every_public_recording_has_a_recipe() -> None:
 
 
 @needs_copies("emps")
-def test_real_writes_the_table_and_logs_each_look_at_validation_data(tmp_path: Path) -> None:
-    lines = list(identify_public(tmp_path / "results", tmp_path / "recordings", ["emps"]))
-    assert "pulses.csv" in lines[2]
-    table = pd.read_csv(tmp_path / "results" / "identification.csv")
-    assert list(table.columns) == ["recording", "model", "run", "relative_error_percent"]
-    errors = table.set_index(["model", "run"])["relative_error_percent"]
-    assert errors["chosen", "pulses.csv"] < errors["friction", "pulses.csv"] < errors["rigid", "pulses.csv"]
-    looks = (tmp_path / "results" / LOOKS_FILE).read_text().splitlines()
-    assert len(looks) == 3
-    assert all("pulses.csv" in look for look in looks)
-    assert_allclose(errors["rigid", "identify.csv"], 69.5, atol=1)
+def test_a_study_identifies_three_models_and_the_chosen_one_predicts_held_out_runs_best(tmp_path: Path) -> None:
+    recording = open_public_recording("emps", tmp_path)
+    study = study_recording(recipe_named("emps"), recording)
+    (validate,) = recording.with_role("validate")
+    errors = {
+        name: run_error(each.model_, each.model_.signals(validate)).relative_percent
+        for name, each in study.models.items()
+    }
+    assert errors["chosen"] < errors["friction"] < errors["rigid"]
+    assert errors["rigid"] == pytest.approx(69, abs=2)
+    assert study.seconds > 0

@@ -9,9 +9,11 @@ from public_copies import needs_copies
 from simulated_arm import run, structure, truth
 
 from armlab.identification.peers.exchange import PeerRun, read_runs, write_runs
-from armlab.identification.peers.side_by_side import PeerResult, write_peers
-from armlab.identification.real.report import identify_public
+from armlab.identification.peers.side_by_side import PeerResult, compare_peers, write_peers
+from armlab.identification.real.looks import Looks
+from armlab.identification.real.study import recipe_named, study_recording
 from armlab.identification.regression import signals_of
+from armlab.recordings.public import open_public_recording
 
 
 @pytest.fixture
@@ -52,7 +54,10 @@ def test_the_page_holds_a_row_for_each_package_and_why_one_has_no_figure(tmp_pat
 
 @needs_copies("emps")
 def test_an_interpreter_that_is_not_there_is_told_for_each_peer_and_ours_still_runs(tmp_path: Path) -> None:
-    *_, page = identify_public(tmp_path / "results", tmp_path / "recordings", ["emps"], Path("/no/python"))
-    text = Path(page).read_text()
+    study = study_recording(recipe_named("emps"), open_public_recording("emps", tmp_path / "recordings"))
+    looks = Looks(tmp_path / "looks.jsonl")
+    rows = list(compare_peers(study, Path("/no/python"), tmp_path / "peers", looks))
+    text = write_peers(rows, tmp_path).read_text()
     assert text.count("no interpreter /no/python") == 2
     assert "| emps | pulses.csv | armlab, chosen | " in text
+    assert looks.count("emps", "pulses.csv") == 4

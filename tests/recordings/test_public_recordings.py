@@ -33,17 +33,25 @@ from problem.regressor import observation_matrix
 from problem.robot_file import load_arm
 from problem.urdf import read_urdf
 
-NEEDS_COPIES = needs_copies()
 FIGURES = {  # percent of the torque, all joints: first run / the last one, rigid and with friction, rounded up
     "emps": ((71, 70), (4.5, 7.0)),
     "staubli-tx40": ((79, 82), (10.5, 18.0)),
     "unisa-ur10": ((43, 70), (6.0, 10.0)),
     "unisa-panda": ((4.5, 5.5), (3.0, 4.0)),
     "kuka-kr300": ((45, 65), (12.0, 47.0)),
+    "friction-damper-20-lb": ((99, 99), (55.0, 66.0)),
+    "friction-damper-25-lb": ((99, 99), (55.0, 69.0)),
+    "friction-damper-35-lb": ((99, 99), (55.0, 69.0)),
+    "friction-damper-80-lb": ((99, 99), (55.0, 69.0)),
 }
 
 
-@pytest.fixture(params=PUBLIC_RECORDING_NAMES)
+def robot_of(name: str) -> str:
+    """The built-in robot of a public recording: its own, but one for all tensions of the damper."""
+    return "friction-damper" if name.startswith("friction-damper") else name
+
+
+@pytest.fixture(params=[pytest.param(name, marks=needs_copies(name)) for name in PUBLIC_RECORDING_NAMES])
 def recording(request: pytest.FixtureRequest, tmp_path: Path) -> Recording:
     return load_recording(fetch_recording(request.param, tmp_path / request.param))
 
@@ -69,28 +77,25 @@ def percent(recording: Recording, friction: bool) -> list[float]:
     return [errors[0], errors[-1]]
 
 
-@NEEDS_COPIES
 def test_the_equations_of_motion_explain_the_converted_torques(recording: Recording) -> None:
     """A wrong gear, sign, unit or D-H row doubles these errors."""
-    for limits, friction in zip(FIGURES[recording.arm.name], (False, True), strict=True):
+    for limits, friction in zip(FIGURES[recording.name], (False, True), strict=True):
         for error, limit in zip(percent(recording, friction), limits, strict=True):
             assert error < limit
 
 
-@NEEDS_COPIES
 def test_runs_that_validate_take_no_part_in_identification(recording: Recording) -> None:
     identify, validate = recording.with_role("identify"), recording.with_role("validate")
     assert len(identify) == 1
     assert len(validate) == len(recording.runs) - 1 >= 1
-    assert recording.robot == recording.arm.name
+    assert recording.robot == recording.arm.name == robot_of(recording.name)
 
 
-@NEEDS_COPIES
 def test_fetched_recordings_follow_the_schema(recording: Recording) -> None:
     check_against_schema(yaml.safe_load((recording.folder / FILE_NAME).read_text()), "recording")
 
 
-@NEEDS_COPIES
+@needs_copies("staubli-tx40")
 def test_axes_5_and_6_of_the_tx40_are_coupled_as_published(tmp_path: Path) -> None:
     transmission = load_recording(fetch_recording("staubli-tx40", tmp_path / "new")).transmission
     gears = np.diag([32.0, 32, 45, -48, 45, 32])
@@ -137,7 +142,7 @@ def test_raw_files_in_the_download_cache_are_at_hand_too(
     assert is_available(PUBLIC_RECORDINGS[name])
 
 
-@NEEDS_COPIES
+@needs_copies("emps")
 def test_a_raw_file_with_another_content_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path))
     (tmp_path / "emps").mkdir()
@@ -163,7 +168,7 @@ def test_a_blank_folder_of_local_copies_is_read_as_unset(
     copy.touch()  # in the current folder, which a blank name would mean
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv(LOCAL_COPIES_VARIABLE, blank)
-    monkeypatch.setattr("armlab.recordings.public._download", lambda recording, file: Path("downloaded"))
+    monkeypatch.setattr("armlab.recordings.public._download", lambda recording, address, file: Path("downloaded"))
     assert local_copies() is None
     assert find_raw_file(recording, recording.files[0]) == Path("downloaded")
 
@@ -196,9 +201,45 @@ def test_a_download_is_checked_against_the_registered_hash(tmp_path: Path, monke
     assert asked == [(file.address, f"sha256:{file.sha256}")]
 
 
+def test_converted_files_that_are_missing_are_asked_for_with_folder_and_source(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pooch = pytest.importorskip("pooch")
+    monkeypatch.setattr(pooch, "os_cache", lambda _: str(tmp_path / "cache"))
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path / "copies"))
+    message = refusal(fetch_recording, "friction-damper-20-lb", tmp_path / "new")
+    assert f"no run-1-hz.csv in {tmp_path / 'copies' / 'friction-damper' / 'tension-20-lb'}" in message
+    assert "ARTS-Laboratory/Dataset-Friction-Damper-with-Backlash" in message
+    assert not (tmp_path / "new").exists()
+
+
+def test_converted_files_in_the_cache_are_taken_where_the_local_copies_have_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pooch = pytest.importorskip("pooch")
+    monkeypatch.setattr(pooch, "os_cache", lambda _: str(tmp_path / "cache"))
+    monkeypatch.setenv(LOCAL_COPIES_VARIABLE, str(tmp_path / "copies"))
+    recording = PUBLIC_RECORDINGS["friction-damper-20-lb"]
+    copy = tmp_path / "cache" / recording.folder / recording.files[0].name
+    copy.parent.mkdir(parents=True)
+    copy.write_bytes(b"something else")
+    assert f"{copy} is not the registered file" in refusal(find_raw_file, recording, recording.files[0])
+
+
+@needs_copies("friction-damper-20-lb")
+def test_the_damper_is_read_in_si_units_and_says_that_its_licence_is_share_alike(tmp_path: Path) -> None:
+    recording = load_recording(fetch_recording("friction-damper-20-lb", tmp_path / "new"))
+    identify, validate = recording.runs
+    assert (identify.rate_hz, validate.rate_hz) == (512.0, 512.0)
+    assert 0.025 < np.abs(identify.position).max() < 0.03  # m
+    assert 4e3 < np.abs(identify.torque).max() < 12e3  # N
+    assert "CC-BY-SA-4.0" in (recording.folder / FILE_NAME).read_text()
+
+
 def test_every_public_recording_has_a_built_in_robot_and_a_command() -> None:
     assert tuple(PUBLIC_RECORDINGS) == PUBLIC_RECORDING_NAMES
-    assert [load_arm(name).name for name in PUBLIC_RECORDINGS] == list(PUBLIC_RECORDINGS)
+    for name in PUBLIC_RECORDINGS:
+        assert load_arm(robot_of(name)).name == robot_of(name)
 
 
 def test_an_unknown_public_recording_names_the_nearest(tmp_path: Path) -> None:

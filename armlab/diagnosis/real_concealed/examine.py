@@ -27,6 +27,7 @@ from armlab.diagnosis.real_concealed.conceal import (
 )
 from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.stored import code_digest, recording_digest
 from armlab.effects.contract import UNKNOWN
 from armlab.identification.model_file import write_model
 from armlab.identification.torque_model import TorqueModel
@@ -173,8 +174,6 @@ def _rms(values: Array) -> tuple[float, ...]:
     return tuple(np.sqrt(np.mean(values**2, axis=0)).tolist())
 
 
-REPOSITORY = Path(__file__).resolve().parents[3]
-CODE_FOLDERS = ("problem", "armlab/common", "armlab/recordings", "armlab/effects", "armlab/identification")
 OUTCOME_ADAPTER = TypeAdapter(Outcome)
 
 
@@ -187,11 +186,7 @@ class OutcomeStore:
 
     def place(self, case: Case, recording: Recording) -> Path:
         """The file of an outcome."""
-        key = hashlib.sha256(f"{self.code} {case!r}".encode())
-        for run in recording.runs:
-            key.update(f"{run.name} {run.role}".encode())
-            for signal in (run.time, run.position, run.torque):
-                key.update(np.ascontiguousarray(signal).tobytes())
+        key = hashlib.sha256(f"{self.code} {case!r} {recording_digest(recording)}".encode())
         return self.folder / f"{case.recording}-{key.hexdigest()[:20]}.json"
 
     def read(self, case: Case, recording: Recording) -> Outcome | None:
@@ -209,10 +204,4 @@ class OutcomeStore:
 
 def open_outcomes(folder: Path) -> OutcomeStore:
     """Outcomes of the code as it stands."""
-    own = Path(__file__).parent
-    sources = [path for folder in CODE_FOLDERS for path in (REPOSITORY / folder).rglob("*.py")]
-    sources += [*own.parent.glob("*.py"), *own.glob("*.py")]
-    code = hashlib.sha256()
-    for path in sorted(sources):
-        code.update(path.read_bytes())
-    return OutcomeStore(folder, code.hexdigest())
+    return OutcomeStore(folder, code_digest(*Path(__file__).parent.glob("*.py")))

@@ -20,8 +20,7 @@ from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
 from armlab.diagnosis.report.words import effect_in_words, format_number, format_unit, place_in_words
 from armlab.effects.contract import UNKNOWN
-from armlab.identification.real.looks import Looks
-from armlab.identification.real.report import LOOKS_FILE
+from armlab.identification.real.looks import LOOKS_FILE, Looks
 
 ANSWER_WORDS = {
     "named": "named at its place",

@@ -11,9 +11,8 @@ from armlab.diagnosis.real_concealed.examine import Outcome, OutcomeStore, exami
 from armlab.diagnosis.real_concealed.judge import CaseVerdict, judge_case
 from armlab.diagnosis.real_concealed.plan import Case, cases_of
 from armlab.identification.real.looks import Looks
-from armlab.identification.real.study import RECIPES
-from armlab.recordings.load import load_recording
-from armlab.recordings.public import fetch_recording
+from armlab.identification.real.study import recipe_named
+from armlab.recordings.public import open_public_recording
 
 Progress = Callable[[str], None]
 
@@ -36,11 +35,9 @@ def study_recording(
     name: str, recordings: Path, stored: OutcomeStore, looks: Looks, progress: Progress
 ) -> ConcealedStudy:
     """Conceals, diagnoses and judges. recordings: where the recording is, or will be fetched to."""
-    place = recordings / name
     progress(f"{name}: the reference model")
-    recording = load_recording(place if place.is_dir() else fetch_recording(name, place))
-    recipe = next(each for each in RECIPES if each.name == name)
-    return study_cases(identify_reference(recording, recipe), cases_of(name), stored, looks, progress)
+    recording = open_public_recording(name, recordings)
+    return study_cases(identify_reference(recording, recipe_named(name)), cases_of(name), stored, looks, progress)
 
 
 def study_cases(

@@ -47,17 +47,19 @@ class PeerResult:
 
 def compare_peers(study: Study, python: Path, folder: Path, looks: Looks) -> Iterator[PeerResult]:
     """This package and the peers on the runs of a recording, fitted on the run that identifies."""
-    model = study.models[-1].identifier.model_
+    model = study.chosen.model_
     signals = [model.signals(run) for run in study.recording.runs]
-    for each in study.models[1:]:
-        yield from _own_results(study, each.name, signals)
+    for name in ("friction", "chosen"):
+        yield from _own_results(study, name, signals, looks)
     _write_inputs(study.recording.arm, signals, folder)
     for package, (script, arm) in PEERS.items():
         yield from _peer_results(study, package, [str(python), script, arm], signals, folder, looks)
 
 
-def _own_results(study: Study, name: str, signals: list[Signals]) -> Iterator[PeerResult]:
-    known = next(model.identifier for model in study.models if model.name == name)
+def _own_results(study: Study, name: str, signals: list[Signals], looks: Looks) -> Iterator[PeerResult]:
+    known = study.models[name]
+    for run in study.recording.with_role("validate"):
+        looks.note(study.recipe.name, run.name, f"armlab, {name}")
     started = time.process_time()
     identifier = Identifier(
         known.arm,
@@ -117,7 +119,7 @@ def _peer_results(
     out = folder / f"{Path(script).stem}.npz"
     out.unlink(missing_ok=True)
     for run in study.recording.with_role("validate"):
-        looks.note(study.recording.arm.name, run.name, package)
+        looks.note(study.recipe.name, run.name, package)
     try:
         _run_script(
             [python, str(Path(__file__).parent / script), *(str(folder / name) for name in ("runs.npz", arm)), str(out)]

@@ -1,1 +1,1 @@
-"""The public recordings identified by one procedure, and judged on data that took no part."""
+"""The public recordings identified by one procedure: recipes, the choice inside the identification data, looks."""

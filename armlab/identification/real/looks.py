@@ -7,6 +7,8 @@ from pathlib import Path
 
 from armlab.common.errors import InputError
 
+LOOKS_FILE = "validation_looks.jsonl"
+
 
 @dataclass(frozen=True)
 class Looks:

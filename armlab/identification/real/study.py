@@ -1,15 +1,14 @@
-"""One public recording from raw file to errors: choose inside the identification data, fit, then look.
+"""One public recording identified: choose inside the identification data, then fit. Runs that validate stay unseen.
 
 A recipe is what is given to this procedure for each recording before it looks at any data.
 """
 
+import time
 from dataclasses import dataclass
-from pathlib import Path
 
 from armlab.effects.contract import Candidate
 from armlab.identification.identifier import Identifier
 from armlab.identification.priors import Pull
-from armlab.identification.real.looks import Looks
 from armlab.identification.selection import (
     NOMINAL_TOLERANCES,
     USUAL_GROUPS,
@@ -23,9 +22,6 @@ from armlab.identification.selection import (
     describe_choice,
     select_structure,
 )
-from armlab.identification.validation import RunError, run_error
-from armlab.recordings.load import load_recording
-from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
@@ -73,49 +69,56 @@ RECIPES = (
         payload=KUKA_FLANGE,
         counterbalanced=2,
     ),
+    Recipe("friction-damper-20-lb", {"run-0p5-hz.csv": 60}),
+    Recipe("friction-damper-25-lb", {"run-0p5-hz.csv": 63}),
+    Recipe("friction-damper-35-lb", {"run-0p5-hz.csv": 62}),
+    Recipe("friction-damper-80-lb", {"run-0p5-hz.csv": 66}),
 )
 
 
 @dataclass(frozen=True, eq=False)
-class JudgedModel:
-    """A model of a recording under its name, with its errors on every run."""
-
-    name: str
-    identifier: Identifier
-    errors: tuple[RunError, ...]
-
-
-@dataclass(frozen=True, eq=False)
 class Study:
-    """What is shown of one recording: the models, from the rigid arm to the chosen one."""
+    """What is identified of one recording.
+
+    models: `rigid`; `friction`, which is viscous and Coulomb friction, rotor inertia and offset at every joint; and
+    `chosen`. seconds: of the choice and its fit.
+    """
 
     recipe: Recipe
     recording: Recording
     selection: Selection
-    models: tuple[JudgedModel, ...]
+    models: dict[str, Identifier]
+    seconds: float
+
+    @property
+    def chosen(self) -> Identifier:
+        """The identification with everything that was chosen."""
+        return self.models["chosen"]
 
 
-def study_recording(recipe: Recipe, folder: Path, looks: Looks) -> Study:
-    """Identifies a recording that is fetched into `folder` (taken from there if it is there already)."""
-    place = folder / recipe.name
-    recording = load_recording(place if place.is_dir() else fetch_recording(recipe.name, place))
-    groups = recipe.groups(recording.arm)
+def recipe_named(name: str) -> Recipe:
+    """The recipe of a public recording."""
+    return next(each for each in RECIPES if each.name == name)
+
+
+def study_recording(recipe: Recipe, recording: Recording) -> Study:
+    """Identifies a recording from the runs that identify."""
     runs = recording.with_role("identify")
+    groups = recipe.groups(recording.arm)
+    started = time.perf_counter()
     selection = select_structure(recording.arm, runs, groups, recipe.pulls(recording.arm), recipe.starts)
     choice = selection.choice
-    chosen = components_of(groups, choice.groups)
-    method = _choose_method(recipe, recording, choice, chosen)
-    tasks: tuple[tuple[str, tuple[Candidate, ...], str, Pull], ...] = (
-        ("rigid", (), "ordinary", Pull()),
-        ("friction", components_of(groups, USUAL_GROUPS), "ordinary", Pull()),
-        ("chosen", chosen, method, choice.pull),
-    )
-    models = []
-    for name, components, by, pull in tasks:
-        filters = choice.cutoff_hz, recording.robot, choice.position_factor
-        identifier = Identifier(recording.arm, components, by, pull, *filters).fit(runs)
-        models.append(JudgedModel(name, identifier, _look_at_errors(identifier, recording, name, looks)))
-    return Study(recipe, recording, selection, tuple(models))
+    filters = choice.cutoff_hz, recording.robot, choice.position_factor
+    components = components_of(groups, choice.groups)
+    method = _choose_method(recipe, recording, choice, components)
+    chosen = Identifier(recording.arm, components, method, choice.pull, *filters).fit(runs)
+    seconds = time.perf_counter() - started
+    usual = components_of(groups, USUAL_GROUPS)
+    plain = {
+        name: Identifier(recording.arm, parts, "ordinary", Pull(), *filters).fit(runs)
+        for name, parts in (("rigid", ()), ("friction", usual))
+    }
+    return Study(recipe, recording, selection, {**plain, "chosen": chosen}, seconds)
 
 
 def _choose_method(recipe: Recipe, recording: Recording, choice: Choice, components: tuple[Candidate, ...]) -> str:
@@ -132,15 +135,8 @@ def _choose_method(recipe: Recipe, recording: Recording, choice: Choice, compone
     return min(errors, key=errors.__getitem__)
 
 
-def _look_at_errors(identifier: Identifier, recording: Recording, name: str, looks: Looks) -> tuple[RunError, ...]:
-    model = identifier.model_
-    for run in recording.with_role("validate"):
-        looks.note(recording.arm.name, run.name, name)
-    return tuple(run_error(model, model.signals(run)) for run in recording.runs)
-
-
 def describe_study(study: Study) -> str:
     """The choice in a line."""
     choice = study.selection.choice
-    method = study.models[-1].identifier.method
+    method = study.chosen.method
     return f"{study.recipe.name}: {describe_choice(choice)}; {method}; held-out error {100 * choice.held_out:.2f} %"
