@@ -24,6 +24,7 @@ from armlab.diagnosis.fitted_model import (
     search_effects,
 )
 from armlab.diagnosis.formats import Status
+from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
@@ -88,7 +89,7 @@ def prepare(
 def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """Tests what a search found, withdraws names that do not hold, and states the rest with numbers."""
     progress("testing claims")
-    named = name_effects(prune(searched))
+    named = name_effects(find_friction_curves(prune(searched)))
     model, tuning = named.model, named.model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
@@ -119,7 +120,9 @@ def name_effects(pruned: Pruned) -> NamedEffects:
         model, effects, links = withdraw(model, doubtful, "what is left at its joint is no less structured")
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left, tuning)
-    return NamedEffects(model, effects, {link: each for link, each in links.items() if link not in wrong}, left)
+    links = {link: each for link, each in links.items() if link not in wrong}
+    named, left = name_friction_curves((model, effects, links), left)
+    return NamedEffects(*named, left)
 
 
 def _assemble(
