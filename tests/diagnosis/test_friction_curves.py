@@ -51,6 +51,17 @@ def test_friction_that_steps_between_plateaus_is_a_curve_through_both(step_found
     np.testing.assert_allclose(torques[fast], 2.4, atol=0.25)
 
 
+def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_curve(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("armlab.diagnosis.diagnose.find_friction_curves", lambda pruned: pruned)
+    found = diagnose(cases.recording(with_friction(step), seconds=20.0))
+    (claim,) = (each for each in found.claims if each.joint == 2)
+    assert claim.effect == "friction_curve"
+    assert claim.evidence.rms_after < claim.evidence.rms_before / 3
+    assert "what is left at joint 2 is a friction curve" in {each.what for each in found.steps}
+
+
 def test_the_model_of_a_curve_predicts_the_same_after_a_round_trip(step_found: Diagnosis, tmp_path: Path) -> None:
     model = model_found(step_found)
     again = read_model(write_model(model, tmp_path / "model.yaml"))
