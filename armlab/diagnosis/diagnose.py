@@ -25,6 +25,7 @@ from armlab.diagnosis.fitted_model import (
 )
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.found_model import build_model
+from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.prediction import Prediction, choose_smoothing, filtered_residual, fit_prediction
@@ -90,7 +91,7 @@ def prepare(
 def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """Tests what a search found, withdraws names that do not hold, fits the model that predicts, and states numbers."""
     progress("testing claims")
-    named = name_effects(prune(searched))
+    named = name_effects(find_friction_curves(prune(searched)))
     model, tuning = named.model, named.model.design.settings.tuning
     progress("fitting the model that predicts")
     prediction = fit_prediction(model)
@@ -123,7 +124,9 @@ def name_effects(pruned: Pruned) -> NamedEffects:
         model, effects, links = withdraw(model, doubtful, "what is left at its joint is no less structured")
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left, tuning)
-    return NamedEffects(model, effects, {link: each for link, each in links.items() if link not in wrong}, left)
+    links = {link: each for link, each in links.items() if link not in wrong}
+    named, left = name_friction_curves((model, effects, links), left)
+    return NamedEffects(*named, left)
 
 
 def _assemble(

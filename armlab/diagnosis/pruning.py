@@ -65,7 +65,7 @@ def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
     for group in groups:
         candidate = model.solver.groups[group].candidate
         steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
-    back = {other for group in groups for other in judge.simpler(group)}
+    back = {other for group in groups for other in judge.in_place_of(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
     return _settle_links(model, _remove_failing(model, state, groups, steps), steps)
 
@@ -95,7 +95,7 @@ def _remove_failing(model: FittedModel, state: State, banned: frozenset[int], st
             steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
         places = {groups[group].place for group in gone}
         banned |= {number for number, each in enumerate(groups) if each.place in places}
-        back = {other for group in gone for other in judge.simpler(group)}
+        back = {other for group in gone for other in judge.in_place_of(group)}
         state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
 
 

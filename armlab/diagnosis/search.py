@@ -14,6 +14,18 @@ from armlab.diagnosis.solver import Solver, State
 from armlab.diagnosis.tuning import SearchTuning
 
 
+def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
+    """Numbers of the formulas at a joint that a law of the last resort has to be clearly better than."""
+    own = groups[number].candidate
+    return tuple(
+        other
+        for other, each in enumerate(groups)
+        if each.candidate.joint == own.joint
+        and each.candidate.facts.one_of == own.facts.one_of
+        and not each.candidate.facts.last_resort
+    )
+
+
 def contained_groups(groups: Sequence[Group], number: int) -> tuple[int, ...]:
     """Numbers of the simpler effects that a group contains and has to be better than."""
     own = groups[number].candidate
@@ -113,18 +125,25 @@ class Search:
         ]
 
     def excluded(self, state: State, group: int) -> bool:
-        """Whether the state holds the group's place already, or something that contains it."""
+        """Whether the state holds the group's place already, or something that contains it.
+
+        A law of the last resort is nowhere looked for beside the others: see `find_friction_curves`.
+        """
         candidate = self.solver.groups[group].candidate
         inside = [self.solver.groups[other] for other in state.groups]
-        return self._too_many_beside(state, group) or any(
-            other.place == self.solver.groups[group].place
-            or (
-                bool(candidate.facts.one_of)
-                and candidate.facts.one_of == other.candidate.facts.one_of
-                and candidate.joint == other.candidate.joint
+        return (
+            candidate.facts.last_resort
+            or self._too_many_beside(state, group)
+            or any(
+                other.place == self.solver.groups[group].place
+                or (
+                    bool(candidate.facts.one_of)
+                    and candidate.facts.one_of == other.candidate.facts.one_of
+                    and candidate.joint == other.candidate.joint
+                )
+                or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
+                for other in inside
             )
-            or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
-            for other in inside
         )
 
     def _too_many_beside(self, state: State, group: int) -> bool:

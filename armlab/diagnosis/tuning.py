@@ -502,6 +502,12 @@ class UnknownTuning:
         meaning="structure below it comes from the form of the law, and is no finding",
         source=REFUTE_SOURCE,
     )
+    min_curve_share: float = tuned(
+        0.5,
+        unit="of the error that a surrogate explains",
+        meaning="what a friction curve has to explain of structure that depends on the joint's own velocity alone",
+        most=1.0,
+    )
 
 
 @dataclass(frozen=True)

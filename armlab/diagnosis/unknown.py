@@ -42,24 +42,27 @@ def is_structured(each: Structure, tuning: Tuning) -> bool:
     return each.gain > tuning.surrogate.min_structure_gain and each.p_value < tuning.unknown.level
 
 
-def make_unknown_claim(model: FittedModel, each: Structure, residual: Array) -> Claim:
-    """The finding `unknown` at a joint, with its surrogate's prediction."""
+def unknown_evidence(model: FittedModel, each: Structure, before: Array, after: Array) -> Evidence:
+    """The evidence of structure. before, after: (rows,), N m, what is left at its joint without and with it."""
     observed = model.design.observed
     rows = rows_in(observed.of_role("validate", each.joint), observed.rows)
-    before = float(np.sqrt(np.mean(residual[rows, each.joint] ** 2)))
-    after = float(np.sqrt(np.mean((residual[rows, each.joint] - each.prediction[rows]) ** 2)))
-    tried = observed.joints
-    evidence = Evidence(
+    return Evidence(
         each.joint,
         each.p_value,
-        min(1.0, each.p_value * tried),
+        min(1.0, each.p_value * observed.joints),
         each.gain,
         each.p_value,
         each.validation_gain,
-        before,
-        after,
-        -0.5 * len(residual) * float(np.log(max(1 - each.gain, 1e-6))),
+        float(np.sqrt(np.mean(before[rows] ** 2))),
+        float(np.sqrt(np.mean(after[rows] ** 2))),
+        -0.5 * len(before) * float(np.log(max(1 - each.gain, 1e-6))),
     )
+
+
+def make_unknown_claim(model: FittedModel, each: Structure, residual: Array) -> Claim:
+    """The finding `unknown` at a joint, with its surrogate's prediction."""
+    own = residual[:, each.joint]
+    evidence = unknown_evidence(model, each, own, own - each.prediction)
     prediction = np.zeros(residual.shape)
     prediction[:, each.joint] = each.prediction
     joint = each.joint + 1

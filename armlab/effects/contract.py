@@ -53,7 +53,8 @@ class Effect:
     little for a claim. dissipates: it takes energy from the motion.
     sticks: at rest it takes any value up to its level, so data at a standstill do not determine it.
     contains: ids of simpler effects at the same joint. A law of this effect has to explain more than they do.
-    one_of: name of a set of effects of which a joint has at most one.
+    one_of: name of a set of effects of which a joint has at most one. last_resort: it can follow any other effect of
+    that set, so it is named only where it is clearly better than each of them.
     at_most_beside: ids of other effects, and how many of each may stand beside this one.
     equal_sums: pairs of effects which together are this effect exactly, for any motion.
     prior_scale: standard deviation (SI units) of the normal prior about zero of its coefficients; infinite where
@@ -76,6 +77,7 @@ class Effect:
     sticks: bool = False
     contains: tuple[str, ...] = ()
     one_of: str = ""
+    last_resort: bool = False
     at_most_beside: Mapping[str, int] = field(default_factory=dict, hash=False)
     equal_sums: tuple[tuple[str, str], ...] = ()
     prior_scale: float = float("inf")

@@ -16,6 +16,7 @@ from armlab.effects.friction import (
     STRIBECK,
     VISCOUS_FRICTION,
 )
+from armlab.effects.friction_curve import FRICTION_CURVE
 from armlab.effects.geometry import BASE_TILT, ENCODER_OFFSET, GEOMETRY_ERROR
 from armlab.effects.links import INERTIAL_ERROR, PAYLOAD
 from armlab.effects.memory import FRICTION_DRIFT, PRESLIDING
@@ -50,6 +51,7 @@ BUILT_IN: tuple[Family, ...] = (
     CHANNEL_SKEW,
     EXTERNAL_CONTACT,
     TORQUE_SATURATION,
+    FRICTION_CURVE,
 )
 EFFECT_IDS = (*(family.effect for family in BUILT_IN), UNKNOWN.id)
 ENTRY_POINT_GROUP = "armlab.effects"

@@ -15,6 +15,7 @@ from armlab.concealed.effects.drives import Backlash, Coupling, Elasticity, Roto
 from armlab.concealed.effects.friction import (
     Asymmetric,
     Coulomb,
+    Curve,
     Drift,
     LoadDependent,
     NonlinearViscous,
@@ -66,6 +67,7 @@ MARKS: dict[type[HiddenEffect], tuple[Column, float]] = {  # a column, and the l
     Cable: (lambda m, t, e: m.position[:, J] - e.shape["rest"], 0.9),
     Delay: (lambda m, t, e: -_slope(m, t, e), 0.9),
     Skew: (lambda m, t, e: -e.shape["direction"] * _slope(m, t, e), 0.9),
+    Curve: (_sign, 0.6),
     Saturation: (lambda m, t, e: -np.sign(t[:, J]) * np.maximum(np.abs(t[:, J]) - e.parameters()["limit"], 0), 0.9),
 }
 

@@ -25,7 +25,7 @@ def rows_under(heading: str) -> dict[str, str]:
 
 def facts_row(effect: Effect) -> str:
     """The row that the facts of an effect have in the second table."""
-    marks = ("usual", "dissipates", "sticks", "scanned", "single_event")
+    marks = ("usual", "dissipates", "sticks", "scanned", "single_event", "last_resort")
     kept = ", ".join(mark.replace("_", " ") for mark in marks if getattr(effect, mark))
     contained = ", ".join(f"`{name}`" for name in effect.contains)
     scale = "" if effect.prior_scale == float("inf") else f"{effect.prior_scale:g}"

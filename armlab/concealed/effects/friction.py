@@ -149,6 +149,31 @@ class Asymmetric(HiddenEffect):
         return np.asarray(torque + self.size * (self.shape["slope"] * velocity + np.abs(velocity)))
 
 
+class Curve(HiddenEffect):
+    """tau = F sgn(v) (b + (1 + tanh x) / 2), x = (|v| - w) / d: a step between two plateaus.
+
+    Other form: tau = F sgn(v) (b + d log(1 + exp x) / w), a plateau and then a rise. No law of friction has these
+    curves; both grow with speed. size: F, the height of the step, N m.
+    """
+
+    effect, forms = "friction_curve", ("step", "plateau and rise")
+    companions = ("coulomb", "viscous")
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        knee = float(rng.uniform(0.15, 0.4) * machine.speed[joint])
+        shape = {"base": float(rng.uniform(0.3, 1.0)), "knee": knee, "width": float(rng.uniform(0.1, 0.25)) * knee}
+        step = torque_share(0.03, machine, joint)
+        return cls(joint, step, 8 * step, cls.draw_form(rng), shape)
+
+    def torque(self, track: Track, run: int) -> Array:
+        velocity = track.velocity[:, self.joint]
+        knee, width = self.shape["knee"], self.shape["width"]
+        beyond = (np.abs(velocity) - knee) / width
+        rise = (1 + np.tanh(beyond)) / 2 if self.form == "step" else width / knee * np.logaddexp(0, beyond)
+        return np.asarray(self.size * smooth_sign(velocity) * (self.shape["base"] + rise))
+
+
 class LoadDependent(HiddenEffect):
     """tau = m |tau_load| sgn(v); other form: |tau_load| fades in above a knee. size: m."""
 

@@ -6,6 +6,7 @@ from armlab.concealed.effects.drives import Backlash, Coupling, Elasticity, Roto
 from armlab.concealed.effects.friction import (
     Asymmetric,
     Coulomb,
+    Curve,
     Drift,
     LoadDependent,
     NonlinearViscous,
@@ -43,4 +44,5 @@ LIBRARY: tuple[type[HiddenEffect], ...] = (
     Skew,
     Contact,
     Saturation,
+    Curve,
 )

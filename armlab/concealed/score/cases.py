@@ -103,6 +103,7 @@ CONTAINED_EFFECTS = {  # what the law of an effect holds as a part
     "stribeck_friction": ("coulomb_friction", "viscous_friction"),
     "asymmetric_friction": ("coulomb_friction", "torque_offset", "viscous_friction"),
     "presliding_hysteresis": ("coulomb_friction",),
+    "friction_curve": ("coulomb_friction", "viscous_friction"),
     "friction_drift": ("viscous_friction",),
     "cable_stiffness": ("gravity_compensator", "torque_offset"),
     "gravity_compensator": ("cable_stiffness", "torque_offset"),

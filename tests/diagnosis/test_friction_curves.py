@@ -1,0 +1,85 @@
+"""Friction that no formula fits is named as a curve, and friction that a formula fits never is."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import engine_cases as cases
+import numpy as np
+import pytest
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.found_model import model_found
+from armlab.diagnosis.result import Diagnosis
+from armlab.identification.model_file import read_model, write_model
+from problem.motion import Motion
+
+Law = Callable[[Array], Array]
+PLAIN = np.array([[2.0, 0.0, 1.0], [1.5, 0.0, 0.8]])  # Coulomb level, viscous coefficient of joints 1 and 3
+
+
+def step(speed: Array) -> Array:
+    """Two plateaus, 0.6 and 2.4 N m, with a rise at 1.2 rad/s."""
+    return np.asarray(0.6 + 0.9 * (1 + np.tanh((speed - 1.2) / 0.2)))
+
+
+def with_friction(law: Law) -> cases.Hidden:
+    """Coulomb and viscous friction at joints 1 and 3, and a law of speed at joint 2."""
+
+    def torque(motion: Motion, time: Array) -> Array:
+        speed = np.abs(motion.velocity)
+        within_sample = np.abs(motion.acceleration) / (2 * cases.RATE_HZ)
+        direction = motion.velocity / np.maximum(speed, within_sample)  # its mean over the sample's interval
+        out = direction * (PLAIN[0] + PLAIN[1] * speed)
+        out[:, 1] = direction[:, 1] * law(speed[:, 1])
+        return np.asarray(out)
+
+    return torque
+
+
+@pytest.fixture(scope="module")
+def step_found() -> Diagnosis:
+    return diagnose(cases.recording(with_friction(step), seconds=20.0))
+
+
+def test_friction_that_steps_between_plateaus_is_a_curve_through_both(step_found: Diagnosis) -> None:
+    (claim,) = (each for each in step_found.claims if each.joint == 2)
+    assert (claim.effect, claim.rivals) == ("friction_curve", ())
+    velocities, torques = (np.array(each.value) for each in claim.parameters)
+    slow, fast = (velocities > 0.1) & (velocities < 0.8), velocities > 1.6
+    np.testing.assert_allclose(torques[slow], 0.6, atol=0.05)
+    np.testing.assert_allclose(torques[fast], 2.4, atol=0.25)
+
+
+def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_curve(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("armlab.diagnosis.diagnose.find_friction_curves", lambda pruned: pruned)
+    found = diagnose(cases.recording(with_friction(step), seconds=20.0))
+    (claim,) = (each for each in found.claims if each.joint == 2)
+    assert claim.effect == "friction_curve"
+    assert claim.evidence.rms_after < claim.evidence.rms_before / 3
+    assert "what is left at joint 2 is a friction curve" in {each.what for each in found.steps}
+
+
+def test_the_model_of_a_curve_predicts_the_same_after_a_round_trip(step_found: Diagnosis, tmp_path: Path) -> None:
+    model = model_found(step_found)
+    again = read_model(write_model(model, tmp_path / "model.yaml"))
+    (run,) = (run for run in step_found.recording.runs if run.role == "validate")
+    np.testing.assert_allclose(again.predict(run), model.predict(run), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        pytest.param(lambda speed: 1.5 + speed, id="Coulomb and viscous"),
+        pytest.param(lambda speed: 1 + speed**1.7, id="power"),
+        pytest.param(lambda speed: 1.5 * speed**0.4, id="root"),
+        pytest.param(lambda speed: 1 + 0.8 * np.exp(-((speed / 0.1) ** 2)) + 0.5 * speed, id="Stribeck"),
+        pytest.param(lambda speed: 1 + 0.8 / (1 + (speed / 0.1) ** 2) + 0.5 * speed, id="rational Stribeck"),
+        pytest.param(lambda speed: 0.5 + 0.6 * np.arcsinh(speed / 0.1), id="Eyring"),
+    ],
+)
+def test_friction_that_a_formula_fits_is_never_a_curve(law: Law) -> None:
+    found = diagnose(cases.recording(with_friction(law), seconds=20.0))
+    assert "friction_curve" not in {claim.effect for claim in found.claims}
