@@ -26,6 +26,7 @@ from armlab.diagnosis.fitted_model import (
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
+from armlab.diagnosis.plausibility import withdraw_implausible
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
@@ -110,13 +111,14 @@ class NamedEffects:
 
 def name_effects(pruned: Pruned) -> NamedEffects:
     """Withdraws names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
-    model, effects, links = pruned
+    model, effects, links = withdraw_implausible(pruned)
     tuning = model.design.settings.tuning
     if not model.design.settings.guards.unknown:
         return NamedEffects(model, effects, links, ())
     left = predict_residual_structure(model, fit_coloured_noise(model))
     while doubtful := names_contradicted_by_residual(effects, left, tuning):
-        model, effects, links = withdraw(model, doubtful, "what is left at its joint is no less structured")
+        contradicted = withdraw(model, doubtful, "what is left at its joint is no less structured")
+        model, effects, links = withdraw_implausible(contradicted)
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left, tuning)
     return NamedEffects(model, effects, {link: each for link, each in links.items() if link not in wrong}, left)

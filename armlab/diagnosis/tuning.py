@@ -485,6 +485,36 @@ class ClaimTuning:
 
 
 @dataclass(frozen=True)
+class PlausibilityTuning:
+    """When numbers that no engineer expects, or that are hardly known, withdraw a finding."""
+
+    overwhelming_evidence: float = tuned(
+        600.0,
+        unit="log likelihood",
+        meaning="what a name with a parameter outside its plausible range adds to the log evidence",
+        source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
+    )
+    overwhelming_gain: float = tuned(
+        0.25,
+        unit="of the joint's held-out error",
+        meaning="gain on held-out data that such a name makes, too",
+        source="as pruning.self_evident_gain",
+    )
+    max_interval_ratio: float = tuned(
+        10.0,
+        meaning="highest over lowest end of the interval of a positive parameter that is known",
+        source="less than its order of magnitude is no knowledge of a size",
+        least=1.0,
+    )
+    max_order_error: float = tuned(
+        0.5,
+        unit="cycles over the joint's travel",
+        meaning="half width of the interval of a wave's order",
+        source="beyond half a cycle the wave at one end of the travel says nothing of that at the other",
+    )
+
+
+@dataclass(frozen=True)
 class IntervalTuning:
     """Intervals of named parameters."""
 
@@ -520,6 +550,7 @@ class Tuning:
     location: LocationTuning = LocationTuning()
     unknown: UnknownTuning = UnknownTuning()
     claims: ClaimTuning = ClaimTuning()
+    plausibility: PlausibilityTuning = PlausibilityTuning()
     intervals: IntervalTuning = IntervalTuning()
 
 

@@ -13,7 +13,7 @@ from armlab.common.settings import suggest_name
 from armlab.effects.scene import Scene
 from problem.arm import Arm
 
-__all__ = ["Candidate", "Effect", "Family", "Kind", "Parameter", "Scene", "Value"]
+__all__ = ["Candidate", "Effect", "Family", "Kind", "Parameter", "Range", "Scene", "Value"]
 
 Kind = Literal["revolute", "prismatic"]
 Value = float | tuple[float, ...]
@@ -29,12 +29,37 @@ MAX_SCALE_RATIO = 3.0  # of the prior scale; no arm has a larger coefficient (ch
 
 
 @dataclass(frozen=True)
+class Range:
+    """Sizes that a parameter has on arms, SI units: (lowest, highest), and where that is known from.
+
+    prismatic: the same at a joint that slides, where it differs.
+    """
+
+    revolute: tuple[float, float]
+    source: str
+    prismatic: tuple[float, float] | None = None
+
+    def limits(self, kind: Kind = "revolute") -> tuple[float, float]:
+        """Lowest and highest at a joint that turns or slides."""
+        return self.prismatic if kind == "prismatic" and self.prismatic is not None else self.revolute
+
+
+@dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect: its name, its unit, and whether physics wants it positive."""
+    """A parameter of an effect: its name, its unit, and whether physics wants it positive.
+
+    plausible: sizes that it has on arms; None where nothing general is known. max_width: an interval that is wider, in
+    its unit, tells nothing. detail: it may be unknown though the effect is certain. sampled: a shift in time, which
+    below one sampling interval is how a log is made.
+    """
 
     name: str
     unit: str
     positive: bool = False
+    plausible: Range | None = None
+    max_width: float = float("inf")
+    detail: bool = False
+    sampled: bool = False
 
     def unit_for(self, kind: Kind = "revolute") -> str:
         """The unit at a joint that turns or slides."""
@@ -99,6 +124,7 @@ class Effect:
 COULOMB_LEVEL = Parameter("level", TORQUE, positive=True)
 VISCOUS_COEFFICIENT = Parameter("coefficient", f"{TORQUE}.s/{ANGLE}", positive=True)
 STIFFNESS = Parameter("stiffness", f"{TORQUE}/{ANGLE}", positive=True)
+HALF_CIRCLE = 3.1416  # rad: a phase whose interval is wider has not even a sign
 
 UNKNOWN = Effect(
     "unknown",
