@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.added_body import possible_links, prefer_one_body
 from armlab.diagnosis.claims import make_claims
 from armlab.diagnosis.data import Observed, observe, rows_in
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
@@ -89,7 +90,7 @@ def prepare(
 def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """Tests what a search found, withdraws names that do not hold, and states the rest with numbers."""
     progress("testing claims")
-    named = name_effects(prune(searched))
+    named = name_effects(prefer_one_body(prune(searched)))
     model, tuning = named.model, named.model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
@@ -121,7 +122,8 @@ def name_effects(pruned: Pruned) -> NamedEffects:
         model, effects, links = withdraw_implausible(contradicted)
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left, tuning)
-    return NamedEffects(model, effects, {link: each for link, each in links.items() if link not in wrong}, left)
+    model, links = possible_links(model, {link: each for link, each in links.items() if link not in wrong})
+    return NamedEffects(model, effects, links, left)
 
 
 def _assemble(

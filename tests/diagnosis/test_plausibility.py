@@ -16,7 +16,7 @@ from armlab.effects.springs import TorqueRipple
 from armlab.effects.timing import TimeDelay, TorqueSkew
 from problem.robot_file import load_arm
 
-ARM = load_arm("emps")
+ARM = load_arm("staubli-tx40")
 
 
 @dataclass(frozen=True)
