@@ -33,6 +33,7 @@ from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State
+from armlab.diagnosis.story import with_story
 from armlab.diagnosis.summary import summarise
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import changed_numbers
@@ -97,7 +98,7 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     residual = model.residual(model.fit)
     claims = make_claims(model, named.effects, named.links)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
-    return _assemble(recording, model, claims, unknowns, remains)
+    return with_story(_assemble(recording, model, claims, unknowns, remains))
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,20 @@ from armlab.common.settings import suggest_name
 from armlab.effects.scene import Scene
 from problem.arm import Arm
 
-__all__ = ["Candidate", "Effect", "Family", "Kind", "Parameter", "Range", "Scene", "Value"]
+__all__ = ["Candidate", "Cause", "Effect", "Family", "Kind", "Parameter", "Range", "Scene", "Value"]
 
 Kind = Literal["revolute", "prismatic"]
+Cause = Literal[
+    "friction",
+    "drive",
+    "links",
+    "gravity and springs",
+    "transmission",
+    "timing",
+    "contact",
+    "geometry",
+    "unknown",
+]
 Value = float | tuple[float, ...]
 
 TORQUE, ANGLE, INERTIA = "{torque}", "{position}", "{inertia}"  # units that depend on how the joint moves
@@ -87,6 +98,7 @@ class Effect:
     axis: the variable against which a figure shows it; `cycle` is the position within one wave, of which a parameter
     `order` says how many there are in a turn.
     experiment: the next experiment that separates it from its rivals.
+    origin: the cause to which the story of a verdict counts it; where it is left out, its other facts say it (`cause`).
     """
 
     id: str
@@ -107,6 +119,20 @@ class Effect:
     in_links: bool = False
     axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
     experiment: str = ""
+    origin: Cause | None = None
+
+    @property
+    def cause(self) -> Cause:
+        """The cause to which the story of a verdict counts it."""
+        if self.origin is not None:
+            return self.origin
+        if self.where == "link":
+            return "links"
+        if self.dissipates:
+            return "friction"
+        if self.single_event:
+            return "contact"
+        return "transmission" if self.where == "coupling" else "drive"
 
     @property
     def words(self) -> str:
@@ -129,6 +155,7 @@ HALF_CIRCLE = 3.1416  # rad: a phase whose interval is wider has not even a sign
 UNKNOWN = Effect(
     "unknown",
     "structure that no effect of this library explains",
+    origin="unknown",
     experiment="move the joint alone over the variables it depends on, one at a time",
 )
 

@@ -23,6 +23,7 @@ BASE_TILT_FACTS = Effect(
     (Parameter("gravity", "m/s2"),),
     where="robot",
     prior_scale=0.5,
+    origin="geometry",
     experiment="measure the base with a level, or turn joint 1 through its full range",
 )
 ENCODER_OFFSET_FACTS = Effect(
@@ -30,6 +31,7 @@ ENCODER_OFFSET_FACTS = Effect(
     "a joint's zero at another place",
     (Parameter("offset", ANGLE),),
     prior_scale=0.05,
+    origin="geometry",
     experiment="check the joint's zero against its calibration mark",
 )
 GEOMETRY_ERROR_FACTS = Effect(
@@ -37,6 +39,7 @@ GEOMETRY_ERROR_FACTS = Effect(
     "a link of another length",
     (Parameter("offset", "m", plausible=LENGTH_ERRORS_SEEN),),
     prior_scale=0.02,
+    origin="geometry",
     experiment="calibrate the geometry with a measuring arm or a laser tracker",
 )
 

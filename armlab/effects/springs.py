@@ -55,6 +55,7 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
     ),
     contains=("torque_offset",),
     axis="position",
+    origin="gravity and springs",
     experiment="record two payloads over the full range of the joint",
 )
 CABLE_STIFFNESS_FACTS = Effect(
@@ -63,6 +64,7 @@ CABLE_STIFFNESS_FACTS = Effect(
     (STIFFNESS, Parameter("rest", ANGLE)),
     contains=("torque_offset",),
     axis="position",
+    origin="gravity and springs",
     experiment="move the joint slowly over its full range in both directions",
 )
 

@@ -29,6 +29,7 @@ TIME_DELAY_FACTS = Effect(
     where="robot",
     at_most_beside={"channel_skew": 1},
     prior_scale=0.01,
+    origin="timing",
     experiment="record a multisine of high frequency: delay grows with frequency, viscous friction does not",
 )
 CHANNEL_SKEW_FACTS = Effect(
@@ -36,6 +37,7 @@ CHANNEL_SKEW_FACTS = Effect(
     "one channel recorded later than the others",
     (SHIFT,),
     prior_scale=0.01,
+    origin="timing",
     experiment="correlate the channels on a fast motion, or trigger them from one clock",
 )
 

@@ -31,6 +31,7 @@ JOINT_ELASTICITY_FACTS = Effect(
     "a spring in the drive train",
     (Parameter("stiffness", f"{TORQUE}/{ANGLE}", positive=True, plausible=DRIVE_TRAINS_SEEN),),
     prior_scale=1e-3,
+    origin="transmission",
     experiment="excite the joint with a chirp past its resonance, or read an encoder on the link side",
 )
 BACKLASH_FACTS = Effect(
@@ -39,6 +40,7 @@ BACKLASH_FACTS = Effect(
     (Parameter("gap", ANGLE, positive=True, plausible=GAPS_SEEN),),
     prior_scale=0.01,
     axis="position",
+    origin="transmission",
     experiment="let the load change its sign slowly, or read an encoder on the link side",
 )
 
