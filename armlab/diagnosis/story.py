@@ -108,7 +108,7 @@ def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
     first, *others = chapters
     sentence = f"{_cause_in_words(first, joints)} explains {100 * first.share:.0f} % of the error"
     for each in others:
-        longer = f"{sentence}; {_cause_in_words(each, joints).lower()} {100 * each.share:.0f} %"
+        longer = f"{sentence}; {_cause_in_words(each, joints).lower()} ({100 * each.share:.0f} %)"
         if each.share < MIN_TOLD_SHARE or len(longer.split()) > MAX_WORDS:
             break
         sentence = longer
@@ -116,13 +116,20 @@ def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
 
 
 def _cause_in_words(each: Chapter, joints: int) -> str:
-    name = "Structure without a name" if each.cause == "unknown" else each.cause.capitalize()
+    name = {"unknown": "Structure without a name", "links": "What the links are off"}.get(each.cause)
+    name = name or each.cause.capitalize()
     if not each.joints or each.cause == "links":
         return name
     if len(each.joints) == joints > 1:
         return f"{name} on all {joints} joints"
     plural = "s" if len(each.joints) > 1 else ""
-    return f"{name} on joint{plural} {', '.join(str(joint) for joint in each.joints)}"
+    return f"{name} on joint{plural} {_join_numbers(each.joints)}"
+
+
+def _join_numbers(numbers: Sequence[int]) -> str:
+    """`1, 2 and 4` of numbers."""
+    *others, last = [str(each) for each in numbers]
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def _places_by_cause(diagnosis: Diagnosis) -> dict[Cause, tuple[int, ...]]:

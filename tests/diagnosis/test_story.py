@@ -29,7 +29,7 @@ def test_the_sentence_names_the_causes_and_has_at_most_thirty_words() -> None:
     ]
     sentence = story_sentence(chapters, 6)
     assert sentence.startswith(
-        "Friction on all 6 joints explains 91 % of the error; gravity and springs on joint 2 5 %"
+        "Friction on all 6 joints explains 91 % of the error; gravity and springs on joint 2 (5 %)"
     )
     assert len(sentence.split()) <= MAX_WORDS
 

@@ -172,7 +172,7 @@ def story_section(diagnosis: Diagnosis) -> str:
         "Share of the error: of the squared held-out error of all joints, each in units of its torque, from the model "
         "without findings down to the noise; causes are added in the order of their size."
     )
-    table = html_table(["cause", "joints or links", "share of the error", "findings"], rows, (0, 1, 3))
+    table = html_table(["cause", "at", "share", "findings"], rows, (0, 1, 3))
     sentence = story_sentence(chapters, len(diagnosis.simulation.arm))
     return section("story", "In short", paragraph(sentence), table, paragraph(text, "pale"))
 
