@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.added_body import neighbours_that_fit
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes
@@ -66,7 +67,8 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     candidate = solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
     own = np.zeros(model.moments.size)
     own[columns] = coefficients
-    rivals = find_rivals(model, group, candidate)
+    rivals = (*neighbours_that_fit(model, group), *find_rivals(model, group, candidate))
+    rivals = rivals[: model.design.settings.tuning.claims.max_rivals]
     return Claim(
         effect=candidate.effect,
         joint=candidate.joint,

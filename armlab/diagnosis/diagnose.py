@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from armlab.diagnosis.added_body import possible_links, prefer_one_body, with_possible_bodies
 from armlab.diagnosis.claims import make_claims
 from armlab.diagnosis.data import observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
@@ -28,12 +29,14 @@ from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
+from armlab.diagnosis.plausibility import unclaim_implausible, withdraw_implausible
 from armlab.diagnosis.prediction import Prediction, choose_smoothing, filtered_residual, fit_prediction
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State
+from armlab.diagnosis.story import with_story
 from armlab.diagnosis.summary import summarise
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import changed_numbers
@@ -91,16 +94,17 @@ def prepare(
 def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """Tests what a search found, withdraws names that do not hold, fits the model that predicts, and states numbers."""
     progress("testing claims")
-    named = name_effects(find_friction_curves(prune(searched)))
-    model, tuning = named.model, named.model.design.settings.tuning
+    named = name_effects(prefer_one_body(find_friction_curves(prune(searched))))
     progress("fitting the model that predicts")
-    prediction = fit_prediction(model)
+    prediction = with_possible_bodies(fit_prediction(named.model))
+    model, effects = unclaim_implausible(named.model, prediction, named.effects)
+    tuning = model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
-    claims = make_claims(model, named.effects, named.links, prediction)
+    claims = make_claims(model, effects, named.links, prediction)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
-    return _assemble(recording, model, prediction, claims, unknowns, remains)
+    return with_story(_assemble(recording, model, prediction, claims, unknowns, remains))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,18 +119,20 @@ class NamedEffects:
 
 def name_effects(pruned: Pruned) -> NamedEffects:
     """Withdraws names that what is left at their joint contradicts; all are kept without the guard `unknown`."""
-    model, effects, links = pruned
+    model, effects, links = withdraw_implausible(pruned)
     tuning = model.design.settings.tuning
     if not model.design.settings.guards.unknown:
         return NamedEffects(model, effects, links, ())
     left = predict_residual_structure(model, fit_coloured_noise(model))
     while doubtful := names_contradicted_by_residual(effects, left, tuning):
-        model, effects, links = withdraw(model, doubtful, "what is left at its joint is no less structured")
+        contradicted = withdraw(model, doubtful, "what is left at its joint is no less structured")
+        model, effects, links = withdraw_implausible(contradicted)
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left, tuning)
     links = {link: each for link, each in links.items() if link not in wrong}
-    named, left = name_friction_curves((model, effects, links), left)
-    return NamedEffects(*named, left)
+    (model, effects, links), left = name_friction_curves((model, effects, links), left)
+    model, links = possible_links(model, links)
+    return NamedEffects(model, effects, links, left)
 
 
 def _assemble(

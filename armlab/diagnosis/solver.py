@@ -6,7 +6,7 @@ number of places that were looked at: Chen and Chen 2008, extended BIC with gamm
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -137,11 +137,21 @@ class Solver:
             self._fits[state] = self._fitted(state)
         return self._fits[state]
 
+    def hold(self, state: State, coefficients: Array) -> None:
+        """Keeps coefficients (size,) as the fit of a state: what a constraint that columns do not know has made them.
+
+        Scores and covariances are those of the free fit, the chi-square that of these coefficients.
+        """
+        free, gram = self.fit(state), self.moments.gram
+        chi_square = float(2 * coefficients @ gram[:-1, -1] - coefficients @ gram[:-1, :-1] @ coefficients)
+        score = free.score - max(free.chi_square - chi_square, 0.0) / 2
+        self._fits[state] = replace(free, coefficients=coefficients, chi_square=chi_square, score=score)
+
     def _columns(self, state: State) -> NDArray[np.intp]:
         parts = [self.groups[group].columns for group in state.groups]
         return np.concatenate(parts).astype(np.intp) if parts else np.empty(0, dtype=np.intp)
 
-    def _system(self, state: State) -> tuple[Array, Array, NDArray[np.intp]]:
+    def system(self, state: State) -> tuple[Array, Array, NDArray[np.intp]]:
         """Matrix of the normal equations, its products with all columns, and the effects' columns."""
         gram = self.moments.gram
         factor, products, precision, _ = self.links(state.widths)
@@ -154,7 +164,7 @@ class Solver:
         return matrix, np.vstack([products, gram[columns]]), columns
 
     def _fitted(self, state: State) -> Fit:
-        matrix, products, columns = self._system(state)
+        matrix, products, columns = self.system(state)
         factor, _, _, price = self.links(state.widths)
         coefficients = np.zeros(self.moments.size)
         chi_square, inverse = 0.0, np.empty((0, 0))
@@ -172,7 +182,7 @@ class Solver:
 
     def gains(self, state: State) -> Array:
         """How much each group would raise the score, were it added: (groups,)."""
-        matrix, products, _ = self._system(state)
+        matrix, products, _ = self.system(state)
         whole = np.zeros((0, self.moments.size + 1))
         if len(matrix):
             whole = solve_triangular(np.linalg.cholesky(matrix), products, lower=True)

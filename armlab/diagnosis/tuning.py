@@ -524,8 +524,48 @@ class ClaimTuning:
     outlying_factor: float = tuned(
         4.0, unit="of the other links' median width", meaning="a link that is so much wider carries something"
     )
+    max_body_deficit: float = tuned(
+        0.02,
+        unit="of the log likelihood that a body adds",
+        meaning="a body at another link that adds so much less fits as well: laws are not exact",
+    )
+    body_tolerance: float = tuned(
+        0.05,
+        unit="of the held-out error, mean of the joints' logarithms",
+        meaning="a body at another link that predicts worse by less predicts as well",
+    )
     min_gap: float = tuned(
         0.02, unit="of the noise floor", meaning="a smaller gap between error and noise cannot be measured"
+    )
+
+
+@dataclass(frozen=True)
+class PlausibilityTuning:
+    """When numbers that no engineer expects, or that are hardly known, withdraw a finding."""
+
+    overwhelming_evidence: float = tuned(
+        600.0,
+        unit="log likelihood",
+        meaning="what a name with a parameter outside its plausible range adds to the log evidence",
+        source="ten times pruning.least_evidence: evidence counts structure that the library lacks, too",
+    )
+    overwhelming_gain: float = tuned(
+        0.25,
+        unit="of the joint's held-out error",
+        meaning="gain on held-out data that such a name makes, too",
+        source="as pruning.self_evident_gain",
+    )
+    max_interval_ratio: float = tuned(
+        30.0,
+        meaning="highest over lowest end of the interval of a positive parameter that is known",
+        source="development sets: 12 for a right finding; an interval of 94 % of the value to both sides has it",
+        least=1.0,
+    )
+    max_order_error: float = tuned(
+        0.5,
+        unit="cycles over the joint's travel",
+        meaning="half width of the interval of a wave's order",
+        source="beyond half a cycle the wave at one end of the travel says nothing of that at the other",
     )
 
 
@@ -566,6 +606,7 @@ class Tuning:
     location: LocationTuning = LocationTuning()
     unknown: UnknownTuning = UnknownTuning()
     claims: ClaimTuning = ClaimTuning()
+    plausibility: PlausibilityTuning = PlausibilityTuning()
     intervals: IntervalTuning = IntervalTuning()
 
 

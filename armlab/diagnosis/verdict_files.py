@@ -19,6 +19,7 @@ from armlab.diagnosis.formats import (
     ParameterEntry,
     RecordedEntry,
     RivalEntry,
+    StoryEntry,
     UnexplainedEntry,
     VerdictFile,
     WhereEntry,
@@ -26,6 +27,7 @@ from armlab.diagnosis.formats import (
 )
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
+from armlab.diagnosis.story import Chapter, finding_shares, tell_story
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.model_file import model_text
@@ -61,12 +63,14 @@ def check_output_folder(folder: Path, recording: Recording) -> None:
 
 def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
     """The content of `verdict.json`."""
+    story, shares = tell_story(diagnosis), finding_shares(diagnosis)
     return VerdictFile(
         schema=VERDICT_SCHEMA,
         status=diagnosis.status,
         summary=diagnosis.summary,
+        story=tuple(_story_entry(each) for each in story),
         located=tuple(_located_entry(each) for each in diagnosis.located),
-        findings=tuple(_finding_entry(each) for each in diagnosis.claims),
+        findings=tuple(_finding_entry(*each) for each in zip(diagnosis.claims, shares, strict=True)),
         unexplained=tuple(_unexplained_entry(each) for each in diagnosis.unexplained),
         fit=tuple(_fit_entry(each) for each in diagnosis.fit),
     )
@@ -77,18 +81,24 @@ def _located_entry(each: Located) -> LocatedEntry:
     return LocatedEntry(joint=each.joint, share=each.share, where=where)
 
 
-def _finding_entry(claim: Claim) -> FindingEntry:
+def _story_entry(each: Chapter) -> StoryEntry:
+    return StoryEntry(cause=each.cause, joints=each.joints, share_of_gap=each.share, findings=each.findings)
+
+
+def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
     effect = effect_named(claim.effect) if claim.candidate is None else claim.candidate.facts
     return FindingEntry(
         effect=claim.effect,
         kind=kind_of_effect(effect),
         joint=claim.joint,
         joints=claim.joints,
+        form=None if claim.candidate is None else claim.candidate.form or None,
         parameters={each.name: _finding_parameter(each) for each in claim.parameters},
         equation=claim.equation,
         heldout_rms_before=claim.evidence.rms_before,
         heldout_rms_after=claim.evidence.rms_after,
         p_value=claim.evidence.corrected,
+        share_of_gap=share,
         rivals=tuple(RivalEntry(effect=each.effect, joint=each.joint) for each in claim.rivals),
         next_experiment=claim.next_experiment,
     )

@@ -13,9 +13,20 @@ from armlab.common.settings import suggest_name
 from armlab.effects.scene import Scene
 from problem.arm import Arm
 
-__all__ = ["Candidate", "Effect", "Family", "Kind", "Parameter", "Scene", "Value"]
+__all__ = ["Candidate", "Cause", "Effect", "Family", "Kind", "Parameter", "Range", "Scene", "Value"]
 
 Kind = Literal["revolute", "prismatic"]
+Cause = Literal[
+    "friction",
+    "drive",
+    "links",
+    "gravity and springs",
+    "transmission",
+    "timing",
+    "contact",
+    "geometry",
+    "unknown",
+]
 Value = float | tuple[float, ...]
 
 TORQUE, ANGLE, INERTIA = "{torque}", "{position}", "{inertia}"  # units that depend on how the joint moves
@@ -29,12 +40,37 @@ MAX_SCALE_RATIO = 3.0  # of the prior scale; no arm has a larger coefficient (ch
 
 
 @dataclass(frozen=True)
+class Range:
+    """Sizes that a parameter has on arms, SI units: (lowest, highest), and where that is known from.
+
+    prismatic: the same at a joint that slides, where it differs.
+    """
+
+    revolute: tuple[float, float]
+    source: str
+    prismatic: tuple[float, float] | None = None
+
+    def limits(self, kind: Kind = "revolute") -> tuple[float, float]:
+        """Lowest and highest at a joint that turns or slides."""
+        return self.prismatic if kind == "prismatic" and self.prismatic is not None else self.revolute
+
+
+@dataclass(frozen=True)
 class Parameter:
-    """A parameter of an effect: its name, its unit, and whether physics wants it positive."""
+    """A parameter of an effect: its name, its unit, and whether physics wants it positive.
+
+    plausible: sizes that it has on arms; None where nothing general is known. max_width: an interval that is wider, in
+    its unit, tells nothing. detail: it may be unknown though the effect is certain. sampled: a shift in time, which
+    below one sampling interval is how a log is made.
+    """
 
     name: str
     unit: str
     positive: bool = False
+    plausible: Range | None = None
+    max_width: float = float("inf")
+    detail: bool = False
+    sampled: bool = False
 
     def unit_for(self, kind: Kind = "revolute") -> str:
         """The unit at a joint that turns or slides."""
@@ -64,6 +100,7 @@ class Effect:
     axis: the variable against which a figure shows it; `cycle` is the position within one wave, of which a parameter
     `order` says how many there are in a turn.
     experiment: the next experiment that separates it from its rivals.
+    origin: the cause to which the story of a verdict counts it; where it is left out, its other facts say it (`cause`).
     """
 
     id: str
@@ -86,6 +123,20 @@ class Effect:
     in_links: bool = False
     axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
     experiment: str = ""
+    origin: Cause | None = None
+
+    @property
+    def cause(self) -> Cause:
+        """The cause to which the story of a verdict counts it."""
+        if self.origin is not None:
+            return self.origin
+        if self.where == "link":
+            return "links"
+        if self.dissipates:
+            return "friction"
+        if self.single_event:
+            return "contact"
+        return "transmission" if self.where == "coupling" else "drive"
 
     @property
     def words(self) -> str:
@@ -103,10 +154,12 @@ class Effect:
 COULOMB_LEVEL = Parameter("level", TORQUE, positive=True)
 VISCOUS_COEFFICIENT = Parameter("coefficient", f"{TORQUE}.s/{ANGLE}", positive=True)
 STIFFNESS = Parameter("stiffness", f"{TORQUE}/{ANGLE}", positive=True)
+HALF_CIRCLE = 3.1416  # rad: a phase whose interval is wider has not even a sign
 
 UNKNOWN = Effect(
     "unknown",
     "structure that no effect of this library explains",
+    origin="unknown",
     experiment="move the joint alone over the variables it depends on, one at a time",
 )
 

@@ -7,9 +7,11 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import INERTIA, TORQUE, Effect, Parameter, Scene, Value
+from armlab.effects.contract import INERTIA, TORQUE, Effect, Parameter, Range, Scene, Value
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number
 from problem.arm import Arm
+
+GAINS_SEEN = Range((0.5, 2.0), "torque constants: 5 to 10 %, rarely more; beyond a factor of two it is a unit")
 
 ROTOR_INERTIA_FACTS = Effect(
     "rotor_inertia",
@@ -22,7 +24,7 @@ ROTOR_INERTIA_FACTS = Effect(
 TORQUE_GAIN_FACTS = Effect(
     "torque_gain_error",
     "torque read too large or too small",
-    (Parameter("gain", "1", positive=True),),
+    (Parameter("gain", "1", positive=True, plausible=GAINS_SEEN),),
     prior_scale=0.2,
     experiment="record the motion with and without a payload of known mass",
 )

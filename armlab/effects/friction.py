@@ -7,9 +7,27 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import ANGLE, COULOMB_LEVEL, TORQUE, VISCOUS_COEFFICIENT, Effect, Parameter, Scene, Value
+from armlab.effects.contract import (
+    ANGLE,
+    COULOMB_LEVEL,
+    TORQUE,
+    VISCOUS_COEFFICIENT,
+    Effect,
+    Parameter,
+    Range,
+    Scene,
+    Value,
+)
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number, format_sum, top_speed
 from problem.arm import Arm
+
+POWER_EXPONENTS_SEEN = Range((0.2, 3.5), "from the root law to cubic friction (Bittencourt and Gunnarsson 2012)")
+STRIBECK_SPEEDS_SEEN = Range(
+    (1e-3, 0.5),
+    "0.025 to 0.05 rad/s on geared arms (Bittencourt and Gunnarsson 2012), a tenth to ten times",
+    (1e-4, 0.1),
+)
+LOAD_SHARES_SEEN = Range((0.0, 0.5), "what gears lose: half of the torque at most")
 
 COULOMB_FACTS = Effect(
     "coulomb_friction",
@@ -38,7 +56,7 @@ NONLINEAR_VISCOUS_FACTS = Effect(
     "torque that grows with a power of velocity",
     (
         Parameter("coefficient", f"{TORQUE}/({ANGLE}/s)^exponent", positive=True),
-        Parameter("exponent", "1", positive=True),
+        Parameter("exponent", "1", positive=True, plausible=POWER_EXPONENTS_SEEN),
     ),
     dissipates=True,
     contains=("coulomb_friction", "viscous_friction"),
@@ -53,8 +71,8 @@ STRIBECK_FACTS = Effect(
     (
         COULOMB_LEVEL,
         Parameter("static_level", TORQUE, positive=True),
-        Parameter("velocity", f"{ANGLE}/s", positive=True),
-        Parameter("exponent", "1", positive=True),
+        Parameter("velocity", f"{ANGLE}/s", positive=True, plausible=STRIBECK_SPEEDS_SEEN),
+        Parameter("exponent", "1", positive=True, detail=True),
     ),
     title="Stribeck friction",
     dissipates=True,
@@ -80,7 +98,7 @@ ASYMMETRIC_FACTS = Effect(
 LOAD_DEPENDENT_FACTS = Effect(
     "load_dependent_friction",
     "friction that grows with the transmitted torque",
-    (Parameter("coefficient", "1", positive=True),),
+    (Parameter("coefficient", "1", positive=True, plausible=LOAD_SHARES_SEEN),),
     dissipates=True,
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),

@@ -8,12 +8,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import ANGLE, Candidate, Effect, Family, Parameter, Scene, Value
+from armlab.effects.contract import ANGLE, Candidate, Effect, Family, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import GEOMETRY_STEP, directional_derivative, geometry_derivative, gravity_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.transforms import rotation_x, translation
+
+LENGTH_ERRORS_SEEN = Range((-0.05, 0.05), "calibrations of arms: millimetres; a tool of another length: centimetres")
 
 BASE_TILT_FACTS = Effect(
     "base_tilt",
@@ -21,6 +23,7 @@ BASE_TILT_FACTS = Effect(
     (Parameter("gravity", "m/s2"),),
     where="robot",
     prior_scale=0.5,
+    origin="geometry",
     experiment="measure the base with a level, or turn joint 1 through its full range",
 )
 ENCODER_OFFSET_FACTS = Effect(
@@ -28,13 +31,15 @@ ENCODER_OFFSET_FACTS = Effect(
     "a joint's zero at another place",
     (Parameter("offset", ANGLE),),
     prior_scale=0.05,
+    origin="geometry",
     experiment="check the joint's zero against its calibration mark",
 )
 GEOMETRY_ERROR_FACTS = Effect(
     "geometry_error",
     "a link of another length",
-    (Parameter("offset", "m"),),
+    (Parameter("offset", "m", plausible=LENGTH_ERRORS_SEEN),),
     prior_scale=0.02,
+    origin="geometry",
     experiment="calibrate the geometry with a measuring arm or a laser tracker",
 )
 

@@ -18,6 +18,7 @@ from armlab.effects.contract import (
     Effect,
     Family,
     Parameter,
+    Range,
     Scene,
     Value,
 )
@@ -32,6 +33,11 @@ from armlab.effects.friction import (
 )
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number, joint_moves, top_speed
 from problem.arm import Arm
+
+WARMING_TIMES_SEEN = Range(
+    (30.0, 2e4),
+    "windings of small motors warm in half a minute, gears in up to hours (Bittencourt and Gunnarsson 2012)",
+)
 
 PRESLIDING_FACTS = Effect(
     "presliding_hysteresis",
@@ -50,7 +56,7 @@ FRICTION_DRIFT_FACTS = Effect(
     (
         Parameter("initial", f"{TORQUE}.s/{ANGLE}", positive=True),
         Parameter("final", f"{TORQUE}.s/{ANGLE}", positive=True),
-        Parameter("time_constant", "s", positive=True),
+        Parameter("time_constant", "s", positive=True, plausible=WARMING_TIMES_SEEN),
     ),
     dissipates=True,
     contains=("coulomb_friction", "viscous_friction"),

@@ -7,7 +7,18 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import ANGLE, STIFFNESS, TORQUE, Candidate, Effect, Family, Parameter, Scene, Value
+from armlab.effects.contract import (
+    ANGLE,
+    HALF_CIRCLE,
+    STIFFNESS,
+    TORQUE,
+    Candidate,
+    Effect,
+    Family,
+    Parameter,
+    Scene,
+    Value,
+)
 from armlab.effects.term import (
     SIGN_SIGMAS,
     EveryJoint,
@@ -27,7 +38,7 @@ TORQUE_RIPPLE_FACTS = Effect(
     (
         Parameter("order", "1/rev", positive=True),
         Parameter("amplitude", TORQUE, positive=True),
-        Parameter("phase", "rad"),
+        Parameter("phase", "rad", max_width=HALF_CIRCLE),
     ),
     scanned=True,
     axis="cycle",
@@ -40,10 +51,11 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
         STIFFNESS,
         Parameter("rest", ANGLE),
         Parameter("amplitude", TORQUE),
-        Parameter("phase", "rad"),
+        Parameter("phase", "rad", max_width=HALF_CIRCLE),
     ),
     contains=("torque_offset",),
     axis="position",
+    origin="gravity and springs",
     experiment="record two payloads over the full range of the joint",
 )
 CABLE_STIFFNESS_FACTS = Effect(
@@ -52,6 +64,7 @@ CABLE_STIFFNESS_FACTS = Effect(
     (STIFFNESS, Parameter("rest", ANGLE)),
     contains=("torque_offset",),
     axis="position",
+    origin="gravity and springs",
     experiment="move the joint slowly over its full range in both directions",
 )
 

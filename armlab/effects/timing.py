@@ -10,26 +10,34 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.effects.contract import Candidate, Effect, Family, Parameter, Scene, Value
+from armlab.effects.contract import Candidate, Effect, Family, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import delay_signal, directional_derivative
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
 from problem.arm import Arm
 from problem.motion import Motion
 
+SHIFT = Parameter(
+    "seconds",
+    "s",
+    plausible=Range((0.0, 0.5), "torque follows its cause; buses, filters and logs take up to half a second"),
+    sampled=True,
+)
 TIME_DELAY_FACTS = Effect(
     "time_delay",
     "torque recorded later than the motion",
-    (Parameter("seconds", "s"),),
+    (SHIFT,),
     where="robot",
     at_most_beside={"channel_skew": 1},
     prior_scale=0.01,
+    origin="timing",
     experiment="record a multisine of high frequency: delay grows with frequency, viscous friction does not",
 )
 CHANNEL_SKEW_FACTS = Effect(
     "channel_skew",
     "one channel recorded later than the others",
-    (Parameter("seconds", "s"),),
+    (SHIFT,),
     prior_scale=0.01,
+    origin="timing",
     experiment="correlate the channels on a fast motion, or trigger them from one clock",
 )
 

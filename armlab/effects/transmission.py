@@ -14,26 +14,33 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects._drive_train import ffi, lib
-from armlab.effects.contract import ANGLE, STIFFNESS, Candidate, Effect, Parameter, Scene, Value
+from armlab.effects.contract import ANGLE, TORQUE, Candidate, Effect, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import directional_derivative, joint_displacement
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
 from problem.arm import Arm
 from problem.kernel import pointer
 from problem.motion import Motion
 
+DRIVE_TRAINS_SEEN = Range(
+    (20.0, 2e7), "10 to 20 kN m/rad on small arms; servos of toys a thousandth, heavy arms a thousand times"
+)
+GAPS_SEEN = Range((1e-5, 0.03), "catalogues of gears: some arc seconds to an arc minute, servos of toys one degree")
+
 JOINT_ELASTICITY_FACTS = Effect(
     "joint_elasticity",
     "a spring in the drive train",
-    (STIFFNESS,),
+    (Parameter("stiffness", f"{TORQUE}/{ANGLE}", positive=True, plausible=DRIVE_TRAINS_SEEN),),
     prior_scale=1e-3,
+    origin="transmission",
     experiment="excite the joint with a chirp past its resonance, or read an encoder on the link side",
 )
 BACKLASH_FACTS = Effect(
     "backlash",
     "a dead zone in the drive train",
-    (Parameter("gap", ANGLE, positive=True),),
+    (Parameter("gap", ANGLE, positive=True, plausible=GAPS_SEEN),),
     prior_scale=0.01,
     axis="position",
+    origin="transmission",
     experiment="let the load change its sign slowly, or read an encoder on the link side",
 )
 

@@ -238,7 +238,7 @@ class Drift(HiddenEffect):
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
         """Time constants of seconds stand in for the minutes of real grease."""
-        shape = {"final": float(rng.uniform(0.5, 2.0)), "time_constant": float(rng.uniform(3, 8))}
+        shape = {"final": float(rng.uniform(0.5, 2.0)), "time_constant": float(rng.uniform(30, 90))}
         fall = torque_share(0.02, machine, joint)
         return cls(joint, fall, 6 * fall, cls.draw_form(rng), shape)
 

@@ -10,9 +10,8 @@ from typing import Literal
 import numpy as np
 
 from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.found_model import model_found
+from armlab.diagnosis.found_model import model_found, named_model
 from armlab.diagnosis.real_arms.judged_run import JudgedRun, Percent, common_cutoff, judged_run
-from armlab.diagnosis.real_arms.named_model import named_model
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline
 from armlab.effects.drive import RotorInertia

@@ -20,6 +20,7 @@ from armlab.diagnosis.report.words import (
     verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.story import story_sentence, tell_story
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 
@@ -153,7 +154,27 @@ def verdict_section(diagnosis: Diagnosis) -> str:
     there = {name: title for name, title in SECTION_TITLES.items() if name != "where" or diagnosis.located}
     links = "".join(f'<a href="#{name}">{escape(title)}</a>' for name, title in there.items())
     title = f"Diagnosis of {diagnosis.recording.name}"
-    return page_header(title, diagnosis.status, *verdict_sentences(diagnosis), links if diagnosis.fit else "")
+    header = page_header(title, diagnosis.status, *verdict_sentences(diagnosis), links if diagnosis.fit else "")
+    return header + story_section(diagnosis)
+
+
+def story_section(diagnosis: Diagnosis) -> str:
+    """The causes of the error in a sentence, and each with its findings; empty without findings."""
+    chapters = tell_story(diagnosis)
+    if not chapters:
+        return ""
+    rows = []
+    for each in chapters:
+        names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
+        joints = ", ".join(str(joint) for joint in each.joints) or "all"
+        rows.append([each.cause, joints, f"{100 * each.share:.1f} %", join_words(list(names))])
+    text = (
+        "Share of the error: of the squared held-out error of all joints, each in units of its torque, from the model "
+        "without findings down to the noise; causes are added in the order of their size."
+    )
+    table = html_table(["cause", "at", "share", "findings"], rows, (0, 1, 3))
+    sentence = story_sentence(chapters, len(diagnosis.simulation.arm))
+    return section("story", "In short", paragraph(sentence), table, paragraph(text, "pale"))
 
 
 def page_header(title: str, status: str, first: str, second: str, links: str = "") -> str:

@@ -1,0 +1,162 @@
+"""Findings whose numbers no engineer believes, or that say nothing: no names, with the reason in the log.
+
+What an effect's parameters are on arms stands on the effect (`Parameter.plausible`, with its source). A law that fits
+with other numbers stands for structure that the library lacks, unless the evidence is overwhelming. An interval that
+holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from armlab.diagnosis.data import Observed
+from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.intervals import extend_with_shapes
+from armlab.diagnosis.prediction import Prediction
+from armlab.diagnosis.pruning import Pruned, withdraw
+from armlab.diagnosis.search import Step
+from armlab.diagnosis.tuning import PlausibilityTuning
+from armlab.effects.contract import Candidate, Kind, Parameter
+from armlab.effects.parameters import ParameterValue, parameter_values
+
+
+def withdraw_implausible(pruned: Pruned) -> Pruned:
+    """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
+    ones: usual friction takes their place.
+
+    Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept without
+    the guard `physics_signs`.
+    """
+    while doubts := _doubtful_friction(pruned[0], pruned[1]):
+        model, effects, _ = pruned
+        weakest = min(doubts, key=lambda group: (effects[group].usual, effects[group].score))
+        pruned = withdraw(model, frozenset({weakest}), doubts[weakest])
+    return pruned
+
+
+def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
+    facts = {group: model.solver.groups[group].candidate.facts for group in effects}
+    doubts = doubtful_names(model, effects)
+    return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
+
+
+def unclaim_implausible(
+    model: FittedModel, prediction: Prediction, effects: dict[int, Evidence]
+) -> tuple[FittedModel, dict[int, Evidence]]:
+    """The effects (by group of `model`) whose numbers in the model that predicts can be believed; the log says why not.
+
+    The others stay in that model as present, not claimed.
+    """
+    places = {prediction.named[group]: group for group in effects}
+    doubts = doubtful_names(prediction.model, {place: effects[group] for place, group in places.items()})
+    steps = list(model.steps)
+    for place, why in doubts.items():
+        candidate = prediction.model.solver.groups[place].candidate
+        steps.append(Step(f"present, not claimed: {candidate.effect} {candidate.joint}: {why}", 0.0))
+    kept = {group: effects[group] for place, group in places.items() if place not in doubts}
+    return replace(model, steps=tuple(steps)), kept
+
+
+def doubtful_names(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
+    """Why the numbers of a name cannot be believed, for each group of which that is so."""
+    if not effects or not model.design.settings.guards.physics_signs:
+        return {}
+    wide, observed = extend_with_shapes(model), model.design.observed
+    tuning = model.design.settings.tuning.plausibility
+    out = {}
+    for group, evidence in effects.items():
+        coefficients = model.solver.values(model.fit, group)
+        candidate = model.solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
+        values = parameter_values(candidate, coefficients, wide.covariance(group), wide.factor)
+        known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
+        reason = reason_implausible(candidate, values, observed, known=known, tuning=tuning)
+        if reason is not None:
+            out[group] = reason
+    return out
+
+
+def reason_implausible(
+    candidate: Candidate,
+    values: tuple[ParameterValue, ...],
+    observed: Observed,
+    *,
+    known: bool,
+    tuning: PlausibilityTuning,
+) -> str | None:
+    """Why these parameters are not believed, in a few words; None where they are.
+
+    known: whether the evidence is overwhelming, so that a parameter may be outside its plausible range.
+    """
+    facts = {each.name: each for each in candidate.facts.parameters}
+    kind: Kind = getattr(candidate, "kind", "revolute")
+    for each in values:
+        parameter = facts.get(each.name)
+        if parameter is None or isinstance(each.value, tuple):
+            continue
+        reason = _reason_below_sampling(parameter, each.value, observed)
+        reason = reason or _reason_unknown(parameter, each, tuning)
+        reason = reason or (None if known else _reason_out_of_range(parameter, each, kind))
+        if candidate.facts.axis == "cycle" and each.name == "order":
+            reason = reason or _reason_order_unknown(each, _travel(candidate, observed), tuning)
+        if reason is not None:
+            return reason
+    return None
+
+
+def _reason_below_sampling(parameter: Parameter, value: float, observed: Observed) -> str | None:
+    interval = max(1 / each.run.rate_hz for each in observed.signals)
+    if not parameter.sampled or abs(value) >= interval:
+        return None
+    return f"{parameter.name} {value:.3g}: less than one sampling interval ({interval:.3g} s) is how a log is made"
+
+
+def _reason_unknown(parameter: Parameter, each: ParameterValue, tuning: PlausibilityTuning) -> str | None:
+    """An interval that holds zero, spans orders of magnitude or is too wide for its parameter."""
+    if parameter.detail:
+        return None
+    ends = _interval(each)
+    if ends is None:
+        return f"{each.name} is not determined" if parameter.positive else None
+    low, high = ends
+    shown = f"{each.name} is between {low:.3g} and {high:.3g} {each.unit}"
+    if high - low > parameter.max_width:
+        return f"{shown}: wider than {parameter.max_width:.3g} says nothing"
+    if parameter.positive and low <= 0:
+        return f"{shown}: it may be zero"
+    if parameter.positive and high > tuning.max_interval_ratio * low:
+        return f"{shown}: not even its order of magnitude is known"
+    return None
+
+
+def _reason_out_of_range(parameter: Parameter, each: ParameterValue, kind: Kind) -> str | None:
+    """A parameter whose whole interval is outside what arms have."""
+    if parameter.plausible is None or isinstance(each.value, tuple):
+        return None
+    lowest, highest = parameter.plausible.limits(kind)
+    low, high = _interval(each) or (each.value, each.value)
+    if high >= lowest and low <= highest:
+        return None
+    usual = f"{lowest:.3g} to {highest:.3g} {each.unit} ({parameter.plausible.source})"
+    return f"{each.name} {each.value:.3g} {each.unit} is not plausible: {usual}"
+
+
+def _reason_order_unknown(each: ParameterValue, travel: float, tuning: PlausibilityTuning) -> str | None:
+    """An order that leaves the wave open over the travel, rad (m)."""
+    ends = _interval(each)
+    cycles = np.inf if ends is None else (ends[1] - ends[0]) / 2 * travel / (2 * np.pi)
+    if cycles <= tuning.max_order_error:
+        return None
+    return f"{each.name} is known to {cycles:.2g} cycles over the travel of the joint"
+
+
+def _travel(candidate: Candidate, observed: Observed) -> float:
+    return float(np.ptp(observed.kept("position")[:, candidate.rows[0]]))
+
+
+def _interval(each: ParameterValue) -> tuple[float, float] | None:
+    """The interval of a scalar parameter."""
+    if each.interval is None or isinstance(each.value, tuple):
+        return None
+    low, high = each.interval
+    return (float(low), float(high)) if not isinstance(low, tuple) and not isinstance(high, tuple) else None

@@ -1,0 +1,146 @@
+"""The story of a verdict: findings grouped by cause, largest first, with the share of the error that each explains.
+
+The error is the squared held-out error over all joints, each in units of its own torque. It falls from the model found
+without the torque of any finding to the model found. The torques of the causes are added one after the other, each time
+the one with which the error falls most, so that the shares sum to at most one; within a cause its findings are added in
+the same way. A share is of the gap between the start and the noise floor. What a surrogate predicts has the cause
+`unknown`: it is not named physics.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.data import rows_in
+from armlab.diagnosis.result import Diagnosis
+from armlab.effects.contract import Cause
+from armlab.effects.library import effect_named
+
+K = TypeVar("K")
+MAX_WORDS = 30  # of the sentence that tells a story
+MIN_TOLD_SHARE = 0.01  # of the gap: less is not in that sentence
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """Findings with one cause. findings: their places among the claims, from 0. share: of the gap."""
+
+    cause: Cause
+    joints: tuple[int, ...]
+    share: float
+    findings: tuple[int, ...]
+
+
+def with_story(diagnosis: Diagnosis) -> Diagnosis:
+    """The diagnosis, its summary beginning with the story in a sentence."""
+    chapters = tell_story(diagnosis)
+    if not chapters:
+        return diagnosis
+    sentence = story_sentence(chapters, len(diagnosis.simulation.arm))
+    return replace(diagnosis, summary=f"{sentence} {diagnosis.summary}")
+
+
+def tell_story(diagnosis: Diagnosis) -> tuple[Chapter, ...]:
+    """The causes of a diagnosis, the one with the largest share first."""
+    shares = [share or 0.0 for share in finding_shares(diagnosis)]
+    chapters = [
+        Chapter(
+            cause,
+            tuple(sorted({joint for place in own for joint in _joints(diagnosis, place)})),
+            float(sum(shares[place] for place in own)),
+            own,
+        )
+        for cause, own in _places_by_cause(diagnosis).items()
+    ]
+    return tuple(sorted(chapters, key=lambda each: -each.share))
+
+
+def finding_shares(diagnosis: Diagnosis) -> tuple[float | None, ...]:
+    """The share of the gap that each finding explains; None where there is no gap to measure it by."""
+    observed, final, claims = diagnosis.observed, diagnosis.final, diagnosis.claims
+    if observed is None or final is None or not claims:
+        return (None,) * len(claims)
+    held_out = [rows_in(observed.of_role("validate", joint), observed.rows) for joint in range(observed.joints)]
+    torque = observed.torque
+    scales = [max(float(np.mean(torque[rows, joint] ** 2)), 1e-300) for joint, rows in enumerate(held_out)]
+
+    def stacked(values: Array) -> Array:
+        """Held-out rows of all joints, each joint's mean square in units of its torque's."""
+        units = [np.sqrt(scale * max(int(rows.sum()), 1)) for scale, rows in zip(scales, held_out, strict=True)]
+        return np.concatenate([values[rows, joint] / units[joint] for joint, rows in enumerate(held_out)])
+
+    torques = [stacked(claim.prediction) for claim in claims]
+    left = stacked(final)
+    floor = sum(each.noise_floor**2 / scale for each, scale in zip(diagnosis.fit, scales, strict=True))
+    start = left + np.sum(torques, axis=0)
+    gap = float(start @ start) - min(float(floor), float(left @ left))
+    if gap <= 0:
+        return (None,) * len(claims)
+    causes = _places_by_cause(diagnosis)
+    out = [0.0] * len(claims)
+    remaining = start
+    sums = {cause: np.sum([torques[each] for each in own], axis=0) for cause, own in causes.items()}
+    for cause in add_in_order(start, sums):
+        own_torques = {place: torques[place] for place in causes[cause]}
+        for place, fall in add_in_order(remaining, own_torques).items():
+            out[place] = fall / gap
+        remaining = remaining - np.sum(list(own_torques.values()), axis=0)
+    total = max(sum(max(each, 0.0) for each in out), 1.0)
+    return tuple(max(each, 0.0) / total for each in out)
+
+
+def add_in_order(start: Array, torques: Mapping[K, Array]) -> dict[K, float]:
+    """How much the squared error falls with each torque, added to those with which it falls more."""
+    left, waiting, out = start, dict(torques), dict[K, float]()
+    while waiting:
+        falls = {key: float(left @ left - (left - torque) @ (left - torque)) for key, torque in waiting.items()}
+        best = max(falls, key=lambda key: falls[key])
+        out[best] = falls[best]
+        left = left - waiting.pop(best)
+    return out
+
+
+def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
+    """The causes with their shares in one sentence of at most MAX_WORDS words."""
+    first, *others = chapters
+    sentence = f"{_cause_in_words(first, joints)} explains {100 * first.share:.0f} % of the error"
+    for each in others:
+        longer = f"{sentence}; {_cause_in_words(each, joints).lower()} ({100 * each.share:.0f} %)"
+        if each.share < MIN_TOLD_SHARE or len(longer.split()) > MAX_WORDS:
+            break
+        sentence = longer
+    return f"{sentence}."
+
+
+def _cause_in_words(each: Chapter, joints: int) -> str:
+    name = {"unknown": "Structure without a name", "links": "What the links are off"}.get(each.cause)
+    name = name or each.cause.capitalize()
+    if not each.joints or each.cause == "links":
+        return name
+    if len(each.joints) == joints > 1:
+        return f"{name} on all {joints} joints"
+    plural = "s" if len(each.joints) > 1 else ""
+    return f"{name} on joint{plural} {_join_numbers(each.joints)}"
+
+
+def _join_numbers(numbers: Sequence[int]) -> str:
+    """`1, 2 and 4` of numbers."""
+    *others, last = [str(each) for each in numbers]
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _places_by_cause(diagnosis: Diagnosis) -> dict[Cause, tuple[int, ...]]:
+    out: dict[Cause, tuple[int, ...]] = {}
+    for place, claim in enumerate(diagnosis.claims):
+        cause = (effect_named(claim.effect) if claim.candidate is None else claim.candidate.facts).cause
+        out[cause] = (*out.get(cause, ()), place)
+    return out
+
+
+def _joints(diagnosis: Diagnosis, place: int) -> tuple[int, ...]:
+    """The joint or link of a finding; none for the whole robot."""
+    joint = diagnosis.claims[place].joint
+    return () if joint is None else (joint,)

@@ -1,0 +1,77 @@
+"""Numbers that no engineer believes, and intervals that say nothing, are no findings."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.plausibility import reason_implausible
+from armlab.diagnosis.tuning import PlausibilityTuning
+from armlab.effects.contract import Candidate
+from armlab.effects.friction import ViscousFriction
+from armlab.effects.memory import ViscousDrift
+from armlab.effects.parameters import Interval, ParameterValue
+from armlab.effects.springs import TorqueRipple
+from armlab.effects.timing import TimeDelay, TorqueSkew
+from problem.robot_file import load_arm
+
+ARM = load_arm("staubli-tx40")
+
+
+@dataclass(frozen=True)
+class RunStandIn:
+    rate_hz: float = 1000.0
+
+
+@dataclass(frozen=True)
+class SignalsStandIn:
+    run: RunStandIn = RunStandIn()
+
+
+@dataclass(frozen=True)
+class ObservedStandIn:
+    """A recording at 1 kHz whose joints travel 2 rad."""
+
+    signals: tuple[SignalsStandIn, ...] = (SignalsStandIn(),)
+    positions: Array = field(default_factory=lambda: np.array([[0.0] * 6, [2.0] * 6]))
+
+    def kept(self, signal: str) -> Array:
+        return self.positions
+
+
+def reason(candidate: Candidate, *values: tuple[str, float, Interval], known: bool = False) -> str | None:
+    named = tuple(ParameterValue(name, value, interval, "") for name, value, interval in values)
+    return reason_implausible(candidate, named, ObservedStandIn(), known=known, tuning=PlausibilityTuning())  # type: ignore[arg-type]
+
+
+def test_a_coefficient_that_may_be_zero_is_no_finding() -> None:
+    assert "may be zero" in str(reason(ViscousFriction.at(ARM, 1), ("coefficient", 0.9, (-0.45, 2.24))))
+
+
+def test_a_coefficient_that_is_known_is_a_finding() -> None:
+    assert reason(ViscousFriction.at(ARM, 1), ("coefficient", 0.9, (0.7, 1.1))) is None
+
+
+def test_friction_does_not_warm_within_seconds_unless_the_evidence_is_overwhelming() -> None:
+    drift = ViscousDrift.at(ARM, 1, shape=(3.0,))
+    assert "not plausible" in str(reason(drift, ("time_constant", 3.0, (2.0, 4.0))))
+    assert reason(drift, ("time_constant", 3.0, (2.0, 4.0)), known=True) is None
+    assert reason(drift, ("time_constant", 600.0, (400.0, 800.0))) is None
+
+
+@pytest.mark.parametrize("shift", [TimeDelay.at(ARM, 1), TorqueSkew.at(ARM, 2)])
+def test_a_shift_below_one_sampling_interval_is_never_a_finding(shift: Candidate) -> None:
+    assert "sampling interval" in str(reason(shift, ("seconds", 0.0006, (0.0005, 0.0007)), known=True))
+    assert reason(shift, ("seconds", 0.004, (0.003, 0.005))) is None
+
+
+def test_torque_that_leads_needs_overwhelming_evidence() -> None:
+    assert "not plausible" in str(reason(TimeDelay.at(ARM, 1), ("seconds", -0.006, (-0.007, -0.005))))
+
+
+def test_a_wave_of_unknown_order_or_phase_is_no_finding() -> None:
+    ripple = TorqueRipple.at(ARM, 1, shape=(30.0,))
+    assert "wider" in str(reason(ripple, ("order", 30.0, (29.9, 30.1)), ("phase", 0.0, (-3.0, 3.0))))
+    assert "cycles" in str(reason(ripple, ("order", 8.6, (6.0, 11.2)), ("phase", 0.0, (-0.1, 0.1))))
+    assert reason(ripple, ("order", 30.0, (29.9, 30.1)), ("phase", 0.0, (-0.1, 0.1))) is None
