@@ -25,8 +25,8 @@ def withdraw_implausible(pruned: Pruned) -> Pruned:
     """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
     ones: usual friction takes their place.
 
-    Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept without
-    the guard `physics_signs`.
+    Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept
+    without the guard `physics_signs`.
     """
     while doubts := _doubtful_friction(pruned[0], pruned[1]):
         model, effects, _ = pruned

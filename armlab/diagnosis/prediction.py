@@ -29,7 +29,7 @@ from armlab.effects.contract import Candidate
 from armlab.effects.scene import scene_of
 from armlab.identification.regression import suggested_cutoff
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Run
+from armlab.recordings.recording import Role, Run
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def fit_prediction(named: FittedModel) -> Prediction:
     error = best.held_out(best.begin)
     for cutoff in _lower_cutoffs(named, tuning):
         design = _design_at(named, candidates, cutoff)
-        if _has_rows(design.observed, tuning):
+        if _has_rows(design.observed):
             best, error = _better(best, error, _Trial.of(design, start, named.state, None), tuning)
     best, error = _better(best, error, best.with_noise(_alike(best.model.noise)), tuning)
     state = best.improve(tuning)
@@ -69,14 +69,10 @@ def fit_prediction(named: FittedModel) -> Prediction:
     return Prediction(model, places, best.held_out(state))
 
 
-def _has_rows(observed: Observed, tuning: PredictionTuning) -> bool:
-    """Whether rows in motion are left on every joint for each block that is held out, and some that validate."""
-    return all(
-        sum(part.stop - part.start for part in observed.of_role("identify", joint))
-        >= tuning.folds * observed.min_segment_rows
-        and observed.of_role("validate", joint)
-        for joint in range(observed.joints)
-    )
+def _has_rows(observed: Observed) -> bool:
+    """Whether every joint has stretches in motion that identify, and some that validate."""
+    roles: tuple[Role, ...] = ("identify", "validate")
+    return all(observed.of_role(role, joint) for role in roles for joint in range(observed.joints))
 
 
 def _better(best: "_Trial", error: float, other: "_Trial", tuning: PredictionTuning) -> tuple["_Trial", float]:
@@ -243,23 +239,22 @@ class _Trial:
         """||tau - tau_hat|| / ||tau|| over all joints on the folds held out in turn."""
         return float(np.sqrt(np.sum(self.errors(state)) / np.sum(self.power)))
 
-    def _scores(self, state: State) -> Array:
-        """Sum of the logarithms of the joints' errors on each fold, (folds,): a small joint counts as a large one."""
-        return np.asarray(0.5 * np.sum(np.log(np.maximum(self.errors(state), 1e-300)), axis=1))
+    def _score(self, state: State) -> float:
+        """Sum of the logarithms of the joints' errors, mean of the folds: a small joint counts as much as a large one."""
+        return float(0.5 * np.mean(np.sum(np.log(np.maximum(self.errors(state), 1e-300)), axis=1)))
 
     def improve(self, tuning: PredictionTuning) -> State:
-        """The best of the changes, one after the other, until none lowers the errors enough, and surely enough."""
-        state, scores = self.begin, self._scores(self.begin)
+        """The best of the changes, one after the other, until none lowers the errors enough."""
+        state, score = self.begin, self._score(self.begin)
         search = Search(self.model.solver, self.model.design.settings, True, 0)
         absurd = {group for group in state.groups if search.objection(state, group) is not None}
         for _ in range(tuning.max_changes):
-            changes = [(scores - self._scores(other), other) for other in self._changes(search, state)]
-            worth = [each for each in changes if _is_sure(each[0], tuning)]
-            worth.sort(key=lambda each: -float(np.mean(each[0])))
-            better = next((each for each in worth if self._is_physical(search, each[1], absurd)), None)
+            scored = [(self._score(other), other) for other in self._changes(search, state)]
+            lower = sorted((each for each in scored if each[0] < score - tuning.min_gain), key=lambda each: each[0])
+            better = next((each for each in lower if self._is_physical(search, each[1], absurd)), None)
             if better is None:
                 break
-            scores, state = scores - better[0], better[1]
+            score, state = better
         return state
 
     @staticmethod
@@ -276,12 +271,6 @@ class _Trial:
                 other = search.in_place(state, group)
                 if set(self.names) <= set(other.groups):
                     yield other
-
-
-def _is_sure(gains: Array, tuning: PredictionTuning) -> bool:
-    """Whether gains (folds,) are large, and larger than their scatter between folds would make them."""
-    error = float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
-    return bool(np.mean(gains) > max(tuning.min_gain, tuning.min_standard_errors * error))
 
 
 def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None) -> FittedModel:
