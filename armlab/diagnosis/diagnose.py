@@ -29,7 +29,7 @@ from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
-from armlab.diagnosis.plausibility import unclaim_implausible, withdraw_implausible
+from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
 from armlab.diagnosis.prediction import Prediction, choose_smoothing, filtered_residual, fit_prediction
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
@@ -102,7 +102,7 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
-    claims = make_claims(model, effects, named.links, prediction)
+    claims = links_that_data_tell(make_claims(model, effects, named.links, prediction))
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
     return with_story(_assemble(recording, model, prediction, claims, unknowns, remains))
 

@@ -5,6 +5,7 @@ with other numbers stands for structure that the library lacks, unless the evide
 holds zero, several orders of magnitude or a whole circle is no knowledge of a parameter.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import extend_with_shapes
 from armlab.diagnosis.prediction import Prediction
 from armlab.diagnosis.pruning import Pruned, withdraw
+from armlab.diagnosis.result import Claim
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
@@ -68,12 +70,26 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence]) -> dict[int
     for group, evidence in effects.items():
         coefficients = model.solver.values(model.fit, group)
         candidate = model.solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
-        values = parameter_values(candidate, coefficients, wide.covariance(group), wide.factor)
+        covariance = wide.covariance(group)
+        values = parameter_values(candidate, coefficients, covariance, wide.factor)
         known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
         reason = reason_implausible(candidate, values, observed, known=known, tuning=tuning)
+        if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
+            reason = reason or "its size may be zero"
         if reason is not None:
             out[group] = reason
     return out
+
+
+def links_that_data_tell(claims: Sequence[Claim]) -> tuple[Claim, ...]:
+    """The claims without those on a link of which no parameter differs from zero: these data do not tell of it."""
+    return tuple(each for each in claims if not each.in_links or _differs_from_zero(each))
+
+
+def _differs_from_zero(claim: Claim) -> bool:
+    intervals = [each.interval for each in claim.parameters if each.interval is not None]
+    ends = np.concatenate([np.reshape(each, (-1, 2)) for each in intervals]) if intervals else np.empty((0, 2))
+    return bool(np.any((ends[:, 0] > 0) | (ends[:, 1] < 0)))
 
 
 def reason_implausible(

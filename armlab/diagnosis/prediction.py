@@ -60,9 +60,12 @@ def fit_prediction(named: FittedModel) -> Prediction:
     error = best.held_out(best.begin)
     for cutoff in _lower_cutoffs(named, tuning):
         design = _design_at(named, candidates, cutoff)
-        if _has_rows(design.observed):
-            best, error = _better(best, error, _Trial.of(design, start, named.state, None), tuning)
-    best, error = _better(best, error, best.with_noise(_alike(best.model.noise)), tuning)
+        if not _has_rows(design.observed):
+            continue
+        trial = _Trial.of(design, start, named.state, None)
+        changed = trial.held_out(trial.begin)
+        if changed < (1 - tuning.min_cutoff_gain) * error:
+            best, error = trial, changed
     state = best.improve(tuning)
     model = replace(best.model, state=state)
     places = {group: place for place, group in enumerate(own) if place in state.groups}
@@ -73,20 +76,6 @@ def _has_rows(observed: Observed) -> bool:
     """Whether every joint has stretches in motion that identify, and some that validate."""
     roles: tuple[Role, ...] = ("identify", "validate")
     return all(observed.of_role(role, joint) for role in roles for joint in range(observed.joints))
-
-
-def _better(best: "_Trial", error: float, other: "_Trial", tuning: PredictionTuning) -> tuple["_Trial", float]:
-    """The other trial with its held-out error where that is lower by enough."""
-    changed = other.held_out(other.begin)
-    return (other, changed) if changed < (1 - tuning.min_cutoff_gain) * error else (best, error)
-
-
-def _alike(noise: Noise) -> Noise:
-    """White noise of one size on all joints: each newton metre counts the same."""
-    scale = float(np.sqrt(np.mean(np.square(noise.scales))))
-    ratios = [scale / each for each in noise.scales]
-    resting = tuple(rest * ratio for rest, ratio in zip(noise.resting, ratios, strict=True))
-    return Noise(tuple(np.ones(1) for _ in noise.taps), (scale,) * len(noise.scales), resting)
 
 
 def _lower_cutoffs(model: FittedModel, tuning: PredictionTuning) -> list[float]:
@@ -141,10 +130,6 @@ class _Trial:
     begin: State
     rows: WhitenedRows
     recorded: WhitenedRows
-
-    def with_noise(self, noise: Noise) -> "_Trial":
-        """The same columns under another noise."""
-        return _Trial.of(self.model.design, self.names, self.begin, noise)
 
     @classmethod
     def of(cls, design: DesignMatrix, names: tuple[int, ...], state: State, noise: Noise | None) -> "_Trial":
@@ -240,7 +225,7 @@ class _Trial:
         return float(np.sqrt(np.sum(self.errors(state)) / np.sum(self.power)))
 
     def _score(self, state: State) -> float:
-        """Sum of the logarithms of the joints' errors, mean of the folds: a small joint counts as much as a large one."""
+        """Sum of the logarithms of the joints' errors, mean of the folds: a small joint counts as a large one."""
         return float(0.5 * np.mean(np.sum(np.log(np.maximum(self.errors(state), 1e-300)), axis=1)))
 
     def improve(self, tuning: PredictionTuning) -> State:

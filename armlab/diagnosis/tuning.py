@@ -261,7 +261,7 @@ class PredictionTuning:
     min_cutoff_gain: float = tuned(
         0.02,
         unit="of the held-out error",
-        meaning="another cut-off or weighting of the joints has to lower the error by more",
+        meaning="another cut-off has to lower the error by more",
         most=1.0,
     )
     min_gain: float = tuned(
