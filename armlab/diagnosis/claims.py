@@ -25,11 +25,11 @@ def make_claims(
 ) -> tuple[Claim, ...]:
     """All claims of a model, the strongest first.
 
-    Names, evidence and rivals are of the model on which they were tested; numbers are of the model that predicts.
+    Numbers are of the model on which the names were tested: beside parts that are only present they are less sure.
     """
     if not effects and not links:
         return ()
-    wide = extend_with_shapes(prediction.model)
+    wide = extend_with_shapes(model)
     claims = [_effect_claim(model, wide, group, prediction.named[group], each) for group, each in effects.items()]
     claims += _link_claims(model, wide, links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
@@ -62,8 +62,7 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     """group: of the model; place: of the same law in the model that predicts."""
     solver = model.solver
     columns = solver.groups[group].columns
-    coefficients = wide.model.solver.values(wide.model.fit, place)
-    covariance = wide.covariance(place)
+    coefficients, covariance = solver.values(model.fit, group), wide.covariance(group)
     candidate = solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
     own = np.zeros(model.moments.size)
     own[columns] = coefficients

@@ -37,7 +37,7 @@ from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.story import with_story
-from armlab.diagnosis.summary import summarise
+from armlab.diagnosis.summary import describe_unnamed, summarise, unnamed_gain
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import changed_numbers
 from armlab.diagnosis.unknown import (
@@ -97,7 +97,7 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     named = name_effects(prefer_one_body(find_friction_curves(prune(searched))))
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
-    model, effects = unclaim_implausible(named.model, prediction, named.effects)
+    model, effects = unclaim_implausible(named.model, named.effects)
     tuning = model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
@@ -165,13 +165,14 @@ def _assemble(
         noise[:, each.joint] -= each.prediction
     floor = noise_floor(noise, design.features, observed, tuning.surrogate)
     fits = joint_fits(refit, found, alone, floor, observed, tuning)
-    status: Status = "mismatch" if claims else "none"
+    hidden = unnamed_gain(fits, tuning.claims) if not claims else None
+    status: Status = "mismatch" if claims else "none" if hidden is None else "inconclusive"
     base, covariance = prediction.model.base_parameters()
     return Diagnosis(
         recording=recording,
         simulation=simulation,
         status=status,
-        summary=summarise(status, claims, fits),
+        summary=summarise(status, claims, fits) if hidden is None else describe_unnamed(hidden, found),
         observed=observed,
         nominal=design.target,
         refit=refit,

@@ -14,7 +14,6 @@ from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import extend_with_shapes
-from armlab.diagnosis.prediction import Prediction
 from armlab.diagnosis.pruning import Pruned, withdraw
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.search import Step
@@ -43,21 +42,14 @@ def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict
     return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
 
 
-def unclaim_implausible(
-    model: FittedModel, prediction: Prediction, effects: dict[int, Evidence]
-) -> tuple[FittedModel, dict[int, Evidence]]:
-    """The effects (by group of `model`) whose numbers in the model that predicts can be believed; the log says why not.
-
-    The others stay in that model as present, not claimed.
-    """
-    places = {prediction.named[group]: group for group in effects}
-    doubts = doubtful_names(prediction.model, {place: effects[group] for place, group in places.items()})
+def unclaim_implausible(model: FittedModel, effects: dict[int, Evidence]) -> tuple[FittedModel, dict[int, Evidence]]:
+    """The effects whose numbers can be believed; the log says why not. The others stay as present, not claimed."""
+    doubts = doubtful_names(model, effects)
     steps = list(model.steps)
-    for place, why in doubts.items():
-        candidate = prediction.model.solver.groups[place].candidate
+    for group, why in doubts.items():
+        candidate = model.solver.groups[group].candidate
         steps.append(Step(f"present, not claimed: {candidate.effect} {candidate.joint}: {why}", 0.0))
-    kept = {group: effects[group] for place, group in places.items() if place not in doubts}
-    return replace(model, steps=tuple(steps)), kept
+    return replace(model, steps=tuple(steps)), {group: each for group, each in effects.items() if group not in doubts}
 
 
 def doubtful_names(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:

@@ -56,13 +56,14 @@ def fit_prediction(named: FittedModel) -> Prediction:
     numbers = (*own, *more)
     candidates = [groups[number].candidate for number in numbers]
     start = tuple(range(len(own)))
-    best = _Trial.of(_smaller_design(named, numbers), start, named.state, named.noise)
+    designs = [_smaller_design(named, numbers)]
+    designs += [_design_at(named, candidates, cutoff) for cutoff in _lower_cutoffs(named, tuning)]
+    designs = [each for each in designs if _has_rows(each.observed)]
+    spans = [_common_span([_span(each.observed, run) for each in designs]) for run in range(len(named.design.scenes))]
+    best = _Trial.of(designs[0], start, named.state, named.noise, spans)
     error = best.held_out(best.begin)
-    for cutoff in _lower_cutoffs(named, tuning):
-        design = _design_at(named, candidates, cutoff)
-        if not _has_rows(design.observed):
-            continue
-        trial = _Trial.of(design, start, named.state, None)
+    for design in designs[1:]:
+        trial = _Trial.of(design, start, named.state, None, spans)
         changed = trial.held_out(trial.begin)
         if changed < (1 - tuning.min_cutoff_gain) * error:
             best, error = trial, changed
@@ -70,6 +71,16 @@ def fit_prediction(named: FittedModel) -> Prediction:
     model = replace(best.model, state=state)
     places = {group: place for place, group in enumerate(own) if place in state.groups}
     return Prediction(model, places, best.held_out(state))
+
+
+def _span(observed: Observed, run: int) -> tuple[float, float]:
+    """First and last stamp of the kept rows of a run, s: a lower cut-off loses more at the ends."""
+    time = observed.signals[run].time
+    return float(time[0]), float(time[-1])
+
+
+def _common_span(spans: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    return max(first for first, _ in spans), min(last for _, last in spans)
 
 
 def _has_rows(observed: Observed) -> bool:
@@ -122,7 +133,8 @@ def _recorded_columns(design: DesignMatrix) -> Columns:
 class _Trial:
     """A design on which structures are compared. begin: named effects and the usual ones of every joint.
 
-    rows, recorded: of all columns, whitened and as recorded, the identification rows of each joint.
+    rows, recorded: of all columns, whitened and as recorded, the identification rows of each joint. judged: which of
+    the recorded rows judge: those that every cut-off has.
     """
 
     model: FittedModel
@@ -130,10 +142,21 @@ class _Trial:
     begin: State
     rows: WhitenedRows
     recorded: WhitenedRows
+    judged: tuple[NDArray[np.bool_], ...]
 
     @classmethod
-    def of(cls, design: DesignMatrix, names: tuple[int, ...], state: State, noise: Noise | None) -> "_Trial":
-        """noise: white with the scatter that the named and usual effects leave, where it is left out."""
+    def of(
+        cls,
+        design: DesignMatrix,
+        names: tuple[int, ...],
+        state: State,
+        noise: Noise | None,
+        spans: Sequence[tuple[float, float]],
+    ) -> "_Trial":
+        """noise: white with the scatter that the named and usual effects leave, where it is left out.
+
+        spans: of the stamps of each run, s, within which rows judge.
+        """
         if noise is None:
             plain = fit_noise(design.target, design.observed, 0.0, design.settings.tuning.noise, colour=False)
             first = _fitted(design, plain, state.widths)
@@ -142,16 +165,17 @@ class _Trial:
             noise = fit_noise(left, design.observed, 0.0, design.settings.tuning.noise, colour=False)
         model = _fitted(design, noise, state.widths)
         everything = model.solver.fit(State(tuple(range(len(model.solver.groups))), state.widths))
-        unit = Noise(
-            tuple(np.ones(1) for _ in noise.taps),
-            tuple(1.0 for _ in noise.taps),
-            tuple(np.ones(design.observed.rows) for _ in noise.taps),
-        )
+        unit = _unit_noise(design.observed)
         lengths, blocks = model.moments.lengths, design.settings.tuning.blocks
         rows = whitened_rows(design.columns, {}, everything, lengths, noise, design.observed, blocks)
         raw = whitened_rows(_recorded_columns(design), {}, everything, lengths, unit, design.observed, blocks)
         values = fit_values(everything)
-        return cls(model, names, _with_usual(model, names), _targets(rows, values), _targets(raw, values))
+        inside = _rows_within(design.observed, spans)
+        judged = tuple(
+            unit.numbers(inside, joint, design.observed, "identify") > 0 for joint in range(design.observed.joints)
+        )
+        begin = _with_usual(model, names)
+        return cls(model, names, begin, _targets(rows, values), _targets(raw, values), judged)
 
     def _folds(self, rows: WhitenedRows) -> list[NDArray[np.intp]]:
         """The fold of each row of each joint: the stretches of time, in order, cut into blocks."""
@@ -213,16 +237,20 @@ class _Trial:
         return self.model.solver.groups[group].columns - len(self.model.design.base) + rank
 
     @cached_property
-    def power(self) -> Array:
-        """Squared length of the torque as recorded, (joints,)."""
+    def power(self) -> float:
+        """Squared length of the torque as recorded on the rows that judge."""
         observed = self.model.design.observed
-        rows = np.concatenate([np.arange(each.start, each.stop) for each in observed.of_role("identify")])
         torque = np.concatenate([each.run.torque[each.filter.rows] for each in observed.signals])
-        return np.asarray(np.sum(torque[rows] ** 2, axis=0))
+        numbers = np.arange(observed.rows)
+        unit = _unit_noise(observed)
+        chosen = [
+            unit.numbers(numbers, joint, observed, "identify")[inside] for joint, inside in enumerate(self.judged)
+        ]
+        return float(sum(np.sum(torque[rows, joint] ** 2) for joint, rows in enumerate(chosen)))
 
     def held_out(self, state: State) -> float:
         """||tau - tau_hat|| / ||tau|| over all joints on the folds held out in turn."""
-        return float(np.sqrt(np.sum(self.errors(state)) / np.sum(self.power)))
+        return float(np.sqrt(np.sum(self.errors(state)) / self.power))
 
     def _score(self, state: State) -> float:
         """Sum of the logarithms of the joints' errors, mean of the folds: a small joint counts as a large one."""
@@ -256,6 +284,22 @@ class _Trial:
                 other = search.in_place(state, group)
                 if set(self.names) <= set(other.groups):
                     yield other
+
+
+def _unit_noise(observed: Observed) -> Noise:
+    """White noise of one newton metre, at rest too."""
+    joints = range(observed.joints)
+    return Noise(
+        tuple(np.ones(1) for _ in joints), tuple(1.0 for _ in joints), tuple(np.ones(observed.rows) for _ in joints)
+    )
+
+
+def _rows_within(observed: Observed, spans: Sequence[tuple[float, float]]) -> NDArray[np.intp]:
+    """1 for the rows (rows,) whose stamps are within the span of their run, else 0."""
+    parts = [
+        (each.time >= first) & (each.time <= last) for each, (first, last) in zip(observed.signals, spans, strict=True)
+    ]
+    return np.concatenate(parts).astype(np.intp)
 
 
 def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None) -> FittedModel:

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.result import Claim, JointFit
+from armlab.diagnosis.tuning import ClaimTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
+from armlab.identification.torque_model import TorqueModel
 
 MAX_NAMED_FINDINGS = 6  # findings that the summary names; the others are counted
 
@@ -20,6 +22,23 @@ def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit])
     best = max(fits, key=lambda each: each.before - each.after)
     gain = f"On held-out data the error of joint {best.joint} falls from {best.before:.3g} to {best.after:.3g} N m."
     return f"The simulation misses {findings}{more}. {gain}"
+
+
+def unnamed_gain(fits: Sequence[JointFit], tuning: ClaimTuning) -> JointFit | None:
+    """The joint whose held-out error falls most with parts that are present and not claimed, where that is much."""
+    worst = min(fits, key=lambda each: each.after / max(each.before, 1e-300))
+    return worst if worst.after < (1 - tuning.max_unnamed_gain) * worst.before else None
+
+
+def describe_unnamed(joint: JointFit, model: TorqueModel) -> str:
+    """What is known where a model predicts better and none of its parts is sure enough for a name."""
+    parts = [model.structure.components[index] for index in sorted(model.unclaimed)]
+    here = ", ".join(each.label for each in parts if each.joint == joint.joint) or "the links as fitted"
+    return (
+        f"Something is missing at joint {joint.joint}, and these data cannot name it surely: with what the model holds "
+        f"without a claim ({here}) the error on held-out data falls from {joint.before:.3g} to {joint.after:.3g}. "
+        "Record longer motion with more reversals and speeds."
+    )
 
 
 def _describe_claim(claim: Claim) -> str:

@@ -261,7 +261,7 @@ class PredictionTuning:
     min_cutoff_gain: float = tuned(
         0.02,
         unit="of the held-out error",
-        meaning="another cut-off has to lower the error by more",
+        meaning="a lower cut-off has to lower the error by more",
         most=1.0,
     )
     min_gain: float = tuned(
@@ -527,6 +527,13 @@ class ClaimTuning:
         0.05,
         unit="of the held-out error, mean of the joints' logarithms",
         meaning="a body at another link that predicts worse by less predicts as well",
+    )
+    max_unnamed_gain: float = tuned(
+        0.25,
+        unit="of a joint's held-out error",
+        meaning="more that parts without a claim explain, where nothing is claimed, makes a verdict inconclusive",
+        source="as pruning.self_evident_gain",
+        most=1.0,
     )
     min_gap: float = tuned(
         0.02, unit="of the noise floor", meaning="a smaller gap between error and noise cannot be measured"

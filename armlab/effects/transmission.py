@@ -14,7 +14,18 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects._drive_train import ffi, lib
-from armlab.effects.contract import ANGLE, TORQUE, Candidate, Effect, Parameter, Range, Scene, Value
+from armlab.effects.contract import (
+    ANGLE,
+    COULOMB_LEVEL,
+    TORQUE,
+    Candidate,
+    Effect,
+    Parameter,
+    Range,
+    Scene,
+    Value,
+)
+from armlab.effects.friction import mean_within_samples, positions_within_samples
 from armlab.effects.sensitivity import directional_derivative, joint_displacement
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
 from problem.arm import Arm
@@ -37,13 +48,21 @@ JOINT_ELASTICITY_FACTS = Effect(
 BACKLASH_FACTS = Effect(
     "backlash",
     "a dead zone in the drive train",
-    (Parameter("gap", ANGLE, positive=True, plausible=GAPS_SEEN),),
+    (
+        Parameter("gap", ANGLE, positive=True, plausible=GAPS_SEEN),
+        COULOMB_LEVEL,
+        Parameter("way", ANGLE, positive=True, detail=True),
+    ),
     prior_scale=0.01,
     axis="position",
     origin="transmission",
     experiment="let the load change its sign slowly, or read an encoder on the link side",
 )
 
+PLAYS = (0.01, 0.05, 0.15)  # of the joint's travel: gaps before friction, for a first look
+PLAY_RANGE = (1e-3, 0.5)
+WAY_RATIOS = (0.1, 0.5)  # of the gap: the way over which friction turns behind it, for a first look
+WAY_RATIO_RANGE = (0.02, 1.0)
 PHASE_STEP = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
 MAX_RESONANCE_HZ = 400.0  # of a resonance: stiffer springs follow their load at once, whatever the model's inertia is
@@ -259,16 +278,90 @@ class Backlash(Transmission):
 
 
 @dataclass(frozen=True)
+class FrictionBehindPlay(Term):
+    """level z, z = sgn(d) max(|d| - gap / 2, 0) / way: friction that a joint reaches through play.
+
+    d follows the way of the joint and stops at gap / 2 + way, where the friction slides: after a reversal the torque
+    falls to zero within the way, stays there for the gap, and comes back within another way. The friction is grounded,
+    so what is left in the gap is the joint's other friction alone. shape: the gap, rad (m), and the way as a share of
+    it: with a way that is longer than the gap it is presliding friction.
+    """
+
+    facts = BACKLASH_FACTS
+    form = "friction behind play"
+    names = ("gap", "level", "way")
+    of_time = True
+    replaces = ("presliding_hysteresis",)
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        """Gaps from a hundredth of the joint's travel up."""
+        travel = max(float(np.ptp(scene.motion.position[:, joint - 1])) for scene in scenes)
+        bounds = ((PLAY_RANGE[0] * travel, PLAY_RANGE[1] * travel), WAY_RATIO_RANGE)
+        shapes = [(share * travel, ratio) for share in PLAYS for ratio in WAY_RATIOS]
+        return [cls.at(arm, joint, shape=shape, bounds=bounds) for shape in shapes]
+
+    def columns(self, scene: Scene) -> Array:
+        gap, ratio = self.shape
+        way = ratio * gap
+        lag = way_within_limits(positions_within_samples(scene, self.own), gap / 2 + way)
+        engaged = np.sign(lag) * np.maximum(np.abs(lag) - gap / 2, 0) / way
+        return self._stacked(mean_within_samples(engaged))
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        """The whole gap, the level behind it, and the way on which the torque reaches that level."""
+        gap, ratio = self.shape
+        return {"gap": gap, "level": float(coefficients[0]), "way": ratio * gap}
+
+    def equation(self, coefficients: Array) -> str:
+        own, level, gap = self.joint, format_number(coefficients[0]), format_number(self.shape[0])
+        return f"tau_{own} += {level} z, z zero for {gap} after each reversal of qd_{own}"
+
+    def prior_scale(self, inertial: Array | None) -> float:
+        """The coefficient is a level, of which nothing is known."""
+        return float("inf")
+
+    def absurdity(self, coefficients: Array) -> str | None:
+        """The scale of the effect is that of a gap, not of a level."""
+        return None
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        gap, level = float(parameters["gap"]), float(parameters["level"])
+        ratio = float(parameters["way"]) / gap
+        bounds = ((gap / 10, gap * 10), (ratio / 10, ratio * 10))
+        return cls.at(arm, joints[0], shape=(gap, ratio), bounds=bounds), np.array([level])
+
+
+def way_within_limits(position: Array, limit: float) -> Array:
+    """What a slider is behind a joint at `position` (samples,) that drags it along beyond `limit`, (samples,)."""
+    steps = np.sign(np.diff(position))
+    ends = np.flatnonzero(steps[1:] * steps[:-1] < 0) + 1
+    out, start = np.zeros(len(position)), 0
+    for end in [*ends.tolist(), len(position) - 1]:
+        moved = position[start : end + 1] - position[start]
+        out[start : end + 1] = np.clip(out[start] + moved, -limit, limit)
+        start = end
+    return out
+
+
+@dataclass(frozen=True)
 class BacklashFamily(EveryJoint):
-    """Play at every joint, its gap by a scan of what is left."""
+    """Play at every joint: inside the drive train, its gap by a scan of what is left, and before a joint's friction."""
 
     facts: Effect = BACKLASH_FACTS
-    terms: tuple[type[Term], ...] = (Backlash,)
+    terms: tuple[type[Term], ...] = (Backlash, FrictionBehindPlay)
 
     def scan(self, arm: Arm, scenes: Sequence[Scene], residuals: Sequence[Array]) -> list[list[Candidate]]:
         """The best gaps of a fine grid at each joint that moves."""
         joints = [joint for joint in range(1, len(arm) + 1) if joint_moves(scenes, joint)]
-        return [list[Candidate](Backlash.from_scan(arm, joint, scenes, residuals)) for joint in joints]
+        return [
+            [
+                *Backlash.from_scan(arm, joint, scenes, residuals),
+                *FrictionBehindPlay.initial_shapes(arm, joint, scenes),
+            ]
+            for joint in joints
+        ]
 
 
 def recorded_difference(scene: Scene, joint: int) -> Array | None:

@@ -19,7 +19,7 @@ IDS = [
 NAMES = {
     *("level", "coefficient", "positive", "negative", "static_level", "velocity", "exponent", "gain", "inertia"),
     *("offset", "order", "amplitude", "phase", "stiffness", "rest", "gap", "mass", "centre", "gravity", "seconds"),
-    *("start", "end", "peak", "limit", "initial", "final", "time_constant", "velocities", "torques"),
+    *("start", "end", "peak", "limit", "initial", "final", "time_constant", "velocities", "torques", "way"),
 }
 
 
