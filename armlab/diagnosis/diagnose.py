@@ -149,6 +149,7 @@ def _assemble(
     named = {each.group: each for each in claims if each.group is not None}
     notes = {
         "settings": settings,
+        "white_errors_at_joints": [joint for joint, taps in enumerate(model.noise.taps, 1) if len(taps) == 1],
         "unknown": [each.equation for each in claims if each.candidate is None],
         "in_links": [f"{each.effect}: {each.equation}" for each in claims if each.in_links],
     }

@@ -161,11 +161,11 @@ def fit_coloured_noise(model: FittedModel) -> Noise:
     if not settings.guards.prewhitening:
         return white
     coloured = fit_noise(left, observed, fitted, tuning)
-    losses = _whitening_losses(model, coloured, white)
+    losses = whitening_losses(model, coloured, white)
     return choose_noise(coloured, white, losses > tuning.max_prediction_loss)
 
 
-def _whitening_losses(model: FittedModel, coloured: Noise, white: Noise) -> Array:
+def whitening_losses(model: FittedModel, coloured: Noise, white: Noise) -> Array:
     """Share by which a fit under coloured noise predicts held-out stretches worse than a plain one, (joints,)."""
     plain, whitened = (split_fit(model, model.fit, each) for each in (white, coloured))
     everything = range(len(plain.precision))

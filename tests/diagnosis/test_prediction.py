@@ -1,0 +1,128 @@
+"""The model that predicts: parts without a claim, whitening that must not cost predictions, and smoothing."""
+
+from dataclasses import replace
+
+import engine_cases as cases
+import numpy as np
+import pytest
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.diagnose import diagnose, prepare
+from armlab.diagnosis.fitted_model import FittedModel, fit_background, fit_coloured_noise, whitening_losses
+from armlab.diagnosis.formats import VerdictFile
+from armlab.diagnosis.found_model import model_found, named_model
+from armlab.diagnosis.noise import Noise, choose_noise
+from armlab.diagnosis.prediction import choose_smoothing, filtered_residual, identification_runs, recorded_residual
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import Guards, Settings
+from armlab.diagnosis.verdict_files import make_verdict
+from armlab.effects.library import library
+from armlab.recordings.recording import Recording
+from problem.motion import Motion
+
+
+def friction_and_trifle(motion: Motion, time: Array) -> Array:
+    """Friction of joint 2 that nobody can miss, and a hardly visible one of joint 3."""
+    out = np.zeros(motion.position.shape)
+    out[:, 1] = 3.0 * motion.velocity[:, 1] + 2.0 * np.sign(motion.velocity[:, 1])
+    out[:, 2] = 0.001 * motion.velocity[:, 2]
+    return out
+
+
+def coloured_noise(motion: Motion, time: Array) -> Array:
+    """Errors of all joints that are tied over some tenths of a second."""
+    rng = np.random.default_rng(len(time) + int(1e6 * abs(motion.position[0, 0])))
+    out = np.zeros(motion.position.shape)
+    for row in range(1, len(out)):
+        out[row] = 0.97 * out[row - 1] + 0.05 * rng.standard_normal(out.shape[1])
+    return out
+
+
+@pytest.fixture(scope="module")
+def found() -> Diagnosis:
+    return diagnose(cases.recording(friction_and_trifle))
+
+
+def test_what_is_not_sure_is_present_without_a_claim(found: Diagnosis) -> None:
+    model = model_found(found)
+    claimed = {(each.effect, each.joint) for each in found.claims}
+    parts = {(each.effect, each.joint): index for index, each in enumerate(model.structure.components)}
+    assert ("viscous_friction", 2) in claimed
+    assert ("viscous_friction", 3) not in claimed
+    assert all((parts[place] in model.unclaimed) == (place not in claimed) for place in parts)
+    assert {("viscous_friction", 3), ("torque_offset", 1)} <= set(parts)
+
+
+def test_the_named_model_has_the_claims_and_nothing_else(found: Diagnosis) -> None:
+    alone = named_model(found)
+    assert {(each.effect, each.joint) for each in alone.structure.components} == {
+        (each.effect, each.joint) for each in found.claims
+    }
+    assert not alone.unclaimed
+
+
+def test_held_out_errors_are_those_of_the_written_models(found: Diagnosis) -> None:
+    observed = found.observed
+    assert observed is not None
+    for index, each in enumerate(found.fit):
+        rows = np.concatenate([np.arange(part.start, part.stop) for part in observed.of_role("validate", index)])
+        for errors, residual in ((each.filtered, filtered_residual), (each.recorded, recorded_residual)):
+            for value, model in ((errors.after, model_found(found)), (errors.named, named_model(found))):
+                left = residual(model, observed)[rows, index]
+                assert value == pytest.approx(float(np.sqrt(np.mean(left**2))))
+        assert each.recorded.after > 0.8 * cases.NOISE > each.filtered.after
+    verdict = VerdictFile.model_validate_json(make_verdict(found).to_json())
+    assert verdict.fit[1].heldout_rms_named == found.fit[1].filtered.named
+    assert verdict.fit[1].recorded is not None
+    assert verdict.fit[1].recorded.heldout_rms_identify == found.fit[1].recorded.identified
+
+
+def test_the_model_is_no_worse_than_a_plain_identification(found: Diagnosis) -> None:
+    assert all(each.filtered.after <= 1.05 * each.filtered.identified for each in found.fit)
+
+
+def test_the_runs_that_identify_are_cut_to_their_kept_rows(found: Diagnosis) -> None:
+    assert found.observed is not None
+    runs = identification_runs(found.observed)
+    assert [each.name for each in runs] == ["run-0.csv", "run-1.csv"]
+    assert all(0 < each.time[0] < 1 and each.role == "identify" for each in runs)
+
+
+def test_positions_are_smoothed_as_predicts_best(found: Diagnosis) -> None:
+    observed, model = found.observed, model_found(found)
+    assert observed is not None
+    tuning = Settings().tuning.prediction
+    rows = observed.of_role("identify")
+
+    def error(factor: float) -> float:
+        left = recorded_residual(replace(model, position_factor=factor), observed)
+        return float(sum(np.sum(left[each.start : each.stop] ** 2) for each in rows))
+
+    chosen = choose_smoothing(replace(model, position_factor=50.0), observed, tuning)
+    assert error(chosen.position_factor) <= min(error(factor * chosen.position_factor) for factor in (0.5, 2.0))
+
+
+def first_model(recording: Recording, guards: Guards | None = None) -> FittedModel:
+    """Links and usual friction fitted to a recording."""
+    design = prepare(recording, None, Settings(guards or Guards()), lambda message: None)
+    assert not isinstance(design, Diagnosis)
+    usual = [family for family in library() if family.facts.usual]
+    return fit_background(design, usual, 0, lambda message: None)
+
+
+def test_coloured_noise_is_whitened() -> None:
+    noisy = cases.recording(coloured_noise)
+    assert all(len(taps) > 1 for taps in fit_coloured_noise(first_model(noisy)).taps)
+    off = fit_coloured_noise(first_model(noisy, replace(Guards(), prewhitening=False)))
+    assert all(len(taps) == 1 for taps in off.taps)
+
+
+def test_whitening_that_neglects_the_frequencies_of_the_motion_costs_predictions() -> None:
+    model = first_model(cases.recording(friction_and_trifle))
+    tuning, rows = model.design.settings.tuning.noise, np.ones(model.design.observed.rows)
+    white = Noise((np.ones(1),) * 3, (cases.NOISE,) * 3, (rows,) * 3)
+    slow = Noise((np.array([1.0, -0.99]),) * 3, (cases.NOISE,) * 3, (rows,) * 3)
+    assert np.all(whitening_losses(model, white, white) == 0)
+    assert np.all(whitening_losses(model, slow, white) > tuning.max_prediction_loss)
+    chosen = choose_noise(slow, white, np.array([True, False, True]))
+    assert [len(taps) for taps in chosen.taps] == [1, 2, 1]
