@@ -56,14 +56,17 @@ def fit_prediction(named: FittedModel) -> Prediction:
     numbers = (*own, *more)
     candidates = [groups[number].candidate for number in numbers]
     start = tuple(range(len(own)))
-    designs = [_smaller_design(named, numbers)]
-    designs += [_design_at(named, candidates, cutoff) for cutoff in _lower_cutoffs(named, tuning)]
-    designs = [each for each in designs if _has_rows(each.observed)]
-    spans = [_common_span([_span(each.observed, run) for each in designs]) for run in range(len(named.design.scenes))]
-    best = _Trial.of(designs[0], start, named.state, named.noise, spans)
+    own_design = _smaller_design(named, numbers)
+    suggested = max(suggested_cutoff(run) for run in identification_runs(named.design.observed))
+    smooth = _design_at(named, candidates, min(suggested, named.design.observed.cutoff_hz), position_ratio=1.0)
+    judge = _Judge.of(smooth if _has_rows(smooth.observed) else own_design)
+    best = _Trial.of(own_design, start, named.state, named.noise, judge)
     error = best.held_out(best.begin)
-    for design in designs[1:]:
-        trial = _Trial.of(design, start, named.state, None, spans)
+    for cutoff in _lower_cutoffs(named.design.observed, suggested, tuning):
+        design = _design_at(named, candidates, cutoff)
+        if not _has_rows(design.observed):
+            continue
+        trial = _Trial.of(design, start, named.state, None, judge)
         changed = trial.held_out(trial.begin)
         if changed < (1 - tuning.min_cutoff_gain) * error:
             best, error = trial, changed
@@ -73,26 +76,15 @@ def fit_prediction(named: FittedModel) -> Prediction:
     return Prediction(model, places, best.held_out(state))
 
 
-def _span(observed: Observed, run: int) -> tuple[float, float]:
-    """First and last stamp of the kept rows of a run, s: a lower cut-off loses more at the ends."""
-    time = observed.signals[run].time
-    return float(time[0]), float(time[-1])
-
-
-def _common_span(spans: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    return max(first for first, _ in spans), min(last for _, last in spans)
-
-
 def _has_rows(observed: Observed) -> bool:
     """Whether every joint has stretches in motion that identify, and some that validate."""
     roles: tuple[Role, ...] = ("identify", "validate")
     return all(observed.of_role(role, joint) for role in roles for joint in range(observed.joints))
 
 
-def _lower_cutoffs(model: FittedModel, tuning: PredictionTuning) -> list[float]:
-    """Cut-offs below the present one that the positions suggest, Hz."""
-    suggested = max(suggested_cutoff(run) for run in identification_runs(model.design.observed))
-    present = model.design.observed.cutoff_hz
+def _lower_cutoffs(observed: Observed, suggested: float, tuning: PredictionTuning) -> list[float]:
+    """Cut-offs below the present one, Hz. suggested: by the positions."""
+    present = observed.cutoff_hz
     return [each * suggested for each in tuning.cutoff_shares if each * suggested < tuning.least_change * present]
 
 
@@ -101,10 +93,17 @@ def _smaller_design(model: FittedModel, numbers: Sequence[int]) -> DesignMatrix:
     return replace(model.design, blocks=tuple(model.design.blocks[number] for number in numbers))
 
 
-def _design_at(model: FittedModel, candidates: Sequence[Candidate], cutoff_hz: float) -> DesignMatrix:
-    """The design of these candidates with another cut-off; columns follow the model as it is fitted."""
+def _design_at(
+    model: FittedModel, candidates: Sequence[Candidate], cutoff_hz: float, position_ratio: float | None = None
+) -> DesignMatrix:
+    """The design of these candidates with another cut-off; columns follow the model as it is fitted.
+
+    position_ratio: of the positions' cut-off to it, as in the settings where it is left out.
+    """
     design = model.design
-    data = replace(design.settings.tuning.data, cutoff_hz=cutoff_hz, min_cutoff_hz=cutoff_hz)
+    usual = design.settings.tuning.data
+    ratio = position_ratio or usual.position_cutoff_ratio
+    data = replace(usual, cutoff_hz=cutoff_hz, min_cutoff_hz=cutoff_hz, position_cutoff_ratio=ratio)
     settings = replace(design.settings, tuning=replace(design.settings.tuning, data=data))
     runs = [each.run for each in design.observed.signals]
     observed = observe(runs, design.simulation.arm, design.simulation.inertial, settings)
@@ -130,11 +129,46 @@ def _recorded_columns(design: DesignMatrix) -> Columns:
 
 
 @dataclass(frozen=True, eq=False)
+class _Judge:
+    """The identification rows that judge every trial: the torque as recorded, columns of positions smoothed alike.
+
+    edges: of each run the stamps at which another block of time begins, s, and the number of its first block.
+    """
+
+    observed: Observed
+    columns: Columns
+    edges: tuple[tuple[Array, int], ...]
+
+    @classmethod
+    def of(cls, design: DesignMatrix) -> "_Judge":
+        """The rows of a design; blocks are alike long."""
+        observed, count = design.observed, design.settings.tuning.prediction.folds
+        rows = rows_in(observed.of_role("identify"), observed.rows)
+        run = np.concatenate([np.full(len(each.torque), index) for index, each in enumerate(observed.signals)])
+        block = np.zeros(observed.rows, dtype=np.intp)
+        block[rows] = np.arange(rows.sum()) * count // rows.sum()
+        edges = []
+        for index in range(len(observed.signals)):
+            own = rows & (run == index)
+            numbers = np.unique(block[own])
+            begins = [float(observed.time[own & (block == number)][0]) for number in numbers]
+            edges.append((np.array(begins[1:]), int(numbers[0]) if len(numbers) else 0))
+        return cls(observed, _recorded_columns(design), tuple(edges))
+
+    def blocks(self, observed: Observed) -> NDArray[np.intp]:
+        """The block of time of each row (rows,) of the same runs, whatever their cut-off."""
+        parts = []
+        for each, (begins, first) in zip(observed.signals, self.edges, strict=True):
+            parts.append(first + np.searchsorted(begins, each.time - each.run.time[0], "right"))
+        return np.concatenate(parts).astype(np.intp)
+
+
+@dataclass(frozen=True, eq=False)
 class _Trial:
     """A design on which structures are compared. begin: named effects and the usual ones of every joint.
 
-    rows, recorded: of all columns, whitened and as recorded, the identification rows of each joint. judged: which of
-    the recorded rows judge: those that every cut-off has.
+    rows, recorded: of all columns, whitened, and as the judge has them, the identification rows of each joint. fitting,
+    judging: the block of time of each of those rows.
     """
 
     model: FittedModel
@@ -142,45 +176,36 @@ class _Trial:
     begin: State
     rows: WhitenedRows
     recorded: WhitenedRows
-    judged: tuple[NDArray[np.bool_], ...]
+    fitting: tuple[NDArray[np.intp], ...]
+    judging: tuple[NDArray[np.intp], ...]
 
     @classmethod
     def of(
-        cls,
-        design: DesignMatrix,
-        names: tuple[int, ...],
-        state: State,
-        noise: Noise | None,
-        spans: Sequence[tuple[float, float]],
+        cls, design: DesignMatrix, names: tuple[int, ...], state: State, noise: Noise | None, judge: _Judge
     ) -> "_Trial":
-        """noise: white with the scatter that the named and usual effects leave, where it is left out.
-
-        spans: of the stamps of each run, s, within which rows judge.
-        """
+        """noise: white with the scatter that the named and usual effects leave, where it is left out."""
+        observed, tuning = design.observed, design.settings.tuning
         if noise is None:
-            plain = fit_noise(design.target, design.observed, 0.0, design.settings.tuning.noise, colour=False)
+            plain = fit_noise(design.target, observed, 0.0, tuning.noise, colour=False)
             first = _fitted(design, plain, state.widths)
-            begin = _with_usual(first, names)
-            left = first.residual(first.solver.fit(begin))
-            noise = fit_noise(left, design.observed, 0.0, design.settings.tuning.noise, colour=False)
+            left = first.residual(first.solver.fit(_with_usual(first, names)))
+            noise = fit_noise(left, observed, 0.0, tuning.noise, colour=False)
         model = _fitted(design, noise, state.widths)
         everything = model.solver.fit(State(tuple(range(len(model.solver.groups))), state.widths))
-        unit = _unit_noise(design.observed)
-        lengths, blocks = model.moments.lengths, design.settings.tuning.blocks
-        rows = whitened_rows(design.columns, {}, everything, lengths, noise, design.observed, blocks)
-        raw = whitened_rows(_recorded_columns(design), {}, everything, lengths, unit, design.observed, blocks)
-        values = fit_values(everything)
-        inside = _rows_within(design.observed, spans)
-        judged = tuple(
-            unit.numbers(inside, joint, design.observed, "identify") > 0 for joint in range(design.observed.joints)
+        unit, lengths = _unit_noise(judge.observed), model.moments.lengths
+        rows = whitened_rows(design.columns, {}, everything, lengths, noise, observed, tuning.blocks)
+        raw = whitened_rows(judge.columns, {}, everything, lengths, unit, judge.observed, tuning.blocks)
+        values, joints = fit_values(everything), range(observed.joints)
+        own, judged = judge.blocks(observed), judge.blocks(judge.observed)
+        return cls(
+            model,
+            names,
+            _with_usual(model, names),
+            _targets(rows, values),
+            _targets(raw, values),
+            tuple(noise.numbers(own, joint, observed, "identify") for joint in joints),
+            tuple(unit.numbers(judged, joint, judge.observed, "identify") for joint in joints),
         )
-        begin = _with_usual(model, names)
-        return cls(model, names, begin, _targets(rows, values), _targets(raw, values), judged)
-
-    def _folds(self, rows: WhitenedRows) -> list[NDArray[np.intp]]:
-        """The fold of each row of each joint: the stretches of time, in order, cut into blocks."""
-        stretches = np.unique(np.concatenate(self.recorded.blocks))
-        return [np.searchsorted(stretches, each) * self._tuning.folds // len(stretches) for each in rows.blocks]
 
     @property
     def _tuning(self) -> PredictionTuning:
@@ -191,7 +216,7 @@ class _Trial:
         """Normal equations without each fold: (folds, parameters, parameters) and (folds, parameters)."""
         count, size = self._tuning.folds, self.rows.designs[0].shape[1]
         grams, products = np.zeros((count, size, size)), np.zeros((count, size))
-        for design, target, fold in zip(self.rows.designs, self.rows.errors, self._folds(self.rows), strict=True):
+        for design, target, fold in zip(self.rows.designs, self.rows.errors, self.fitting, strict=True):
             for number in range(count):
                 own = fold == number
                 grams[number] += design[own].T @ design[own]
@@ -204,12 +229,10 @@ class _Trial:
         return prior_precision(self.model.solver, everything, self.rows.designs[0].shape[1])
 
     @cached_property
-    def _judged(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
+    def _products(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
         """Per joint and fold the own columns and their products, the recorded torque last."""
         out = []
-        for design, target, fold in zip(
-            self.recorded.designs, self.recorded.errors, self._folds(self.recorded), strict=True
-        ):
+        for design, target, fold in zip(self.recorded.designs, self.recorded.errors, self.judging, strict=True):
             used = np.flatnonzero(np.any(design != 0, axis=0))
             both = np.column_stack([design[:, used], target])
             out.append([(used, both[fold == number].T @ both[fold == number]) for number in range(self._tuning.folds)])
@@ -221,13 +244,13 @@ class _Trial:
         rank = self.model.solver.fit(self.begin).links.shape[1]
         own = [np.arange(rank), *(self._columns(group, rank) for group in state.groups)]
         columns = np.concatenate(own).astype(np.intp)
-        out = np.empty((len(grams), len(self._judged)))
+        out = np.empty((len(grams), len(self._products)))
         for number in range(len(grams)):
             gram = grams[number][np.ix_(columns, columns)]
             values = np.zeros(grams.shape[1])
             if len(columns):
                 values[columns] = cho_solve(cho_factor(gram, lower=True), products[number][columns])
-            for joint, parts in enumerate(self._judged):
+            for joint, parts in enumerate(self._products):
                 used, judged = parts[number]
                 full = np.append(-values[used], 1.0)
                 out[number, joint] = full @ judged @ full
@@ -238,42 +261,40 @@ class _Trial:
 
     @cached_property
     def power(self) -> float:
-        """Squared length of the torque as recorded on the rows that judge."""
-        observed = self.model.design.observed
-        torque = np.concatenate([each.run.torque[each.filter.rows] for each in observed.signals])
-        numbers = np.arange(observed.rows)
-        unit = _unit_noise(observed)
-        chosen = [
-            unit.numbers(numbers, joint, observed, "identify")[inside] for joint, inside in enumerate(self.judged)
-        ]
-        return float(sum(np.sum(torque[rows, joint] ** 2) for joint, rows in enumerate(chosen)))
+        """Squared length of the torque that is to be explained, as recorded, of all joints."""
+        return float(sum(target @ target for target in self.recorded.errors))
 
     def held_out(self, state: State) -> float:
         """||tau - tau_hat|| / ||tau|| over all joints on the folds held out in turn."""
         return float(np.sqrt(np.sum(self.errors(state)) / self.power))
 
-    def _score(self, state: State) -> float:
-        """Sum of the logarithms of the joints' errors, mean of the folds: a small joint counts as a large one."""
-        return float(0.5 * np.mean(np.sum(np.log(np.maximum(self.errors(state), 1e-300)), axis=1)))
+    def _scores(self, state: State) -> Array:
+        """Sum of the logarithms of the joints' errors on each fold, (folds,): a small joint counts as a large one."""
+        return np.asarray(0.5 * np.sum(np.log(np.maximum(self.errors(state), 1e-300)), axis=1))
 
     def improve(self, tuning: PredictionTuning) -> State:
-        """The best of the changes, one after the other, until none lowers the errors enough."""
-        state, score = self.begin, self._score(self.begin)
+        """The best of the changes, one after the other, until none lowers the errors enough, and surely enough."""
+        state, scores = self.begin, self._scores(self.begin)
         search = Search(self.model.solver, self.model.design.settings, True, 0)
         absurd = {group for group in state.groups if search.objection(state, group) is not None}
         for _ in range(tuning.max_changes):
-            scored = [(self._score(other), other) for other in self._changes(search, state)]
-            lower = sorted((each for each in scored if each[0] < score - tuning.min_gain), key=lambda each: each[0])
-            better = next((each for each in lower if self._is_physical(search, each[1], absurd)), None)
+            changes = [(scores - self._scores(other), other) for other in self._changes(search, state)]
+            worth = [each for each in changes if _is_sure(each[0], tuning)]
+            worth.sort(key=lambda each: -float(np.mean(each[0])))
+            better = next((each for each in worth if self._is_physical(search, each[1], absurd)), None)
             if better is None:
                 break
-            score, state = better
+            scores, state = scores - better[0], better[1]
         return state
 
-    @staticmethod
-    def _is_physical(search: Search, state: State, absurd: Container[int]) -> bool:
+    def _is_physical(self, search: Search, state: State, absurd: Container[int]) -> bool:
         """Whether no group breaks a law of physics; absurd: those that did so before."""
-        return all(search.objection(state, group) is None for group in state.groups if group not in absurd)
+        return all(
+            search.objection(state, group) is None
+            and (group in self.names or not _outgrows_friction(self.model, state, group))
+            for group in state.groups
+            if group not in absurd
+        )
 
     def _changes(self, search: Search, state: State) -> Iterator[State]:
         for group in range(len(self.model.solver.groups)):
@@ -294,12 +315,10 @@ def _unit_noise(observed: Observed) -> Noise:
     )
 
 
-def _rows_within(observed: Observed, spans: Sequence[tuple[float, float]]) -> NDArray[np.intp]:
-    """1 for the rows (rows,) whose stamps are within the span of their run, else 0."""
-    parts = [
-        (each.time >= first) & (each.time <= last) for each, (first, last) in zip(observed.signals, spans, strict=True)
-    ]
-    return np.concatenate(parts).astype(np.intp)
+def _is_sure(gains: Array, tuning: PredictionTuning) -> bool:
+    """Whether gains (folds,) are large, and larger than their scatter between folds would make them."""
+    error = float(np.std(gains, ddof=1)) / np.sqrt(len(gains))
+    return bool(np.mean(gains) > max(tuning.min_gain, tuning.min_standard_errors * error))
 
 
 def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None) -> FittedModel:
@@ -314,10 +333,30 @@ def _with_usual(model: FittedModel, names: tuple[int, ...]) -> State:
     for number, group in enumerate(model.solver.groups):
         if group.candidate.facts.usual and number not in names and not search.excluded(state, number):
             state = state.plus(number)
-    for number in set(state.groups) - set(names):
-        if search.objection(state, number) is not None:
+    for number in sorted(set(state.groups) - set(names)):
+        if search.objection(state, number) is not None or _outgrows_friction(model, state, number):
             state = state.minus(number)
     return state
+
+
+def _outgrows_friction(model: FittedModel, state: State, group: int) -> bool:
+    """Whether a usual part that does not dissipate, an offset, is larger than the friction of its joint.
+
+    Offsets of real arms are 5 to 30 % of the friction level (tables of TX40, UR10 and EMPS). A larger one stands for
+    gravity, or for a spring, that the motion does not separate from it.
+    """
+    groups, fit = model.solver.groups, model.solver.fit(state)
+    own = groups[group].candidate
+    if not own.facts.usual or own.facts.dissipates:
+        return False
+    beside = [
+        groups[each].columns
+        for each in state.groups
+        if groups[each].candidate.joint == own.joint and groups[each].candidate.facts.dissipates
+    ]
+    friction = np.concatenate([*beside, np.empty(0, dtype=np.intp)]).astype(np.intp)
+    power = fit.coefficients[friction] @ model.moments.gram[np.ix_(friction, friction)] @ fit.coefficients[friction]
+    return bool(np.sum(fit.coefficients[groups[group].columns] ** 2) > power)
 
 
 def _targets(rows: WhitenedRows, values: Array) -> WhitenedRows:

@@ -270,6 +270,12 @@ class PredictionTuning:
         meaning="a part that is present has to lower the errors by more",
         source="1 % of the error of one joint, as the choice of `identify` asks",
     )
+    min_standard_errors: float = tuned(
+        2.0,
+        unit="standard errors between blocks",
+        meaning="a change has to lower the errors by more",
+        source="one is the rule of Breiman and others 1984 for one choice; two, after looks at the public arms",
+    )
     smoothing_shares: tuple[float, ...] = tuned(
         (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8),
         unit="of the cut-off that the positions suggest",

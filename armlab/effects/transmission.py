@@ -59,10 +59,10 @@ BACKLASH_FACTS = Effect(
     experiment="let the load change its sign slowly, or read an encoder on the link side",
 )
 
-PLAYS = (0.01, 0.05, 0.15)  # of the joint's travel: gaps before friction, for a first look
-PLAY_RANGE = (1e-3, 0.5)
+PLAYS = (0.03, 0.1)  # of the joint's travel: gaps before friction, for a first look
+PLAY_RANGE = (0.02, 0.5)  # a smaller one looks like presliding friction, or like a shift in time of some samples
 WAY_RATIOS = (0.1, 0.5)  # of the gap: the way over which friction turns behind it, for a first look
-WAY_RATIO_RANGE = (0.02, 1.0)
+WAY_RATIO_RANGE = (0.02, 0.5)
 PHASE_STEP = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
 MAX_RESONANCE_HZ = 400.0  # of a resonance: stiffer springs follow their load at once, whatever the model's inertia is
