@@ -30,7 +30,13 @@ from armlab.diagnosis.friction_curves import find_friction_curves, name_friction
 from armlab.diagnosis.links import are_bodies, link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
-from armlab.diagnosis.prediction import Prediction, choose_smoothing, filtered_residual, fit_prediction
+from armlab.diagnosis.prediction import (
+    Prediction,
+    choose_smoothing,
+    filtered_residual,
+    fit_prediction,
+    with_smoothing_of,
+)
 from armlab.diagnosis.pruning import Pruned, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
@@ -157,7 +163,7 @@ def _assemble(
         build_model(recording, simulation, prediction.model, named, notes), observed, tuning.prediction
     )
     alone = build_model(recording, simulation, prediction.with_names_alone(named), named, {})
-    alone = choose_smoothing(alone, observed, tuning.prediction)
+    alone = with_smoothing_of(found, alone)
     final = filtered_residual(found, observed)
     refit = model.residual(model.solver.fit(State((), None)))
     start = refit if simulation.kind == "refit" else design.target

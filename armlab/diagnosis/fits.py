@@ -4,7 +4,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, rows_in
-from armlab.diagnosis.prediction import choose_smoothing, filtered_residual, identification_runs, recorded_residual
+from armlab.diagnosis.prediction import filtered_residual, identification_runs, recorded_residual, with_smoothing_of
 from armlab.diagnosis.result import HeldOutErrors, JointFit
 from armlab.diagnosis.tuning import Tuning
 from armlab.identification.identifier import Identifier
@@ -17,8 +17,7 @@ def joint_fits(
     """The fits of all joints. refit: residual (rows, joints) of the refitted rigid arm; floor: (joints,), N m (N)."""
     runs = identification_runs(observed)
     rigid, identified = (
-        choose_smoothing(Identifier(found.arm, parts).fit(runs).model_, observed, tuning.prediction)
-        for parts in ((), None)
+        with_smoothing_of(found, Identifier(found.arm, parts).fit(runs).model_) for parts in ((), None)
     )
     models = (found, alone, identified)
     filtered = [refit, *(filtered_residual(each, observed) for each in models)]

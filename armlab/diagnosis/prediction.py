@@ -389,6 +389,13 @@ def choose_smoothing(model: TorqueModel, observed: Observed, tuning: PredictionT
     return min(tried, key=lambda each: float(np.sum(recorded_residual(each, observed)[rows] ** 2)))
 
 
+def with_smoothing_of(model: TorqueModel, other: TorqueModel) -> TorqueModel:
+    """Another model that smooths positions as a model does."""
+    if model.cutoff_hz is None or other.cutoff_hz is None:
+        return other
+    return replace(other, position_factor=model.position_factor * model.cutoff_hz / other.cutoff_hz)
+
+
 def filtered_residual(model: TorqueModel, observed: Observed) -> Array:
     """Measured torque less that of a model through the same filter, (rows, joints), N m (N)."""
     parts = [each.torque - each.filter(model.predict(each.run)) for each in observed.signals]

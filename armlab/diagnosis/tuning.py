@@ -252,7 +252,7 @@ class PredictionTuning:
 
     folds: int = tuned(6, unit="blocks", meaning="blocks of time of the identification runs, held out in turn", least=2)
     cutoff_shares: tuple[float, ...] = tuned(
-        (0.35, 0.5, 0.7, 1.0),
+        (0.5, 0.7),
         unit="of the cut-off that the positions suggest",
         meaning="lower cut-offs that are tried, as `identify` tries them",
         least=0.01,
@@ -277,7 +277,7 @@ class PredictionTuning:
         source="one is the rule of Breiman and others 1984 for one choice; two, after looks at the public arms",
     )
     smoothing_shares: tuple[float, ...] = tuned(
-        (0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8),
+        (0.35, 0.5, 0.7, 1.0, 1.4, 2.0),
         unit="of the cut-off that the positions suggest",
         meaning="cut-offs of the positions that are tried for predictions",
         least=0.01,
