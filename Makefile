@@ -70,8 +70,8 @@ speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results
 
 # --- checks
 
-test: .venv/dev lint regression ## every test
-	$(BIN)/pytest -n auto
+test: .venv/dev lint regression ## every test, one thread of linear algebra a worker
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -n auto
 
 lint: .venv/dev ## style, types and import contracts
 	$(BIN)/ruff check .

@@ -7,8 +7,8 @@ import yaml
 from click.testing import CliRunner
 from simulated_arm import RATE_HZ, arm, run, structure, truth
 
-from armlab.cli.diagnosis import export_model
-from armlab.cli.identification import coverage, identify, predict, real
+from armlab.cli.diagnosis import export_model, real
+from armlab.cli.identification import coverage, identify, predict
 from armlab.common.errors import InputError
 from armlab.identification.model import Model
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording
