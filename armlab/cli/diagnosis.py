@@ -55,7 +55,7 @@ def next_experiment(
 
 
 @click.command()
-@click.argument("recording", type=click.Path(path_type=Path))
+@click.argument("recordings", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="RECORDING...")
 @click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder for verdict, report and model.")
 @click.option(
     "--baseline",
@@ -63,13 +63,13 @@ def next_experiment(
     help="What is compared [default: nominal where there is a simulation].",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of random waves in surrogates.")
-@click.option("--compare", "old", type=click.Path(path_type=Path), help="An older recording: say what changed since.")
+@click.option("--compare", "old", type=click.Path(path_type=Path), help="An older recording: what changed since?")
 @click.option("--without", multiple=True, metavar="GUARD", help="Switch a guard off, to see what it is worth.")
 @click.option(
     "--set", "changes", multiple=True, metavar="NUMBER=VALUE", help="Another tuning number, like noise.max_order=8."
 )
 def diagnose(
-    recording: Path,
+    recordings: tuple[Path, ...],
     out: Path,
     baseline: str | None,
     seed: int,
@@ -79,7 +79,8 @@ def diagnose(
 ) -> None:
     """Find the physics that the simulation of RECORDING lacks.
 
-    Says where the simulation is wrong, which effects are missing, and how much better it predicts with them.
+    Says where the simulation is wrong, which effects are missing, and how much better it predicts with them. With
+    --compare OLD: what changed from OLD to RECORDING, and to each further one.
     """
     from armlab.common.errors import InputError
     from armlab.diagnosis.compare.report import compare_recordings
@@ -87,11 +88,13 @@ def diagnose(
 
     if old is not None and changes:
         raise InputError("--set: a comparison takes the usual tuning numbers, leave out --set or --compare")
+    if old is None and len(recordings) > 1:
+        raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     with ProgressLine() as progress:
         lines = (
-            diagnose_recording(recording, out, baseline, seed, without, changes, progress.tell)
+            diagnose_recording(recordings[0], out, baseline, seed, without, changes, progress.tell)
             if old is None
-            else compare_recordings(old, recording, out, baseline, seed, progress.tell)
+            else compare_recordings((old, *recordings), out, baseline, seed, progress.tell)
         )
         for line in lines:
             progress.clear()

@@ -190,38 +190,66 @@ class VerdictFile(Entry):
 
 
 class ChangeEntry(Entry):
-    """One parameter in both recordings. effect: `base_parameter` for one of the rigid body, named by its sum.
+    """One parameter in the recordings. old, new: in the first and in the last; null where only changes are known.
 
-    difference_ci95: 95 % interval of new minus old. p_value: of no difference, corrected for all parameters.
+    difference_ci95: 95 % interval of new minus old. ratio: new over old. p_value: of no difference, corrected for all
+    that was compared.
     """
 
     effect: str
     joint: JointNumber | None
     joints: tuple[JointNumber, ...]
     parameter: str
-    old: float
-    new: float
+    old: float | None
+    new: float | None
+    difference: float | None = None
     difference_ci95: tuple[float, float]
+    ratio: float | None = None
+    ratio_ci95: tuple[float, float] | None = None
     unit: str
     p_value: float
     changed: bool
 
 
 class DetectableEntry(Entry):
-    """The smallest change of a parameter that the two recordings would show."""
+    """The smallest change of a parameter that these recordings would have shown.
+
+    share: of its level, null where there is none.
+    """
 
     effect: str
     joint: JointNumber | None
     parameter: str
     change: float
     unit: str
+    share: float | None = None
+
+
+class TrendEntry(Entry):
+    """A parameter that moves over more than two recordings: its value in each, with 95 % intervals.
+
+    kind: `step` where it changed once, `slope` where it grows or falls steadily, `scatter` else. change_point: the
+    first recording after the step, from 0. per_day: of a slope whose recordings have dates.
+    """
+
+    effect: str
+    joint: JointNumber | None
+    joints: tuple[JointNumber, ...]
+    parameter: str
+    unit: str
+    values: tuple[float, ...]
+    ci95: tuple[tuple[float, float], ...]
+    kind: Literal["step", "slope", "scatter"]
+    change_point: int | None = None
+    per_day: float | None = None
 
 
 class ComparisonFile(Entry):
     """The content of `comparison.json` (schema comparison/1).
 
-    old, new: names of the recordings. level: a parameter changed where its p-value is below it. findings: what changed,
-    parameters as changes. against: the verdict on the new recording with the model of the old one as its simulation.
+    old, new: names of the first and of the last recording; recordings: of all, dates: as far as they are known.
+    level: a parameter changed where its p-value is below it. findings: what changed, parameters as changes. notes: what
+    the recordings hold and the comparison does not use.
     """
 
     schema_: Literal["comparison/1"] = Field(alias="schema")
@@ -229,11 +257,14 @@ class ComparisonFile(Entry):
     summary: str
     old: str
     new: str
+    recordings: tuple[str, ...] | None = None
+    dates: tuple[str | None, ...] | None = None
     level: float
     findings: tuple[FindingEntry, ...] | None = None
     changes: tuple[ChangeEntry, ...]
     smallest_detectable: tuple[DetectableEntry, ...] | None = None
-    against: VerdictFile | None
+    trends: tuple[TrendEntry, ...] | None = None
+    notes: tuple[str, ...] | None = None
 
 
 def read_verdict_file(path: Path) -> VerdictFile:

@@ -595,6 +595,58 @@ class IntervalTuning:
 
 
 @dataclass(frozen=True)
+class ComparisonTuning:
+    """What changed between recordings."""
+
+    stretch_s: float = tuned(
+        1.5,
+        unit="s",
+        meaning="length of the stretches of time whose scatter says how sure a change is",
+        least=1e-3,
+    )
+    min_stretches: int = tuned(6, unit="stretches", meaning="shorter ones where a recording has fewer", least=2)
+    same_length: float = tuned(
+        0.9, unit="of the longer run", meaning="runs of one motion are so long at least", most=1.0
+    )
+    same_motion: float = tuned(
+        0.02, unit="of the travel", meaning="how far apart the positions of runs of one motion may be"
+    )
+    typical_share: float = tuned(
+        0.2,
+        unit="of the torque's root mean square",
+        meaning="scale of the normal prior of a change of which nothing else is known",
+        least=1e-6,
+    )
+    typical_scale: float = tuned(
+        0.5, unit="of the friction", meaning="the same of a change of all friction of a joint by one factor", least=1e-6
+    )
+    drift_waves: int = tuned(
+        6, unit="waves a run", meaning="slow waves in which offset and friction of a run may drift", least=1
+    )
+    level: float = tuned(
+        0.01, unit="probability", meaning="of a false change in all that is compared", source="convention", most=1.0
+    )
+    least_evidence: float = tuned(
+        5.0, unit="log likelihood", meaning="least log evidence of a change", source="a Bayes factor of 150"
+    )
+    least_gain: float = tuned(
+        0.003,
+        unit="of the held-out error",
+        meaning="gain that a change makes on stretches of the recordings that are held out in turn",
+    )
+    max_rival_deficit: float = tuned(
+        5.0,
+        unit="log likelihood",
+        meaning="a change that explains the difference so little worse is a rival",
+        source="as least_evidence",
+    )
+    max_rivals: int = tuned(2, unit="rivals", meaning="most rivals of a change", source="a class has three names")
+    max_asked: int = tuned(12, unit="candidates", meaning="candidates that are tested at each step", least=1)
+    max_changes: int = tuned(8, unit="changes", meaning="most changes that are named", least=1)
+    folds: int = tuned(4, unit="folds", meaning="parts of the stretches that are held out in turn", least=2)
+
+
+@dataclass(frozen=True)
 class Tuning:
     """All tuning numbers of a diagnosis, by stage."""
 
@@ -615,6 +667,7 @@ class Tuning:
     claims: ClaimTuning = ClaimTuning()
     plausibility: PlausibilityTuning = PlausibilityTuning()
     intervals: IntervalTuning = IntervalTuning()
+    comparison: ComparisonTuning = ComparisonTuning()
 
 
 @dataclass(frozen=True)

@@ -1,79 +1,156 @@
-"""The comparison of two recordings of one robot: each diagnosed alone, both in one structure, and the new recording
-against the model of the old one.
+"""The comparison of recordings of one robot, step by step.
+
+`compare` is the whole flow: diagnose each recording (what there is), put all on one table with one common model
+(`pool_recordings`), test what changed beside it (`find_changes`), name it (`name_changes`), and say what would have
+been seen (`list_table`).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armlab.common.errors import InputError
-from armlab.diagnosis.compare.structure import Change, changes_between
+from armlab.diagnosis.compare.changes import ChangeTable, Tested, find_changes, held_out_errors, make_table
+from armlab.diagnosis.compare.named import (
+    Change,
+    NamedChange,
+    held_out_gains,
+    list_table,
+    name_changes,
+    predicts_better,
+)
+from armlab.diagnosis.compare.pooled import pool_recordings
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
-from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.settings import Baseline, Guards, Settings
-from armlab.effects.scene import scene_of
-from armlab.recordings.differentiate import differentiate
-from armlab.recordings.recording import Recording, Run
-from problem.arm import Arm
-from problem.pseudo_inertia import links_of
+from armlab.diagnosis.settings import Baseline, Settings
+from armlab.diagnosis.simulation import read_simulation
+from armlab.recordings.recording import Recording
 
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """old, new: each on its own. against: the new recording with the old one's model as its simulation.
+    """diagnoses: of each recording alone. named: what changed, the surest first. changes: every parameter compared.
 
-    reason: of an inconclusive comparison.
+    reason: of an inconclusive comparison. notes: sentences on what was not used.
     """
 
     status: ComparisonStatus
-    old: Diagnosis
-    new: Diagnosis
-    against: Diagnosis | None = None
+    diagnoses: tuple[Diagnosis, ...]
+    named: tuple[NamedChange, ...] = ()
     changes: tuple[Change, ...] = ()
     reason: str = ""
+    notes: tuple[str, ...] = ()
+
+    @property
+    def old(self) -> Diagnosis:
+        """Of the first recording."""
+        return self.diagnoses[0]
+
+    @property
+    def new(self) -> Diagnosis:
+        """Of the last recording."""
+        return self.diagnoses[-1]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the recordings."""
+        return tuple(each.recording.name for each in self.diagnoses)
 
     def __repr__(self) -> str:
-        """The status, how many parameters changed, and what the new recording shows against the old model."""
-        changed = sum(each.changed for each in self.changes)
-        lines = [f"Comparison of {self.old.recording.name!r} with {self.new.recording.name!r}: {self.status}"]
-        if self.against is None:
+        """The status, what changed, and how much was compared."""
+        lines = [f"Comparison of {', '.join(map(repr, self.names))}: {self.status}"]
+        if self.status == "inconclusive":
             return "\n".join([*lines, f"  {self.reason}"])
-        lines.append(f"  {changed} of {len(self.changes)} parameters changed (1 %, Holm)")
-        effects = [f"{each.effect}@{each.joint}" if each.joint else each.effect for each in self.against.claims]
-        return "\n".join([*lines, f"  new recording against old model: {', '.join(effects) or 'nothing'}"])
+        lines += [f"  {each.effect}@{each.joint}: {each.equation}" for each in self.named]
+        return "\n".join([*lines, f"  parameters compared: {len(self.changes)}"])
 
 
 def compare(
     old: Recording,
     new: Recording,
+    *more: Recording,
     baseline: Baseline | None = None,
     seed: int = 0,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Comparison:
-    """What changed from the old recording to the new one; InputError where they are not of one robot."""
-    _check_same_robot(old, new)
-    new = replace(new, arm=old.arm, simulation=old.simulation)
+    """What changed from the first recording to the later ones; InputError where they are not of one robot."""
+    for other in (new, *more):
+        _check_same_robot(old, other)
+    recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
+    diagnoses: list[Diagnosis] = []
+    for number, each in enumerate(recordings, 1):
+        diagnosis = _diagnose_once(recordings, diagnoses, baseline, seed, _progress_of(number, progress))
+        diagnoses.append(diagnosis)
+        if diagnosis.status == "inconclusive" and diagnosis.inertial is None:
+            return Comparison("inconclusive", tuple(diagnoses), reason=f"{each.name}: {diagnosis.summary}")
+    settings = Settings()
+    progress("putting the recordings on one table")
+    pooled = pool_recordings(recordings, diagnoses, read_simulation(old, baseline), settings)
+    progress("looking for changes")
+    table = make_table(pooled)
+    found = _without_failures(table, find_changes(table))
+    named = name_changes(pooled, table, found)
+    status: ComparisonStatus = "changed" if named else "same"
+    changes = list_table(pooled, table, found)
+    return Comparison(status, tuple(diagnoses), named, changes, notes=tuple(_notes(recordings, baseline)))
 
-    def progress_of(which: str) -> Callable[[str], None]:
-        return lambda message: progress(f"{which}: {message}")
 
-    first = diagnose(old, baseline, seed, progress=progress_of("old recording"))
-    second = diagnose(new, baseline, seed, progress=progress_of("new recording"))
-    for each in (first, second):
-        if each.status == "inconclusive" or each.inertial is None:
-            return Comparison("inconclusive", first, second, reason=f"{each.recording.name}: {each.summary}")
-    signs_may_fall = Settings(guards=replace(Guards(), physics_signs=False))  # a change may be less friction
-    simulated = with_simulation(new, first)
-    against = diagnose(simulated, "simulated", seed, signs_may_fall, progress_of("new recording, old model"))
-    if against.status == "inconclusive":
-        return Comparison("inconclusive", first, second, reason=against.summary)
-    status: ComparisonStatus = "changed" if against.status == "mismatch" else "same"
-    return Comparison(status, first, second, against, changes_between(first, second))
+def _diagnose_once(
+    recordings: Sequence[Recording],
+    known: Sequence[Diagnosis],
+    baseline: Baseline | None,
+    seed: int,
+    progress: Callable[[str], None],
+) -> Diagnosis:
+    """The diagnosis of the next recording; that of an earlier one where both hold the same rows."""
+    own = recordings[len(known)]
+    for diagnosis, other in zip(known, recordings, strict=False):
+        if _same_rows(own, other):
+            return replace(diagnosis, recording=own)
+    return diagnose(own, baseline, seed, progress=progress)
+
+
+def _same_rows(one: Recording, other: Recording) -> bool:
+    return len(one.runs) == len(other.runs) and all(
+        a.role == b.role
+        and a.samples == b.samples
+        and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("time", "position", "torque"))
+        for a, b in zip(one.runs, other.runs, strict=True)
+    )
+
+
+def _progress_of(number: int, progress: Callable[[str], None]) -> Callable[[str], None]:
+    return lambda message: progress(f"recording {number}: {message}")
+
+
+def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Tested, ...]:
+    """The changes without those that do not help on held-out stretches of every recording, the worst first."""
+    while found:
+        chosen = [each.group for each in found]
+        gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}
+        worst = min(gains, key=lambda each: min(gains[each]))
+        if all(predicts_better(each, table.tuning.least_gain) for each in gains.values()):
+            break
+        if predicts_better(gains[worst], table.tuning.least_gain):
+            worst = min(gains, key=lambda each: float(np.mean(gains[each])))
+        found = tuple(each for each in table.test([each for each in chosen if each != worst]) if table.is_sure(each))
+        found = table.test([each.group for each in found])
+    return found
+
+
+def _notes(recordings: Sequence[Recording], baseline: Baseline | None) -> Iterator[str]:
+    """What the recordings hold and the comparison does not use."""
+    runs = [run for each in recordings for run in each.runs]
+    if baseline == "simulated":
+        yield "The columns of simulated_torque are the simulation; what they lack in all recordings alike is no change."
+    elif any(run.simulated_torque is not None for run in runs):
+        yield "The columns of simulated_torque are not used: give --baseline simulated to take them as the simulation."
+    if any(run.simulated_position is not None for run in runs):
+        yield "The columns of simulated_position are not used: a comparison of torques takes the measured motion."
 
 
 def _check_same_robot(old: Recording, new: Recording) -> None:
@@ -86,25 +163,3 @@ def _check_same_robot(old: Recording, new: Recording) -> None:
     )
     if not alike:
         raise InputError(f"{old.name} is of {old.arm.name}, {new.name} of {new.arm.name}: not the same geometry")
-
-
-def with_simulation(new: Recording, old: Diagnosis) -> Recording:
-    """The new recording with the torque that the old one's model predicts for its runs, and the old one's links."""
-    runs = tuple(_run_with_prediction(run, old) for run in new.runs)
-    return replace(new, arm=_arm_with_found_links(old), simulation=None, runs=runs)
-
-
-def _arm_with_found_links(old: Diagnosis) -> Arm:
-    """The arm with the links that were found; as it is where there are none to start from."""
-    arm = old.simulation.arm
-    if old.simulation.inertial is None or old.inertial is None:
-        return arm
-    return replace(arm, links=links_of(old.inertial), rotor_inertia=())
-
-
-def _run_with_prediction(run: Run, old: Diagnosis) -> Run:
-    signals = differentiate(run)
-    time = signals.run.time
-    torque = model_found(old).torque_in(scene_of(signals.run, signals.motion, old.simulation.arm))
-    columns = [np.interp(run.time, time, torque[:, joint]) for joint in range(torque.shape[1])]
-    return replace(run, simulated_torque=np.column_stack(columns))

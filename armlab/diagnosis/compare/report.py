@@ -3,18 +3,28 @@ these files.
 """
 
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from textwrap import wrap
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.structure import BASE_PARAMETER, SIGNIFICANCE_LEVEL, Change
-from armlab.diagnosis.formats import COMPARISON_SCHEMA, ChangeEntry, ComparisonFile
+from armlab.diagnosis.compare.named import Change, NamedChange
+from armlab.diagnosis.formats import (
+    COMPARISON_SCHEMA,
+    ChangeEntry,
+    ClassMember,
+    ComparisonFile,
+    DetectableEntry,
+    FindingEntry,
+    ParameterEntry,
+    RivalEntry,
+    kind_of_effect,
+)
 from armlab.diagnosis.report import sections
 from armlab.diagnosis.report.charts import (
     FOUND_LOOK,
@@ -25,79 +35,113 @@ from armlab.diagnosis.report.charts import (
     svg_picture,
     svg_text,
 )
-from armlab.diagnosis.report.gallery import draw_gallery
-from armlab.diagnosis.report.html import figures, folded_details, html_document, html_table, paragraph, section
-from armlab.diagnosis.report.residuals import select_residuals
-from armlab.diagnosis.report.sections import findings_section
+from armlab.diagnosis.report.html import bullets, figures, folded_details, html_document, html_table, paragraph, section
 from armlab.diagnosis.report.words import (
     LINE_WIDTH,
     PARAMETER_DIGITS,
     effect_in_words,
-    finding_in_words,
     format_number,
     format_probability,
     format_unit,
-    gain_sentence,
     join_words,
+    parameter_rows,
     place_in_words,
 )
+from armlab.diagnosis.result import Rival
 from armlab.diagnosis.settings import Baseline
-from armlab.diagnosis.verdict_files import check_output_folder, make_verdict
+from armlab.diagnosis.tuning import ComparisonTuning
+from armlab.diagnosis.verdict_files import check_output_folder
+from armlab.effects.library import effect_named
 from armlab.recordings.load import load_recording
 
 MAX_NAMED_CHANGES = 3
+SEEN_EFFECTS = ("coulomb_friction", "viscous_friction", "payload", "torque_gain_error", "encoder_offset", "time_delay")
 
 
 def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
-    """What changed by name, and which numbers."""
-    names = f"{comparison.old.recording.name} and {comparison.new.recording.name}"
+    """What changed and by how much; and the smallest changes that would have been seen."""
+    names = join_words(comparison.names)
     if comparison.status == "inconclusive":
         return f"{names} cannot be compared.", comparison.reason
-    changed = [each for each in comparison.changes if each.changed and each.effect != BASE_PARAMETER]
-    more = f", and {len(changed) - MAX_NAMED_CHANGES} more" if len(changed) > MAX_NAMED_CHANGES else ""
-    numbers = join_words([change_phrase(each) for each in changed[:MAX_NAMED_CHANGES]]) + more if changed else ""
+    seen = detectable_sentence(comparison)
     if comparison.status == "same":
-        small = f"Differences too small to matter for the torque: {numbers}." if numbers else ""
-        return f"Nothing changed between {names} that the recordings show.", small
-    assert comparison.against is not None
-    claims = join_words([finding_in_words(each) for each in comparison.against.claims[:MAX_NAMED_CHANGES]])
-    in_numbers = f"In numbers: {numbers}. " if numbers else ""
-    return f"Between {names} this changed: {claims}.", in_numbers + gain_sentence(comparison.against)
+        return f"Nothing changed between {names} that the recordings show.", seen
+    phrases = [change_phrase(each) for each in comparison.named[:MAX_NAMED_CHANGES]]
+    rest = len(comparison.named) - len(phrases)
+    more = f", and {rest} more" if rest else ""
+    return f"Between {names} this changed: {join_words(phrases)}{more}.", f"Nothing else changed. {seen}".strip()
 
 
-def change_phrase(change: Change) -> str:
-    """A changed parameter with both values."""
-    name = (
-        change.parameter
-        if change.effect == BASE_PARAMETER
-        else (
-            f"{change.parameter} of {effect_in_words(change.effect)} at "
-            f"{place_in_words(change.effect, change.joint, change.joints)}"
-        )
-    )
-    old, new = format_number(change.old, PARAMETER_DIGITS), format_number(change.new, PARAMETER_DIGITS)
-    return f"{name} from {old} to {new} {format_unit(change.unit)}".rstrip()
+def change_phrase(named: NamedChange) -> str:
+    """A change with its numbers: in percent where there is a level, else in units."""
+    where = f"{effect_in_words(named.effect)} {'of' if named.joint is None else 'at'} "
+    where += place_in_words(named.effect, named.joint, named.joints)
+    parts = [_amount(each) for each in named.changes]
+    return f"{where} ({', '.join(parts)})" if parts else f"{where}: {named.equation}"
+
+
+def _amount(change: Change) -> str:
+    unit = format_unit(change.unit)
+    if change.levels is not None:
+        levels = " to ".join(format_number(value) for value in (change.levels[0], change.levels[-1]))
+        percent = "" if change.ratio is None else f", {_percents(change.ratio)}"
+        return f"{change.parameter} from {levels} {unit}".rstrip() + percent
+    if change.ratio is not None:
+        return f"{change.parameter} {_percents(change.ratio)}"
+    low, high = (format_number(value) for value in change.interval)
+    return f"{change.parameter} changes by {format_number(change.difference)} ({low} to {high}) {unit}".rstrip()
+
+
+def _percents(ratio: tuple[float, float, float]) -> str:
+    value, low, high = (100 * (each - 1) for each in ratio)
+    return f"{value:+.3g} % ({low:+.3g} to {high:+.3g} %)".replace("-", "−")
+
+
+def detectable_sentence(comparison: Comparison) -> str:
+    """The smallest changes that would have been named, of the usual kinds: the middle one of the joints."""
+    parts = []
+    for effect in SEEN_EFFECTS:
+        rows = [each for each in comparison.changes if each.effect == effect and not each.changed]
+        first = rows[0].parameter if rows else ""
+        sizes = sorted((each.detectable, each) for each in rows if each.parameter == first)
+        if not sizes:
+            continue
+        middle = sizes[len(sizes) // 2][1]
+        share = detectable_share(middle)
+        size = f"{100 * share:.2g} %" if share is not None else f"{format_number(middle.detectable, 2)} {middle.unit}"
+        parts.append(f"{effect_in_words(effect)} {size.replace('N.m', 'N m')}")
+    if not parts:
+        return ""
+    return f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
+
+
+def detectable_share(change: Change) -> float | None:
+    """The smallest change as a share of the level; of a gain, of the torque."""
+    if change.parameter == "gain":
+        return change.detectable
+    if change.levels is None or not np.mean(change.levels):
+        return None
+    return change.detectable / abs(float(np.mean(change.levels)))
 
 
 def comparison_lines(comparison: Comparison) -> Iterator[str]:
-    """The verdict, then each parameter that changed with its interval."""
+    """The verdict, then each change with its rivals and how sure it is."""
     first, second = comparison_sentences(comparison)
     yield from wrap(f"{comparison.status.upper()}: {first} {second}", LINE_WIDTH)
-    if comparison.against is not None:
-        for claim in comparison.against.claims:
-            yield from wrap(
-                f"{finding_in_words(claim)}: {claim.equation}",
-                LINE_WIDTH,
-                initial_indent="  ",
-                subsequent_indent="    ",
-            )
-    changed = [each for each in comparison.changes if each.changed]
-    for each in changed:
-        low, high = (format_number(value, PARAMETER_DIGITS) for value in each.interval)
-        yield f"  {change_phrase(each)}: difference {low} to {high} (95 %), p {format_probability(each.p_value)}"
+    for each in comparison.named:
+        rivals = [_rival_phrase(rival) for rival in each.rivals]
+        also = f"; it could also be {join_words(rivals)}" if rivals else ""
+        text = f"{change_phrase(each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
+        yield from wrap(text, LINE_WIDTH, initial_indent="  ", subsequent_indent="    ")
+    for note in comparison.notes:
+        yield from wrap(note, LINE_WIDTH, initial_indent="  ", subsequent_indent="  ")
     if comparison.changes:
-        all_changes = len(comparison.changes)
-        yield f"  {all_changes - len(changed)} of {all_changes} parameters show no change (1 %, Holm)"
+        changed = sum(each.changed for each in comparison.changes)
+        yield f"  {len(comparison.changes) - changed} of {len(comparison.changes)} parameters show no change"
+
+
+def _rival_phrase(rival: Rival) -> str:
+    return f"{effect_in_words(rival.effect)} at {place_in_words(rival.effect, rival.joint, rival.joints)}"
 
 
 def make_comparison_file(comparison: Comparison) -> ComparisonFile:
@@ -106,11 +150,40 @@ def make_comparison_file(comparison: Comparison) -> ComparisonFile:
         schema=COMPARISON_SCHEMA,
         status=comparison.status,
         summary=" ".join(comparison_sentences(comparison)).strip(),
-        old=comparison.old.recording.name,
-        new=comparison.new.recording.name,
-        level=SIGNIFICANCE_LEVEL,
+        old=comparison.names[0],
+        new=comparison.names[-1],
+        recordings=comparison.names,
+        level=ComparisonTuning().level,
+        findings=tuple(_finding_entry(each) for each in comparison.named),
         changes=tuple(_change_entry(each) for each in comparison.changes),
-        against=None if comparison.against is None else make_verdict(comparison.against),
+        smallest_detectable=tuple(_detectable_entry(each) for each in comparison.changes),
+        notes=comparison.notes,
+    )
+
+
+def _finding_entry(each: NamedChange) -> FindingEntry:
+    members = [(each.effect, each.joint, each.probability)]
+    near = [(rival.effect, rival.joint, np.exp(-rival.deficit)) for rival in each.rivals]
+    members += [(effect, joint, float(each.probability * weight)) for effect, joint, weight in near]
+    total = sum(member[2] for member in members)
+    names = tuple(ClassMember(effect=name, joint=joint, probability=share / total) for name, joint, share in members)
+    own_class: dict[str, Any] = {"class": names}
+    return FindingEntry(
+        effect=each.effect,
+        kind=kind_of_effect(effect_named(each.effect)),
+        joint=each.joint,
+        joints=each.joints,
+        form=each.form or None,
+        parameters={
+            one.name: ParameterEntry(value=one.value, ci95=one.interval, unit=one.unit) for one in each.parameters
+        },
+        equation=each.equation,
+        heldout_rms_before=each.rms_before,
+        heldout_rms_after=each.rms_after,
+        p_value=each.p_value,
+        probability=each.probability,
+        rivals=tuple(RivalEntry(effect=rival.effect, joint=rival.joint) for rival in each.rivals),
+        **own_class,
     )
 
 
@@ -122,14 +195,28 @@ def _change_entry(each: Change) -> ChangeEntry:
         parameter=each.parameter,
         old=each.old,
         new=each.new,
+        difference=each.difference,
         difference_ci95=each.interval,
+        ratio=None if each.ratio is None else each.ratio[0],
+        ratio_ci95=None if each.ratio is None else each.ratio[1:],
         unit=each.unit,
         p_value=each.p_value,
         changed=each.changed,
     )
 
 
-TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p (Holm)")
+def _detectable_entry(each: Change) -> DetectableEntry:
+    return DetectableEntry(
+        effect=each.effect,
+        joint=each.joint,
+        parameter=each.parameter,
+        change=each.detectable,
+        unit=each.unit,
+        share=detectable_share(each),
+    )
+
+
+TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p", "smallest seen")
 PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 178.0
 MAX_DRAWN_CHANGES = 24
 
@@ -138,69 +225,69 @@ def comparison_page(comparison: Comparison, command: str) -> str:
     """HTML text."""
     first, second = comparison_sentences(comparison)
     kind = {"changed": "mismatch", "same": "none", "inconclusive": "inconclusive"}[comparison.status]
-    title = f"What changed between {comparison.old.recording.name} and {comparison.new.recording.name}"
+    title = f"What changed between {join_words(comparison.names)}"
     parts = [sections.page_header(title, kind, first, second)]
+    if comparison.named:
+        parts.append(section("changed", "What changed", *(_card(each, comparison.names) for each in comparison.named)))
     if comparison.changes:
         parts.append(_numbers_section(comparison))
-    if comparison.against is not None:
-        data = select_residuals(comparison.against)
-        if data is not None:
-            drawn = draw_gallery(comparison.against, data)
-            text = (
-                f"Below, {comparison.new.recording.name} is diagnosed with the model of "
-                f"{comparison.old.recording.name} as its simulation: “as given” is what the old model "
-                "predicts. Signs are free: friction may have fallen."
-            )
-            parts += [
-                section("against", "The new recording against the old model", paragraph(text)),
-                sections.before_after_section(comparison.against, drawn),
-                findings_section(comparison.against, drawn),
-                sections.location_section(comparison.against, drawn),
-            ]
+    if comparison.notes:
+        parts.append(section("notes", "Not used", bullets(comparison.notes)))
     parts.append(sections.origin_section(comparison.new, command))
     return html_document(title, parts)
 
 
+def _card(named: NamedChange, names: Sequence[str]) -> str:
+    """One change: numbers, what it explains, and what else it could be."""
+    rows = [[one.name, one.value, one.interval, one.unit] for each in named.parameters for one in parameter_rows(each)]
+    gains = ", ".join(f"{name} {100 * gain:.3g} %" for name, gain in zip(names, named.gains, strict=True))
+    rivals = [_rival_phrase(each) for each in named.rivals]
+    texts = [
+        paragraph(f"{named.equation}. Log evidence {named.evidence:.0f}, p {format_probability(named.p_value)}."),
+        paragraph(f"Held-out errors fall by this share of what is left: {gains}."),
+        paragraph(f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well."),
+    ]
+    table = html_table(["change of", "value", "95 % interval", "unit"], rows, (0, 3))
+    return f'<article class="finding"><h3>{change_phrase(named)}</h3>{"".join(texts)}{table}</article>'
+
+
 def _numbers_section(comparison: Comparison) -> str:
     text = (
-        "Both recordings are fitted in one structure: the base parameters and every effect that was found in either, "
-        "nonlinear parameters held. Intervals are robust against errors that are tied within a second; p-values are "
-        "corrected over all parameters (Holm)."
+        "All recordings are fitted with one model: links, and what the diagnoses found, are common; each change is the "
+        "same column again, times the recording, and is tested beside its common part. Intervals come from the scatter "
+        "between stretches of time. “Smallest seen” is the change that would have been named."
     )
     changed = [each for each in comparison.changes if each.changed]
     rest = [each for each in comparison.changes if not each.changed]
-    first = _changes_table(changed) if changed else ""
     return section(
         "numbers",
         "In numbers",
         figures([draw_changes(comparison.changes)]),
-        first,
+        _changes_table(changed) if changed else "",
         paragraph(text, "pale"),
         folded_details(f"{len(rest)} parameters that show no change", _changes_table(rest)),
     )
 
 
-def _changes_table(changes: list[Change]) -> str:
+def _changes_table(changes: Sequence[Change]) -> str:
     return html_table(TABLE_HEADINGS, [_change_row(each) for each in changes], (0, 1, 5))
 
 
 def _change_name(change: Change) -> str:
-    if change.effect == BASE_PARAMETER:
-        return change.parameter
     return f"{change.parameter}, {effect_in_words(change.effect)}"
 
 
 def _change_row(change: Change) -> list[str]:
-    where = "links" if change.effect == BASE_PARAMETER else place_in_words(change.effect, change.joint, change.joints)
     low, high = (format_number(value, PARAMETER_DIGITS) for value in change.interval)
-    values = (format_number(change.old, PARAMETER_DIGITS), format_number(change.new, PARAMETER_DIGITS))
+    levels = ["–" if value is None else format_number(value, PARAMETER_DIGITS) for value in (change.old, change.new)]
     return [
         _change_name(change),
-        where,
-        *values,
+        place_in_words(change.effect, change.joint, change.joints),
+        *levels,
         f"{low} to {high}",
         format_unit(change.unit),
         format_probability(change.p_value),
+        format_number(change.detectable),
     ]
 
 
@@ -246,8 +333,7 @@ def _score_position(score: float, largest: float) -> float:
 
 
 def compare_recordings(
-    old: Path,
-    new: Path,
+    folders: Sequence[Path],
     out: Path,
     baseline: str | None,
     seed: int,
@@ -255,17 +341,18 @@ def compare_recordings(
 ) -> Iterator[str]:
     """Compares, writes comparison.json and comparison.html into `out`, both or none, and yields lines to print.
 
-    Raises InputError, in one line, for recordings that cannot be used or are not of one robot.
+    folders: of the recordings, the oldest first. Raises InputError, in one line, for recordings that cannot be used or
+    are not of one robot.
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
-    recordings = load_recording(old), load_recording(new)
-    check_output_folder(out, recordings[1])
+    first, second, *more = (load_recording(each) for each in folders)
+    check_output_folder(out, second)
     try:
-        comparison = compare(*recordings, chosen, seed, progress)
+        comparison = compare(first, second, *more, baseline=chosen, seed=seed, progress=progress)
     except ValueError as error:
-        raise InputError(f"{old} and {new}: {error}") from None
+        raise InputError(f"{' and '.join(map(str, folders))}: {error}") from None
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
-    command = shlex.join(["armlab", "diagnose", "--compare", str(old), str(new), "--out", str(out), *options])
+    command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out), *options])
     texts = {
         "comparison.json": make_comparison_file(comparison).to_json(),
         "comparison.html": comparison_page(comparison, command),

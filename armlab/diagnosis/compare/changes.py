@@ -1,0 +1,356 @@
+"""What changed: the columns of each candidate times the recording, tested beside the same columns in common.
+
+As a change is tested beside its common part, a recording compared with itself has none, by symmetry. Status, named
+changes and the table of parameters come from this one test.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.columns import Block, place_of
+from armlab.diagnosis.compare.mixed import JointRows, MixedModel, WeightedRows, weigh_rows
+from armlab.diagnosis.compare.pooled import Pooled, is_body
+from armlab.diagnosis.data import rows_in
+from armlab.diagnosis.tuning import ComparisonTuning
+from armlab.effects.contract import Candidate
+from armlab.effects.links import BODY_SIZE_M
+
+BODY_SCALES = np.array([1.0, *[BODY_SIZE_M] * 3, *[BODY_SIZE_M**2] * 6])  # of a body of one kilogram
+
+
+@dataclass(frozen=True, eq=False)
+class ChangeGroup:
+    """One thing that may have changed. block: its columns in common; columns: their numbers, times the recording.
+
+    scales: (columns,), of their normal prior. laws: where all friction of a joint changes by one factor, its laws with
+    their coefficients. common: numbers of the same columns in common; empty where links hold them. least: a smaller
+    change is how logs are made, see `Parameter.sampled`.
+    """
+
+    block: Block
+    columns: NDArray[np.intp]
+    scales: Array
+    common: NDArray[np.intp]
+    laws: tuple[tuple[Candidate, Array], ...] = ()
+    least: float = 0.0
+
+    @property
+    def candidate(self) -> Candidate:
+        """The law; of several, that of the largest torque."""
+        return self.block.candidate
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A group fitted beside others. values: (columns,); covariance: by the scatter of stretches of time.
+
+    p_value: of no change, for this group alone. evidence: log of the Bayes factor. inflation: of the covariance under
+    independent errors.
+    """
+
+    group: int
+    values: Array
+    covariance: Array
+    p_value: float
+    evidence: float
+    inflation: float
+
+
+@dataclass(frozen=True, eq=False)
+class ChangeTable:
+    """The model of all recordings. contrast: (recordings, columns a coefficient).
+
+    common: columns that all share. model: those of them that the common model has; the others stand beside changes.
+    """
+
+    mixed: MixedModel
+    common: NDArray[np.intp]
+    model: NDArray[np.intp]
+    groups: tuple[ChangeGroup, ...]
+    contrast: Array
+    tuning: ComparisonTuning
+
+    def columns_with(self, chosen: Sequence[int]) -> NDArray[np.intp]:
+        """The common columns and those of chosen groups."""
+        return np.concatenate([self.common, *(self.groups[each].columns for each in chosen)]).astype(np.intp)
+
+    @cached_property
+    def degrees(self) -> int:
+        """Degrees of freedom of the scatter between stretches: those of the recording with the fewest."""
+        pairs = [np.column_stack([each.rows.members, each.rows.stretches]) for each in self.mixed.joints]
+        owners = np.unique(np.concatenate(pairs), axis=0)[:, 0]
+        return max(int(np.bincount(owners, minlength=len(self.contrast)).min()) - 1, 1)
+
+    def evidence(self, chosen: Sequence[int]) -> Array:
+        """Log evidence of each group beside chosen ones, errors taken as independent: (groups,)."""
+        mixed, inside = self.mixed, self.columns_with(chosen)
+        matrix = mixed.information[np.ix_(inside, inside)] + np.diag(mixed.precision[inside])
+        scale = 1 / np.sqrt(np.diag(matrix))
+        low = np.linalg.cholesky(matrix * np.outer(scale, scale))
+        half = np.linalg.solve(low, scale[:, None] * mixed.information[inside])
+        out = np.full(len(self.groups), -np.inf)
+        for number, group in enumerate(self.groups):
+            if number in chosen:
+                continue
+            own = group.columns
+            data = mixed.information[np.ix_(own, own)] - half[:, own].T @ half[:, own]
+            towards = mixed.information[own, -1] - half[:, own].T @ half[:, -1]
+            out[number] = _log_bayes_factor(np.asarray(data), np.asarray(towards), group.scales)
+        return out
+
+    def test(self, chosen: Sequence[int]) -> tuple[Tested, ...]:
+        """Tests of chosen groups, all fitted together."""
+        inside = self.columns_with(chosen)
+        values, inverse = self.mixed.fit(inside)
+        robust = inverse @ (self.mixed.scatter(inside, values) + np.diag(self.mixed.precision[inside])) @ inverse
+        out, at = [], len(self.common)
+        for number in chosen:
+            place = slice(at, at + len(self.groups[number].columns))
+            out.append(self._judge(number, values[place], inverse[place, place], robust[place, place]))
+            at = place.stop
+        return tuple(out)
+
+    def _judge(self, number: int, values: Array, model: Array, robust: Array) -> Tested:
+        """One factor makes the covariance under independent errors as large as the stretches say."""
+        scales, count = self.groups[number].scales, len(values)
+        precision: Array = np.asarray(np.linalg.inv(model), dtype=np.float64)
+        inflation = max(float(np.trace(precision @ robust)) / count, 1.0)
+        data = (precision - np.diag(scales**-2.0)) / inflation
+        evidence = _log_bayes_factor(data, precision @ values / inflation, scales)
+        rank = max(int(np.sum(np.linalg.eigvalsh(scales[:, None] * data * scales) > 1)), 1)
+        wald = float(values @ precision @ values) / inflation
+        p_value = float(fisher.sf(wald / rank, rank, self.degrees))
+        return Tested(number, values, model * inflation, p_value, evidence, inflation)
+
+    def is_sure(self, tested: Tested) -> bool:
+        """Whether a change is no chance among all that is compared."""
+        size = float(np.ptp(self.contrast @ tested.values.reshape(-1, self.contrast.shape[1]).T))
+        enough = tested.evidence > self.tuning.least_evidence and size >= self.groups[tested.group].least
+        return enough and tested.p_value * len(self.groups) < self.tuning.level
+
+
+def _log_bayes_factor(data: Array, towards: Array, scales: Array) -> float:
+    """Of values with a normal prior of these scales against zeros. data: (columns, columns), their information."""
+    inner = np.eye(len(scales)) + scales[:, None] * data * scales
+    scaled = scales * towards
+    return 0.5 * float(scaled @ np.linalg.solve(inner, scaled)) - 0.5 * float(np.linalg.slogdet(inner)[1])
+
+
+def make_table(pooled: Pooled) -> ChangeTable:
+    """Columns of the common model and of all changes, row by row, with the drift of each run."""
+    design, observed, tuning = pooled.design, pooled.observed, pooled.tuning
+    count = pooled.recordings
+    contrast = np.eye(count)[:, 1:] - 1 / count
+    interval = max(1 / each.run.rate_hz for each in observed.signals)
+    known = {place_of(block.candidate) for block in design.blocks}
+    shared = [*design.blocks, *(each for each in pooled.changes if place_of(each.candidate) not in known)]
+    shared = [each for each in shared if not is_body(each.candidate)]
+    parts = _Columns(observed.joints)
+    for joint in range(observed.joints):
+        loading = np.flatnonzero(design.base.columns >= 10 * joint)
+        parts.add(joint, np.concatenate([run[joint] for run in design.rigid]), loading)
+    at, prior, common = len(design.base), [np.zeros(len(design.base))], dict[object, NDArray[np.intp]]()
+    for block in shared:
+        columns = np.arange(at, at + block.values.shape[2])
+        at += len(columns)
+        scale = block.candidate.prior_scale(design.simulation.inertial)
+        prior.append(np.full(len(columns), scale**-2.0 if np.isfinite(scale) else 0.0))
+        common[place_of(block.candidate)] = columns
+        for place, row in enumerate(block.candidate.rows):
+            parts.add(row, block.values[:, place], columns)
+    everything, groups = np.arange(at), []
+    scaled = _scaled_frictions(pooled)
+    for block, laws in [*((each, ()) for each in pooled.changes), *scaled]:
+        columns = np.arange(at, at + block.values.shape[2] * contrast.shape[1])
+        at += len(columns)
+        scales = np.full(1, tuning.typical_scale) if laws else _prior_scales(block, pooled)
+        scales = np.repeat(scales, contrast.shape[1])
+        own = np.empty(0, dtype=np.intp) if laws else common.get(place_of(block.candidate), np.empty(0, dtype=np.intp))
+        sampled = any(each.sampled for each in block.candidate.facts.parameters)
+        groups.append(ChangeGroup(block, columns, scales, own, laws, interval if sampled else 0.0))
+        prior.append(scales**-2.0)
+        for place, row in enumerate(block.candidate.rows):
+            values = block.values[:, place, :, None] * contrast[pooled.members][:, None, :]
+            parts.add(row, values.reshape(len(values), -1), columns)
+    friction = {block.candidate.rows[0]: block.values[:, 0, 0] for block, _ in scaled}
+    joints = tuple(_weighted_rows(pooled, parts, joint, friction.get(joint)) for joint in range(observed.joints))
+    mixed = MixedModel(joints, at, np.concatenate(prior))
+    own = np.arange(design.columns.size)
+    return ChangeTable(mixed, everything, own, tuple(groups), contrast, tuning)
+
+
+class _Columns:
+    """Columns of each joint with their numbers, as they are added."""
+
+    def __init__(self, joints: int) -> None:
+        self.values: list[list[Array]] = [[] for _ in range(joints)]
+        self.numbers: list[list[NDArray[np.intp]]] = [[] for _ in range(joints)]
+
+    def add(self, joint: int, values: Array, numbers: NDArray[np.intp]) -> None:
+        """Columns (rows, count) of a joint."""
+        self.values[joint].append(values)
+        self.numbers[joint].append(numbers)
+
+
+def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array | None) -> WeightedRows:
+    """The rows in which a joint moves. friction: (rows,), its torque in the common model."""
+    observed = pooled.observed
+    rows = rows_in(observed.used(joint), observed.rows)
+    slow = _slow_waves(pooled)
+    level = np.sign(observed.kept("velocity")[:, joint]) if friction is None else friction
+    level = level / max(float(np.sqrt(np.mean(level**2))), 1e-300)
+    return weigh_rows(
+        JointRows(
+            columns=np.column_stack(parts.values[joint])[rows],
+            index=np.concatenate(parts.numbers[joint]),
+            target=pooled.design.target[rows, joint],
+            random=(slow[rows], slow[rows] * level[rows, None]),
+            stretches=pooled.stretches[rows],
+            members=pooled.members[rows],
+        )
+    )
+
+
+def _slow_waves(pooled: Pooled) -> Array:
+    """A constant and slow cosines of each run, falling as their frequency grows: (rows, runs * waves).
+
+    A run differs from the next one by about as much as its beginning from its end.
+    """
+    waves, start, orders = [], 0, np.arange(1, pooled.tuning.drift_waves + 1)
+    for signals in pooled.observed.signals:
+        count = len(signals.torque)
+        share = (np.arange(count) + 0.5) / count
+        own = np.zeros((pooled.observed.rows, len(orders) + 1))
+        own[start : start + count, 0] = 1.0
+        own[start : start + count, 1:] = np.sqrt(2) * np.cos(np.pi * np.outer(share, orders)) / orders
+        waves.append(own)
+        start += count
+    return np.column_stack(waves)
+
+
+def _scaled_frictions(pooled: Pooled) -> list[tuple[Block, tuple[tuple[Candidate, Array], ...]]]:
+    """The torque of all friction of a joint as one column, where it has several laws."""
+    model, out = pooled.model, []
+    for joint in range(pooled.observed.joints):
+        laws = []
+        for number, block in enumerate(model.design.blocks):
+            candidate = block.candidate
+            if candidate.rows == (joint,) and candidate.facts.dissipates and len(candidate.joints) == 1:
+                values = model.solver.values(model.fit, number)
+                laws.append((candidate, values, block.values[:, 0] @ values))
+        laws.sort(key=lambda law: -float(law[2] @ law[2]))
+        if len(laws) > 1:
+            total = np.sum([law[2] for law in laws], axis=0)
+            out.append((Block(laws[0][0], 0, total[:, None, None]), tuple((law[0], law[1]) for law in laws)))
+    return out
+
+
+def _prior_scales(block: Block, pooled: Pooled) -> Array:
+    """Standard deviations of a change's coefficients: what the effect has on arms, else a share of the torque."""
+    candidate, observed = block.candidate, pooled.observed
+    known = candidate.prior_scale(pooled.design.simulation.inertial)
+    if np.isfinite(known):
+        return np.full(block.values.shape[2], known)
+    rows = list(candidate.rows)
+    torque = pooled.tuning.typical_share * np.sqrt(np.mean(observed.torque[:, rows] ** 2, axis=0))
+    size = np.sqrt(np.mean(block.values**2, axis=0))  # (rows, coefficients)
+    if is_body(candidate):
+        inner = BODY_SCALES[list(getattr(candidate, "felt", range(10)))]
+        total = np.sqrt(np.sum((size * inner) ** 2, axis=1))
+        return np.asarray(inner * np.min(torque / np.maximum(total, 1e-300)))
+    return np.asarray(np.min(torque[:, None] / np.maximum(size, 1e-300), axis=0))
+
+
+def find_changes(table: ChangeTable) -> tuple[Tested, ...]:
+    """The changes that are sure, fitted together: added one by one, exchanged, taken out where others explain them."""
+    chosen: tuple[int, ...] = ()
+    for _ in range(table.tuning.max_changes):
+        added = _best_addition(table, chosen)
+        if added is None:
+            break
+        settled = _settle(table, (*chosen, added))
+        if set(settled) == set(chosen):
+            break
+        chosen = settled
+    return table.test(chosen)
+
+
+def _best_addition(table: ChangeTable, chosen: tuple[int, ...]) -> int | None:
+    """The surest group beside chosen ones; None where none is sure."""
+    gains = table.evidence(chosen)
+    asked = [int(number) for number in np.argsort(-gains)[: table.tuning.max_asked] if gains[number] > 0]
+    tested = [table.test((*chosen, number))[-1] for number in asked]
+    sure = [each for each in tested if table.is_sure(each)]
+    return max(sure, key=lambda each: each.evidence).group if sure else None
+
+
+def _settle(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """The groups, each in place of a worse one, without those that the others explain."""
+    chosen = _without_unsure(table, _with_single_laws(table, chosen))
+    for number in chosen:
+        rest = tuple(each for each in chosen if each != number)
+        gains = table.evidence(rest)
+        best = int(np.argmax(gains))
+        if best != number and gains[best] > gains[number]:
+            exchanged = _without_unsure(table, _with_single_laws(table, (*rest, best)))
+            chosen = exchanged if best in exchanged else chosen
+    return chosen
+
+
+def _without_unsure(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    while chosen:
+        tested = table.test(chosen)
+        worst = min(tested, key=lambda each: each.evidence)
+        if table.is_sure(worst):
+            break
+        chosen = tuple(each for each in chosen if each != worst.group)
+    return chosen
+
+
+def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Laws of friction one by one where they did not change by one factor."""
+    for number in chosen:
+        group = table.groups[number]
+        if not group.laws:
+            continue
+        laws = [place_of(law) for law, _ in group.laws]
+        single = [
+            other for other, each in enumerate(table.groups) if not each.laws and place_of(each.candidate) in laws
+        ]
+        if set(single) & set(chosen):
+            chosen = tuple(dict.fromkeys((*(each for each in chosen if each != number), *single)))
+    return chosen
+
+
+def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tuple[tuple[int, float], ...]:
+    """Groups that explain the difference nearly as well in the place of a chosen one, with their deficits."""
+    number = tested.group
+    rest = [each for each in chosen if each != number]
+    gains = table.evidence(rest)
+    deficits = (gains[number] - gains) / tested.inflation
+    near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.max_rival_deficit]
+    return tuple((each, float(max(deficits[each], 0.0))) for each in near if each != number)[: table.tuning.max_rivals]
+
+
+def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:
+    """Errors (rows,) of each joint without and with a change, each stretch predicted by the others."""
+    mixed, folds = table.mixed, table.tuning.folds
+    fold = np.arange(mixed.stretches) % folds
+    out: list[list[Array]] = []
+    for groups in ([each for each in chosen if each != number], list(chosen)):
+        inside = table.columns_with(groups)
+        values = np.column_stack(
+            [mixed.fit(inside, mixed.information - mixed.information_of(fold == each))[0] for each in range(folds)]
+        )
+        errors = []
+        for joint, rows in enumerate(mixed.joints):
+            left = mixed.errors(joint, inside, values)
+            errors.append(left[np.arange(len(left)), fold[rows.rows.stretches]])
+        out.append(errors)
+    return out[0], out[1]

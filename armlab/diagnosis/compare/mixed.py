@@ -1,0 +1,189 @@
+"""Least squares in which the slow drift of each run is random.
+
+    torque = columns @ values + drift + noise
+
+at each joint. The drift is a slow change of offset and of friction within each run, its size found by restricted
+likelihood (Patterson and Thompson 1971). A level that wanders within a run wanders between runs, too, and is no
+evidence of a change.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
+
+from armlab.common.arrays import Array
+
+VARIANCE_RATIOS = 10.0 ** np.arange(-6.0, 6.1, 0.5)  # of a random part over the noise, that are tried
+FIRST_RATIO = 1e-4
+LIKELIHOOD_ROUNDS = 3
+INDEPENDENT_POWER = 1e-9  # of the largest eigenvalue of scaled columns: less is rounding
+LEAST_PRECISION = 1e-10  # of a column's information: keeps what no row determines finite
+
+
+@dataclass(frozen=True, eq=False)
+class JointRows:
+    """The rows of one joint that count.
+
+    columns: (rows, own), index: (own,) their numbers among all. target: (rows,). random: parts (rows, count), one
+    variance a part. stretches, members: (rows,), stretch of time and recording of each row.
+    """
+
+    columns: Array
+    index: NDArray[np.intp]
+    target: Array
+    random: tuple[Array, ...]
+    stretches: NDArray[np.intp]
+    members: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class WeightedRows:
+    """Rows of one joint with the covariance of drift and noise. variance: of the noise.
+
+    drift: (rows, count), random columns in units of the noise. weighted, weighted_target: inverse covariance times the
+    columns and the target.
+    """
+
+    rows: JointRows
+    variance: float
+    drift: Array
+    factor: tuple[Array, bool]
+    weighted: Array
+    weighted_target: Array
+
+    def weigh(self, values: Array) -> Array:
+        """The inverse covariance times values (rows, ...)."""
+        return _weigh(values, self.drift, self.factor, self.variance)
+
+
+def weigh_rows(rows: JointRows) -> WeightedRows:
+    """The rows with the likeliest covariance of drift and noise."""
+    variance, ratios = _restricted_variances(rows)
+    sizes = [part.shape[1] for part in rows.random]
+    drift = np.column_stack(rows.random) * np.sqrt(np.repeat(ratios, sizes))
+    factor = cho_factor(np.eye(drift.shape[1]) + drift.T @ drift, lower=True)
+    both = _weigh(np.column_stack([rows.columns, rows.target]), drift, factor, variance)
+    return WeightedRows(rows, variance, drift, factor, both[:, :-1], both[:, -1])
+
+
+def _weigh(values: Array, drift: Array, factor: tuple[Array, bool], variance: float) -> Array:
+    return np.asarray((values - drift @ cho_solve(factor, drift.T @ values)) / variance)
+
+
+def _restricted_variances(rows: JointRows) -> tuple[float, tuple[float, ...]]:
+    """Variance of the noise, and of each random part over it, where the restricted likelihood is largest."""
+    basis = _orthonormal_basis(rows.columns)
+    left = rows.target - basis @ (basis.T @ rows.target)
+    random = np.column_stack(rows.random)
+    random = random - basis @ (basis.T @ random)
+    gram, towards, power = random.T @ random, random.T @ left, float(left @ left)
+    free = max(len(left) - basis.shape[1], 1)
+    sizes = [part.shape[1] for part in rows.random]
+
+    def rest_and_spread(ratios: Sequence[float]) -> tuple[float, float]:
+        root = np.sqrt(np.repeat(ratios, sizes))
+        factor = cho_factor(np.eye(len(gram)) + root[:, None] * gram * root, lower=True)
+        scaled = root * towards
+        rest = power - float(scaled @ cho_solve(factor, scaled))
+        return max(rest, 1e-300), 2 * float(np.sum(np.log(np.diag(factor[0]))))
+
+    def likelihood(ratios: Sequence[float]) -> float:
+        rest, spread = rest_and_spread(ratios)
+        return float(-0.5 * (free * np.log(rest) + spread))
+
+    ratios = [FIRST_RATIO] * len(sizes)
+    for _ in range(LIKELIHOOD_ROUNDS):
+        for part in range(len(sizes)):
+            tried = [likelihood([*ratios[:part], ratio, *ratios[part + 1 :]]) for ratio in VARIANCE_RATIOS]
+            ratios[part] = float(VARIANCE_RATIOS[int(np.argmax(tried))])
+    return rest_and_spread(ratios)[0] / free, tuple(ratios)
+
+
+def _orthonormal_basis(columns: Array) -> Array:
+    """An orthonormal basis of columns, dependent ones left out."""
+    lengths = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, lengths > 0] / lengths[lengths > 0]
+    power, axes = np.linalg.eigh(scaled.T @ scaled)
+    kept = power > INDEPENDENT_POWER * power[-1]
+    return np.asarray(scaled @ (axes[:, kept] / np.sqrt(power[kept])))
+
+
+@dataclass(frozen=True, eq=False)
+class MixedModel:
+    """All joints. size: number of columns. prior: (size,), precision of the prior of each, zero where there is none."""
+
+    joints: tuple[WeightedRows, ...]
+    size: int
+    prior: Array
+
+    @cached_property
+    def information(self) -> Array:
+        """(size + 1, size + 1), weighted products of all columns and the target, which is last."""
+        return self._information([np.ones(len(each.rows.target), dtype=bool) for each in self.joints])
+
+    def information_of(self, stretches: NDArray[np.bool_]) -> Array:
+        """The same of the rows of some stretches; stretches: (stretches,)."""
+        return self._information([stretches[each.rows.stretches] for each in self.joints])
+
+    def _information(self, chosen: Sequence[NDArray[np.bool_]]) -> Array:
+        out = np.zeros((self.size + 1, self.size + 1))
+        for each, rows in zip(self.joints, chosen, strict=True):
+            own = np.column_stack([each.rows.columns[rows], each.rows.target[rows]])
+            weighted = np.column_stack([each.weighted[rows], each.weighted_target[rows]])
+            place = np.append(each.rows.index, self.size)
+            out[np.ix_(place, place)] += own.T @ weighted
+        return (out + out.T) / 2
+
+    @cached_property
+    def precision(self) -> Array:
+        """(size,), of the priors, and a little for what no row determines."""
+        return np.maximum(self.prior, LEAST_PRECISION * np.maximum(np.diag(self.information)[:-1], 1e-300))
+
+    def fit(self, chosen: NDArray[np.intp], information: Array | None = None) -> tuple[Array, Array]:
+        """Values and covariance of chosen columns, the others left out. information: of all rows if left out."""
+        known = self.information if information is None else information
+        matrix = known[np.ix_(chosen, chosen)] + np.diag(self.precision[chosen])
+        scale = 1 / np.sqrt(np.diag(matrix))
+        inverse = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
+        return inverse @ known[chosen, -1], inverse
+
+    @cached_property
+    def stretches(self) -> int:
+        """Number of stretches of time."""
+        return 1 + max(int(each.rows.stretches.max()) for each in self.joints)
+
+    def errors(self, joint: int, chosen: NDArray[np.intp], values: Array) -> Array:
+        """What values of chosen columns leave at a joint, (rows,); values (chosen, some) give (rows, some)."""
+        full = np.zeros((self.size, *values.shape[1:]))
+        full[chosen] = values
+        rows = self.joints[joint].rows
+        target = rows.target if values.ndim == 1 else rows.target[:, None]
+        return np.asarray(target - rows.columns @ full[rows.index])
+
+    def scatter(self, chosen: NDArray[np.intp], values: Array) -> Array:
+        """What the stretches of time say of the variance of the weighted errors' products with chosen columns.
+
+        Sum over stretches of the squared products, whose errors may be of any kind within a stretch (Liang and Zeger
+        1986), and the share of the drift, which ties stretches: (chosen, chosen).
+        """
+        where = np.full(self.size, -1)
+        where[chosen] = np.arange(len(chosen))
+        products = np.zeros((self.stretches, len(chosen)))
+        drift = np.zeros((len(chosen), len(chosen)))
+        for joint, each in enumerate(self.joints):
+            used = np.flatnonzero(where[each.rows.index] >= 0)
+            place = where[each.rows.index[used]]
+            noise = each.variance * each.weigh(self.errors(joint, chosen, values))
+            weighted = each.weighted[:, used]
+            own = np.zeros((self.stretches, len(used)))
+            np.add.at(own, each.rows.stretches, weighted * noise[:, None])
+            products[:, place] += own
+            drift[np.ix_(place, place)] += (
+                each.rows.columns[:, used].T @ weighted - each.variance * weighted.T @ weighted
+            )
+        count = int(np.sum(np.any(products != 0, axis=1)))
+        return np.asarray(products.T @ products * count / max(count - 1, 1) + drift)

@@ -1,0 +1,305 @@
+"""Changes with their names and numbers: what changed, by how much in units and percent, and what else it could be."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.columns import place_of
+from armlab.diagnosis.compare.changes import ChangeGroup, ChangeTable, Tested, find_rivals, held_out_errors
+from armlab.diagnosis.compare.pooled import Pooled, is_body
+from armlab.diagnosis.result import Rival
+from armlab.effects.contract import Candidate
+from armlab.effects.links import INERTIAL_ERROR_FACTS
+from armlab.effects.parameters import ParameterValue, half_widths, parameter_slopes, parameter_values
+
+CONFIDENCE = 0.95
+ONE_FACTOR = "all friction of the joint by one factor"
+
+
+@dataclass(frozen=True)
+class Change:
+    """One parameter in the recordings.
+
+    levels: of each recording, None where only the difference is known. difference: last less first. interval: 95 %, of
+    it. ratio: last over first with its interval, None where there is no level. p_value: of no difference, corrected
+    for all that is compared. detectable: the smallest difference that would have been named.
+    """
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    parameter: str
+    levels: tuple[float, ...] | None
+    difference: float
+    interval: tuple[float, float]
+    ratio: tuple[float, float, float] | None
+    unit: str
+    p_value: float
+    detectable: float
+    changed: bool
+
+    @property
+    def old(self) -> float | None:
+        """Level in the first recording."""
+        return None if self.levels is None else self.levels[0]
+
+    @property
+    def new(self) -> float | None:
+        """Level in the last recording."""
+        return None if self.levels is None else self.levels[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class NamedChange:
+    """One thing that changed. parameters: as changes. changes: the same with levels, where they are known.
+
+    gains: share by which the held-out error of each recording falls with it. rms_before, rms_after: held-out, N m (N),
+    at the joint that profits most. probability: of the name among its rivals.
+    """
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    form: str
+    parameters: tuple[ParameterValue, ...]
+    changes: tuple[Change, ...]
+    equation: str
+    p_value: float
+    evidence: float
+    gains: tuple[float, ...]
+    rms_before: float
+    rms_after: float
+    probability: float
+    rivals: tuple[Rival, ...]
+
+
+def name_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> tuple[NamedChange, ...]:
+    """The changes that were found and that predict held-out stretches of every recording better, surest first."""
+    named = tuple(_name(pooled, table, found, each) for each in found)
+    return tuple(sorted(named, key=lambda each: -each.evidence))
+
+
+def predicts_better(gains: Sequence[float], least: float) -> bool:
+    """Whether a change lowers the held-out error of each recording, and of all together enough."""
+    return min(gains) > 0 and float(np.mean(gains)) > least
+
+
+def held_out_gains(table: ChangeTable, errors: tuple[list[Array], list[Array]]) -> tuple[float, ...]:
+    """Share by which the squared held-out error of each recording falls, joints weighted by their noise."""
+    out = []
+    for recording in range(len(table.contrast)):
+        less, left = 0.0, 0.0
+        for before, after, joint in zip(*errors, table.mixed.joints, strict=True):
+            own = joint.rows.members == recording
+            less += float(np.sum(before[own] ** 2 - after[own] ** 2)) / joint.variance
+            left += float(np.sum(after[own] ** 2)) / joint.variance
+        out.append(less / max(left, 1e-300))
+    return tuple(out)
+
+
+def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> NamedChange:
+    group = table.groups[tested.group]
+    chosen = [each.group for each in found]
+    errors = held_out_errors(table, chosen, tested.group)
+    pairs = zip(*errors, table.mixed.joints, strict=True)
+    joint = int(np.argmax([float(one @ one - two @ two) / each.variance for one, two, each in pairs]))
+    before, after = (float(np.sqrt(np.mean(part[joint] ** 2))) for part in errors)
+    rivals = find_rivals(table, chosen, tested)
+    weights = np.exp(-np.array([0.0, *(deficit for _, deficit in rivals)]))
+    changes = tuple(list_changes(pooled, table, found, tested))
+    factor = half_width_factor(table)
+    difference, covariance = _between_ends(table, tested)
+    if group.laws:
+        parameters = tuple(
+            ParameterValue(each.parameter, each.difference, each.interval, each.unit) for each in changes
+        )
+        equation = f"friction of joint {group.candidate.joint} *= {1 + float(difference[0]):.4g}"
+    else:
+        parameters = parameter_values(group.candidate, difference, covariance, factor)
+        equation = group.candidate.equation(difference)
+    return NamedChange(
+        effect=group.candidate.effect,
+        joint=group.candidate.joint,
+        joints=group.candidate.joints,
+        form=ONE_FACTOR if group.laws else group.candidate.form,
+        parameters=parameters,
+        changes=changes,
+        equation=equation,
+        p_value=min(tested.p_value * len(table.groups), 1.0),
+        evidence=tested.evidence,
+        gains=held_out_gains(table, errors),
+        rms_before=before,
+        rms_after=after,
+        probability=float(1 / weights.sum()),
+        rivals=tuple(_list_rivals(table, group, rivals)),
+    )
+
+
+def _list_rivals(table: ChangeTable, own: ChangeGroup, rivals: Sequence[tuple[int, float]]) -> Iterator[Rival]:
+    """Rivals by name, each once; for a load an error of the same link, which no motion tells from it."""
+    seen = {(own.candidate.effect, own.candidate.joint)}
+    for number, deficit in rivals:
+        candidate = table.groups[number].candidate
+        if (candidate.effect, candidate.joint) not in seen:
+            seen.add((candidate.effect, candidate.joint))
+            yield Rival(candidate.effect, candidate.joint, candidate.joints, False, deficit)
+    if is_body(own.candidate):
+        yield Rival(INERTIAL_ERROR_FACTS.id, own.candidate.joint, (), True)
+
+
+def half_width_factor(table: ChangeTable) -> float:
+    """From a standard error to half an interval."""
+    return float(student.ppf((1 + CONFIDENCE) / 2, table.degrees))
+
+
+def detectable_factor(table: ChangeTable) -> float:
+    """From a standard error to the smallest change that is named: the level of the test, corrected."""
+    return float(student.isf(table.tuning.level / 2 / len(table.groups), table.degrees))
+
+
+def recording_values(table: ChangeTable, tested: Tested) -> Array:
+    """Coefficients of a change in each recording, less their mean: (recordings, coefficients)."""
+    return np.asarray(table.contrast @ tested.values.reshape(-1, table.contrast.shape[1]).T)
+
+
+def _between_ends(table: ChangeTable, tested: Tested) -> tuple[Array, Array]:
+    """Last less first recording, and its covariance."""
+    ends = table.contrast[-1] - table.contrast[0]
+    width = len(ends)
+    values = tested.values.reshape(-1, width) @ ends
+    covariance = tested.covariance.reshape(len(values), width, len(values), width)
+    return values, np.einsum("iajb,a,b->ij", covariance, ends, ends)
+
+
+def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Change]:
+    """The scalar parameters of a group in the recordings."""
+    group = table.groups[tested.group]
+    parts = group.laws or ((group.candidate, np.empty(0)),)
+    columns = [table.model, *(table.groups[each.group].columns for each in found)]
+    inside = np.concatenate(columns).astype(np.intp)
+    at_mean = np.zeros(table.mixed.size)
+    at_mean[inside], _ = table.mixed.fit(inside)
+    difference, covariance = _between_ends(table, tested)
+    offsets = recording_values(table, tested)
+    for candidate, coefficients in parts:
+        if group.laws:
+            own = np.outer(1 + offsets[:, 0], coefficients)
+            spread = covariance[0, 0] * np.outer(coefficients, coefficients)
+            yield from _parameters(table, tested, candidate, own, coefficients * difference[0], spread, known=True)
+        else:
+            known = _level_is_known(pooled, candidate)
+            mean = at_mean[group.common] + _simulated(pooled, candidate) if known else np.zeros(len(difference))
+            own = mean + offsets
+            yield from _parameters(table, tested, candidate, own, difference, covariance, known=known)
+
+
+def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
+    """Whether the common model has a level of it: faults of channels and loads are known as differences alone."""
+    place = place_of(candidate)
+    return not is_body(candidate) and any(place_of(each.candidate) == place for each in pooled.design.blocks)
+
+
+def _simulated(pooled: Pooled, candidate: Candidate) -> Array:
+    """Coefficients of the same law in the simulation, whose torque is taken off before anything is fitted."""
+    model = pooled.design.simulation.model
+    out = np.zeros(candidate.size)
+    for each in () if model is None else model.effects:
+        if place_of(each.candidate) == place_of(candidate) and len(each.coefficients) == len(out):
+            out = out + each.coefficients
+    return out
+
+
+def _parameters(
+    table: ChangeTable,
+    tested: Tested,
+    candidate: Candidate,
+    own: Array,
+    difference: Array,
+    covariance: Array,
+    *,
+    known: bool,
+) -> Iterator[Change]:
+    """own: (recordings, coefficients) of each recording; difference, covariance: of last less first."""
+    at = own.mean(axis=0) if known else difference
+    slopes = parameter_slopes(candidate, at, len(at))
+    start, end = candidate.parameters(own[0]), candidate.parameters(own[-1])
+    alone = candidate.parameters(difference)
+    p_value = min(tested.p_value * len(table.groups), 1.0)
+    for name, value in alone.items():
+        error = float(half_widths(slopes[name], covariance, 1.0)[0])
+        if isinstance(value, tuple) or error <= 0:
+            continue
+        levels, ratio = None, None
+        change = (
+            float(np.asarray(end[name]) - np.asarray(start[name])) if known else _own_change(candidate, name, value)
+        )
+        half = half_width_factor(table) * error
+        interval = change - half, change + half
+        if known:
+            levels = tuple(float(np.asarray(candidate.parameters(each)[name])) for each in own)
+            ratio = _ratio(levels, change, half) if _is_positive(candidate, name) else None
+        elif name == "gain":
+            ratio = 1 + change, 1 + interval[0], 1 + interval[1]
+        yield Change(
+            candidate.effect,
+            candidate.joint,
+            candidate.joints,
+            name,
+            levels,
+            change,
+            interval,
+            ratio,
+            candidate.unit(name),
+            p_value,
+            detectable_factor(table) * error,
+            table.is_sure(tested),
+        )
+
+
+def _is_positive(candidate: Candidate, name: str) -> bool:
+    """Whether a parameter has a size that a change is a share of: a level of friction, and no zero of an encoder."""
+    return any(each.name == name and each.positive for each in candidate.facts.parameters)
+
+
+def _own_change(candidate: Candidate, name: str, value: float) -> float:
+    """A parameter of a change as a difference: a gain counts from one."""
+    return value - float(np.asarray(candidate.parameters(np.zeros(candidate.size))[name])) if name == "gain" else value
+
+
+def _ratio(levels: Sequence[float], change: float, half: float) -> tuple[float, float, float] | None:
+    """Last over first level; the interval keeps their mean, which is known far better."""
+    mean = (levels[0] + levels[-1]) / 2
+    if mean == 0 or abs(change) + half >= 2 * abs(mean):
+        return None
+    ends = sorted((mean + each / 2) / (mean - each / 2) for each in (change - half, change + half))
+    return levels[-1] / levels[0], ends[0], ends[1]
+
+
+def list_table(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> tuple[Change, ...]:
+    """Every parameter that was compared: those that changed as fitted together, each other one beside them."""
+    chosen = [each.group for each in found]
+    rows: list[Change] = []
+    sure = {each.group: each for each in found}
+    scaled = {place_of(law) for number in chosen for law, _ in table.groups[number].laws}
+    for number, group in enumerate(table.groups):
+        if number in sure:
+            rows += list_changes(pooled, table, found, sure[number])
+        elif not group.laws and place_of(group.candidate) not in scaled:
+            beside = table.test((*chosen, number))
+            if _is_told(table, beside[-1]):
+                rows += [_unchanged(each) for each in list_changes(pooled, table, beside, beside[-1])]
+    return tuple(rows)
+
+
+def _is_told(table: ChangeTable, tested: Tested) -> bool:
+    """Whether the recordings tell of a group more than its prior does."""
+    scales = table.groups[tested.group].scales
+    spread = tested.covariance / tested.inflation
+    return bool(np.any(np.diag(spread) < 0.25 * scales**2))
+
+
+def _unchanged(change: Change) -> Change:
+    return Change(**{**vars(change), "changed": False})

@@ -1,0 +1,230 @@
+"""Recordings of one robot on one table: filtered together, with the columns of one common model.
+
+The common model has free links, what every arm has, and what the diagnoses of the recordings found. What may have
+changed are the same columns again, times the recording that a row is of (`changes.py`).
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.diagnosis.blocks import block_numbers
+from armlab.diagnosis.columns import Block, Place, place_of
+from armlab.diagnosis.data import Observed, observe
+from armlab.diagnosis.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.fitted_model import FittedModel, follow_model
+from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.simulation import Simulation
+from armlab.diagnosis.solver import State
+from armlab.diagnosis.tuning import ComparisonTuning
+from armlab.effects.contract import Candidate
+from armlab.effects.library import library
+from armlab.effects.links import PAYLOAD_FACTS, InertialError, Payload
+from armlab.recordings.recording import Recording, Run
+from problem.base_parameters import base_parameters
+
+# what wears, is handled or is set anew on any arm; other effects may have changed where a recording has them
+CHANGING_EFFECTS = (
+    "coulomb_friction",
+    "viscous_friction",
+    "torque_offset",
+    "torque_gain_error",
+    "encoder_offset",
+    "time_delay",
+    "channel_skew",
+    "base_tilt",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Pooled:
+    """Recordings in one design, and the common model fitted to all of them.
+
+    owner: of each run, the recording that it is of, from 0. recordings: how many there are. changes: the columns of
+    everything that may have changed.
+    """
+
+    model: FittedModel
+    owner: tuple[int, ...]
+    recordings: int
+    changes: tuple[Block, ...]
+
+    @property
+    def design(self) -> DesignMatrix:
+        """Of the common model."""
+        return self.model.design
+
+    @property
+    def observed(self) -> Observed:
+        """All runs."""
+        return self.model.design.observed
+
+    @property
+    def tuning(self) -> ComparisonTuning:
+        """Numbers of the comparison."""
+        return self.model.design.settings.tuning.comparison
+
+    @cached_property
+    def members(self) -> NDArray[np.intp]:
+        """The recording of each row, (rows,)."""
+        counts = [len(each.torque) for each in self.observed.signals]
+        return np.repeat(np.array(self.owner, dtype=np.intp), counts)
+
+    @cached_property
+    def stretches(self) -> NDArray[np.intp]:
+        """Number of the stretch of time of each row, (rows,).
+
+        Runs of two recordings that follow the same motion share their stretches: what the model lacks is the same in
+        both, and is no difference between them.
+        """
+        numbers = block_numbers(self.observed, self.tuning.stretch_s, self.tuning.min_stretches)
+        starts = np.cumsum([0, *(len(each.torque) for each in self.observed.signals)])
+        for run, first in enumerate(self._first_of_motion()):
+            if first == run:
+                continue
+            own = self.observed.signals[run]
+            other = self.observed.signals[first]
+            clock, theirs = own.time - own.run.time[0], other.time - other.run.time[0]
+            place = np.clip(np.searchsorted(theirs, clock), 0, len(theirs) - 1)
+            numbers[starts[run] : starts[run + 1]] = numbers[starts[first] : starts[first + 1]][place]
+        return np.asarray(np.unique(numbers, return_inverse=True)[1], dtype=np.intp)
+
+    def _first_of_motion(self) -> list[int]:
+        """For each run the first run of another recording that follows the same motion; itself where there is none."""
+        out: list[int] = []
+        taken: set[tuple[int, int]] = set()
+        for run, owner in enumerate(self.owner):
+            first = next(
+                (
+                    other
+                    for other in range(run)
+                    if out[other] == other
+                    and self.owner[other] != owner
+                    and (other, owner) not in taken
+                    and self._same_motion(run, other)
+                ),
+                run,
+            )
+            taken.add((first, owner))
+            out.append(first)
+        return out
+
+    def _same_motion(self, run: int, other: int) -> bool:
+        """Whether two runs follow the same path in time: alike long, and nowhere far apart."""
+        one, two = (self.observed.signals[each] for each in (run, other))
+        lengths = sorted(float(each.run.time[-1] - each.run.time[0]) for each in (one, two))
+        if lengths[0] < self.tuning.same_length * lengths[1]:
+            return False
+        clock, theirs = (each.run.time - each.run.time[0] for each in (one, two))
+        kept = clock <= theirs[-1]
+        travel = np.ptp(one.motion.position, axis=0)
+        for joint in range(one.motion.joints):
+            there = np.interp(clock[kept], theirs, two.motion.position[:, joint])
+            apart = np.sqrt(np.mean((one.motion.position[kept, joint] - there) ** 2))
+            if apart > self.tuning.same_motion * max(travel[joint], 1e-9):
+                return False
+        return True
+
+
+def pool_recordings(
+    recordings: Sequence[Recording], diagnoses: Sequence[Diagnosis], simulation: Simulation, settings: Settings
+) -> Pooled:
+    """The recordings on one table. diagnoses: of each; simulation: what the columns are deviations from."""
+    runs = [run for number, each in enumerate(recordings) for run in _labelled_runs(each, number)]
+    owner = tuple(number for number, each in enumerate(recordings) for _ in each.runs)
+    observed = observe(runs, simulation.arm, simulation.inertial, settings)
+    bare = build_design_matrix(observed, simulation, base_parameters(simulation.arm), None, settings)
+    found = unite_candidates(diagnoses)
+    design = _with_candidates(bare, [*found, *_usual_beside(bare, found)])
+    first = _fit_common(design)
+    model = _fit_common(follow_model(design, first))
+    return Pooled(model, owner, len(recordings), tuple(_changing_blocks(model)))
+
+
+def _labelled_runs(recording: Recording, number: int) -> Iterator[Run]:
+    """The runs with names that tell the recordings apart, all of one role."""
+    for run in recording.runs:
+        yield replace(run, file=f"{number + 1}: {run.file}", role="identify")
+
+
+def unite_candidates(diagnoses: Sequence[Diagnosis]) -> tuple[Candidate, ...]:
+    """What the models of the diagnoses have, each effect once at a place, without laws that another one contains.
+
+    A push belongs to its run: it stays with the recording in which it was found.
+    """
+    chosen: list[Candidate] = []
+    for number, diagnosis in enumerate(diagnoses):
+        components = () if diagnosis.model is None else diagnosis.model.structure.components
+        for candidate in components:
+            if candidate.facts.single_event:
+                run = getattr(candidate, "run", "")
+                chosen.append(replace(candidate, run=f"{number + 1}: {run}"))  # type: ignore[type-var]
+            elif not _is_covered(candidate, chosen):
+                chosen = [each for each in chosen if not _contains(candidate, each)] + [candidate]
+    return tuple(chosen)
+
+
+def _is_covered(candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
+    same = (each.effect == candidate.effect and each.joints == candidate.joints for each in chosen)
+    return any(same) or any(_contains(each, candidate) for each in chosen)
+
+
+def _contains(one: Candidate, other: Candidate) -> bool:
+    return one.joints == other.joints and other.effect in one.replaces
+
+
+def _usual_beside(design: DesignMatrix, found: Sequence[Candidate]) -> list[Candidate]:
+    """What every arm has, where no law that was found stands for it."""
+    families = (family for family in library() if family.facts.usual)
+    places = (place for family in families for place in family.candidates(design.simulation.arm, design.scenes))
+    return [place[0] for place in places if not _is_covered(place[0], found)]
+
+
+def _with_candidates(design: DesignMatrix, candidates: Sequence[Candidate]) -> DesignMatrix:
+    blocks = (design.block(each, 0) for each in candidates)
+    return replace(design, blocks=tuple(each for each in blocks if _is_usable(each)))
+
+
+def _is_usable(block: Block) -> bool:
+    return bool(np.isfinite(block.values).all() and np.all(np.any(block.values != 0, axis=(0, 1))))
+
+
+def _fit_common(design: DesignMatrix) -> FittedModel:
+    """Least squares of everything in the design, joints weighted by what that leaves."""
+    tuning, state = design.settings.tuning.noise, State(tuple(range(len(design.blocks))), None)
+    left = design.target
+    for _ in range(2):
+        noise = fit_noise(left, design.observed, 0.0, tuning, colour=False)
+        moments, solver = design.solver(noise)
+        model = FittedModel(design, noise, moments, solver, state)
+        left = model.residual(model.fit)
+    return model
+
+
+def _changing_blocks(model: FittedModel) -> Iterator[Block]:
+    """Columns of everything that may have changed: a load of any link, what wears, and whatever the model has."""
+    design, seen = model.design, set[Place]()
+    arm, scenes = design.simulation.arm, design.scenes
+    offered: list[Candidate] = [
+        Payload.at(arm, link) for link in range(1, len(arm) + 1) if InertialError.is_visible(arm, link)
+    ]
+    for family in library():
+        if family.facts.id in CHANGING_EFFECTS:
+            offered += [place[0] for place in family.candidates(arm, scenes)]
+    own = [each.candidate for each in design.blocks]
+    offered += [each for each in own if not each.facts.single_event and each.facts.where != "link"]
+    for candidate in offered:
+        block = design.block(candidate, 0)
+        if place_of(candidate) not in seen and _is_usable(block):
+            seen.add(place_of(candidate))
+            yield block
+
+
+def is_body(candidate: Candidate) -> bool:
+    """Whether it is a load of a link."""
+    return candidate.effect == PAYLOAD_FACTS.id
