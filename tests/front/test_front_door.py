@@ -164,9 +164,9 @@ def test_a_diagnosis_and_a_comparison_name_effects_with_their_places(recording):
         "  viscous_friction@1: tau_1",
     ]
     assert repr(found).splitlines()[-1] == "  and 2 more claims"
-    compared = armlab.Comparison("changed", found, found, found, (SimpleNamespace(changed=True),))
-    assert "1 of 1 parameters changed" in repr(compared)
-    assert repr(compared).endswith("viscous_friction@5, time_delay")
-    assert repr(armlab.Comparison("inconclusive", found, found, reason="Too short.")).endswith(
+    named = (SimpleNamespace(effect="coulomb_friction", joint=2, equation="tau_2 += 0.4"),)
+    compared = armlab.Comparison("changed", (found, found), named, (SimpleNamespace(changed=True),))
+    assert "  coulomb_friction@2: tau_2 += 0.4\n  parameters compared: 1" in repr(compared)
+    assert repr(armlab.Comparison("inconclusive", (found, found), reason="Too short.")).endswith(
         "inconclusive\n  Too short."
     )
