@@ -634,6 +634,12 @@ class ComparisonTuning:
         unit="of the held-out error",
         meaning="gain that a change makes on stretches of the recordings that are held out in turn",
     )
+    familiar_odds: float = tuned(
+        5.0,
+        unit="log odds",
+        meaning="of a change of what the model has, against a fault that it does not have",
+        source="as least_evidence",
+    )
     max_rival_deficit: float = tuned(
         5.0,
         unit="log likelihood",

@@ -16,11 +16,11 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.columns import Block, place_of
 from armlab.diagnosis.compare.mixed import JointRows, MixedModel, WeightedRows, weigh_rows
 from armlab.diagnosis.compare.pooled import Pooled, is_body
-from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Candidate
 from armlab.effects.links import BODY_SIZE_M
 
+SHAPE_STEP = 0.05  # of a nonlinear parameter, for derivatives: a gap's torque has corners
 BODY_SCALES = np.array([1.0, *[BODY_SIZE_M] * 3, *[BODY_SIZE_M**2] * 6])  # of a body of one kilogram
 
 
@@ -30,7 +30,8 @@ class ChangeGroup:
 
     scales: (columns,), of their normal prior. laws: where all friction of a joint changes by one factor, its laws with
     their coefficients. common: numbers of the same columns in common; empty where links hold them. least: a smaller
-    change is how logs are made, see `Parameter.sampled`.
+    change is how logs are made, see `Parameter.sampled`. shaped: where nonlinear parameters change, the coefficients of
+    the law; the columns are derivatives. familiar: whether the common model has it.
     """
 
     block: Block
@@ -39,6 +40,8 @@ class ChangeGroup:
     common: NDArray[np.intp]
     laws: tuple[tuple[Candidate, Array], ...] = ()
     least: float = 0.0
+    shaped: Array | None = None
+    familiar: bool = False
 
     @property
     def candidate(self) -> Candidate:
@@ -88,7 +91,7 @@ class ChangeTable:
         return max(int(np.bincount(owners, minlength=len(self.contrast)).min()) - 1, 1)
 
     def evidence(self, chosen: Sequence[int]) -> Array:
-        """Log evidence of each group beside chosen ones, errors taken as independent: (groups,)."""
+        """Log odds of each group beside chosen ones, errors taken as independent: (groups,)."""
         mixed, inside = self.mixed, self.columns_with(chosen)
         matrix = mixed.information[np.ix_(inside, inside)] + np.diag(mixed.precision[inside])
         scale = 1 / np.sqrt(np.diag(matrix))
@@ -101,8 +104,14 @@ class ChangeTable:
             own = group.columns
             data = mixed.information[np.ix_(own, own)] - half[:, own].T @ half[:, own]
             towards = mixed.information[own, -1] - half[:, own].T @ half[:, -1]
-            out[number] = _log_bayes_factor(np.asarray(data), np.asarray(towards), group.scales)
+            out[number] = self.prior_odds(number) + _log_bayes_factor(
+                np.asarray(data), np.asarray(towards), group.scales
+            )
         return out
+
+    def prior_odds(self, number: int) -> float:
+        """Log odds before any data: what the model has changes sooner than a fault appears that it does not have."""
+        return self.tuning.familiar_odds if self.groups[number].familiar else 0.0
 
     def test(self, chosen: Sequence[int]) -> tuple[Tested, ...]:
         """Tests of chosen groups, all fitted together."""
@@ -130,8 +139,14 @@ class ChangeTable:
 
     def is_sure(self, tested: Tested) -> bool:
         """Whether a change is no chance among all that is compared."""
-        size = float(np.ptp(self.contrast @ tested.values.reshape(-1, self.contrast.shape[1]).T))
-        enough = tested.evidence > self.tuning.least_evidence and size >= self.groups[tested.group].least
+        group, values = self.groups[tested.group], tested.values.reshape(-1, self.contrast.shape[1])
+        sizes = self.contrast @ values.T
+        if float(np.ptp(sizes)) < group.least:
+            return False
+        plain = not group.laws and group.shaped is None
+        if plain and any(group.candidate.absurdity(each) for each in sizes[1:] - sizes[0]):
+            return False
+        enough = tested.evidence > self.tuning.least_evidence
         return enough and tested.p_value * len(self.groups) < self.tuning.level
 
 
@@ -164,16 +179,36 @@ def make_table(pooled: Pooled) -> ChangeTable:
         common[place_of(block.candidate)] = columns
         for place, row in enumerate(block.candidate.rows):
             parts.add(row, block.values[:, place], columns)
+    shaped = _shape_derivatives(pooled)
+    for block, _ in shaped:
+        own_columns = np.arange(at, at + block.values.shape[2])
+        at += len(own_columns)
+        prior.append(_shape_scales(block.candidate, tuning) ** -2.0)
+        common[id(block)] = own_columns
+        for place, row in enumerate(block.candidate.rows):
+            parts.add(row, block.values[:, place], own_columns)
     everything, groups = np.arange(at), []
     scaled = _scaled_frictions(pooled)
-    for block, laws in [*((each, ()) for each in pooled.changes), *scaled]:
+    offered = [
+        *((block, None, None) for block in pooled.changes),
+        *((block, laws, None) for block, laws in scaled),
+        *((block, None, values) for block, values in shaped),
+    ]
+    for block, laws, law_values in offered:
         columns = np.arange(at, at + block.values.shape[2] * contrast.shape[1])
         at += len(columns)
-        scales = np.full(1, tuning.typical_scale) if laws else _prior_scales(block, pooled)
+        own = common.get(place_of(block.candidate), np.empty(0, dtype=np.intp))
+        if laws is not None:
+            scales, own = np.full(1, tuning.typical_scale), np.empty(0, dtype=np.intp)
+        elif law_values is not None:
+            scales, own = _shape_scales(block.candidate, tuning), common[id(block)]
+        else:
+            scales = _prior_scales(block, pooled)
         scales = np.repeat(scales, contrast.shape[1])
-        own = np.empty(0, dtype=np.intp) if laws else common.get(place_of(block.candidate), np.empty(0, dtype=np.intp))
         sampled = any(each.sampled for each in block.candidate.facts.parameters)
-        groups.append(ChangeGroup(block, columns, scales, own, laws, interval if sampled else 0.0))
+        least = interval if sampled else 0.0
+        familiar = place_of(block.candidate) in known
+        groups.append(ChangeGroup(block, columns, scales, own, laws or (), least, law_values, familiar))
         prior.append(scales**-2.0)
         for place, row in enumerate(block.candidate.rows):
             values = block.values[:, place, :, None] * contrast[pooled.members][:, None, :]
@@ -201,7 +236,7 @@ class _Columns:
 def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array | None) -> WeightedRows:
     """The rows in which a joint moves. friction: (rows,), its torque in the common model."""
     observed = pooled.observed
-    rows = rows_in(observed.used(joint), observed.rows)
+    rows = observed.moving[:, joint]
     slow = _slow_waves(pooled)
     level = np.sign(observed.kept("velocity")[:, joint]) if friction is None else friction
     level = level / max(float(np.sqrt(np.mean(level**2))), 1e-300)
@@ -211,6 +246,7 @@ def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array 
             index=np.concatenate(parts.numbers[joint]),
             target=pooled.design.target[rows, joint],
             random=(slow[rows], slow[rows] * level[rows, None]),
+            waves=np.tile(np.arange(slow.shape[1]) % (pooled.tuning.drift_waves + 1) > 0, 2),
             stretches=pooled.stretches[rows],
             members=pooled.members[rows],
         )
@@ -251,6 +287,32 @@ def _scaled_frictions(pooled: Pooled) -> list[tuple[Block, tuple[tuple[Candidate
     return out
 
 
+def _shape_derivatives(pooled: Pooled) -> list[tuple[Block, Array]]:
+    """Derivatives of the torque by the nonlinear parameters of laws at one joint, with the laws' coefficients."""
+    model, design, out = pooled.model, pooled.design, []
+    for number, block in enumerate(design.blocks):
+        candidate = block.candidate
+        if not candidate.shape or candidate.facts.single_event or candidate.facts.where != "joint":
+            continue
+        values, columns = model.solver.values(model.fit, number), []
+        for place, (low, high) in enumerate(candidate.bounds):
+            torques = []
+            for way in (1, -1):
+                shape = list(candidate.shape)
+                shape[place] = float(np.clip(shape[place] + way * SHAPE_STEP * abs(shape[place]), low, high))
+                torques.append(design.block(candidate.with_shape(tuple(shape)), 0).values @ values)
+            columns.append((torques[0] - torques[1]) / (2 * SHAPE_STEP * abs(candidate.shape[place])))
+        derivatives = np.stack(columns, axis=-1)
+        if np.isfinite(derivatives).all() and np.all(np.any(derivatives != 0, axis=(0, 1))):
+            out.append((Block(candidate, 0, derivatives), values))
+    return out
+
+
+def _shape_scales(candidate: Candidate, tuning: ComparisonTuning) -> Array:
+    """Standard deviations of changes of nonlinear parameters."""
+    return np.asarray(tuning.typical_scale * np.abs(candidate.shape))
+
+
 def _prior_scales(block: Block, pooled: Pooled) -> Array:
     """Standard deviations of a change's coefficients: what the effect has on arms, else a share of the torque."""
     candidate, observed = block.candidate, pooled.observed
@@ -287,7 +349,7 @@ def _best_addition(table: ChangeTable, chosen: tuple[int, ...]) -> int | None:
     asked = [int(number) for number in np.argsort(-gains)[: table.tuning.max_asked] if gains[number] > 0]
     tested = [table.test((*chosen, number))[-1] for number in asked]
     sure = [each for each in tested if table.is_sure(each)]
-    return max(sure, key=lambda each: each.evidence).group if sure else None
+    return max(sure, key=lambda each: each.evidence + table.prior_odds(each.group)).group if sure else None
 
 
 def _settle(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
@@ -340,17 +402,9 @@ def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tu
 
 def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:
     """Errors (rows,) of each joint without and with a change, each stretch predicted by the others."""
-    mixed, folds = table.mixed, table.tuning.folds
-    fold = np.arange(mixed.stretches) % folds
-    out: list[list[Array]] = []
-    for groups in ([each for each in chosen if each != number], list(chosen)):
-        inside = table.columns_with(groups)
-        values = np.column_stack(
-            [mixed.fit(inside, mixed.information - mixed.information_of(fold == each))[0] for each in range(folds)]
-        )
-        errors = []
-        for joint, rows in enumerate(mixed.joints):
-            left = mixed.errors(joint, inside, values)
-            errors.append(left[np.arange(len(left)), fold[rows.rows.stretches]])
-        out.append(errors)
-    return out[0], out[1]
+    without = table.columns_with([each for each in chosen if each != number])
+    folds = table.tuning.folds
+    return (
+        table.mixed.held_out_errors(without, folds),
+        table.mixed.held_out_errors(table.columns_with(chosen), folds),
+    )

@@ -29,13 +29,15 @@ class JointRows:
     """The rows of one joint that count.
 
     columns: (rows, own), index: (own,) their numbers among all. target: (rows,). random: parts (rows, count), one
-    variance a part. stretches, members: (rows,), stretch of time and recording of each row.
+    variance a part. waves: (count of all,), False for constants of a run. stretches, members: (rows,), stretch of time
+    and recording of each row.
     """
 
     columns: Array
     index: NDArray[np.intp]
     target: Array
     random: tuple[Array, ...]
+    waves: NDArray[np.bool_]
     stretches: NDArray[np.intp]
     members: NDArray[np.intp]
 
@@ -123,17 +125,10 @@ class MixedModel:
     @cached_property
     def information(self) -> Array:
         """(size + 1, size + 1), weighted products of all columns and the target, which is last."""
-        return self._information([np.ones(len(each.rows.target), dtype=bool) for each in self.joints])
-
-    def information_of(self, stretches: NDArray[np.bool_]) -> Array:
-        """The same of the rows of some stretches; stretches: (stretches,)."""
-        return self._information([stretches[each.rows.stretches] for each in self.joints])
-
-    def _information(self, chosen: Sequence[NDArray[np.bool_]]) -> Array:
         out = np.zeros((self.size + 1, self.size + 1))
-        for each, rows in zip(self.joints, chosen, strict=True):
-            own = np.column_stack([each.rows.columns[rows], each.rows.target[rows]])
-            weighted = np.column_stack([each.weighted[rows], each.weighted_target[rows]])
+        for each in self.joints:
+            own = np.column_stack([each.rows.columns, each.rows.target])
+            weighted = np.column_stack([each.weighted, each.weighted_target])
             place = np.append(each.rows.index, self.size)
             out[np.ix_(place, place)] += own.T @ weighted
         return (out + out.T) / 2
@@ -143,13 +138,12 @@ class MixedModel:
         """(size,), of the priors, and a little for what no row determines."""
         return np.maximum(self.prior, LEAST_PRECISION * np.maximum(np.diag(self.information)[:-1], 1e-300))
 
-    def fit(self, chosen: NDArray[np.intp], information: Array | None = None) -> tuple[Array, Array]:
-        """Values and covariance of chosen columns, the others left out. information: of all rows if left out."""
-        known = self.information if information is None else information
-        matrix = known[np.ix_(chosen, chosen)] + np.diag(self.precision[chosen])
+    def fit(self, chosen: NDArray[np.intp]) -> tuple[Array, Array]:
+        """Values and covariance of chosen columns, the others left out."""
+        matrix = self.information[np.ix_(chosen, chosen)] + np.diag(self.precision[chosen])
         scale = 1 / np.sqrt(np.diag(matrix))
         inverse = np.linalg.inv(matrix * np.outer(scale, scale)) * np.outer(scale, scale)
-        return inverse @ known[chosen, -1], inverse
+        return inverse @ self.information[chosen, -1], inverse
 
     @cached_property
     def stretches(self) -> int:
@@ -157,12 +151,11 @@ class MixedModel:
         return 1 + max(int(each.rows.stretches.max()) for each in self.joints)
 
     def errors(self, joint: int, chosen: NDArray[np.intp], values: Array) -> Array:
-        """What values of chosen columns leave at a joint, (rows,); values (chosen, some) give (rows, some)."""
-        full = np.zeros((self.size, *values.shape[1:]))
+        """What values of chosen columns leave at a joint, (rows,)."""
+        full = np.zeros(self.size)
         full[chosen] = values
         rows = self.joints[joint].rows
-        target = rows.target if values.ndim == 1 else rows.target[:, None]
-        return np.asarray(target - rows.columns @ full[rows.index])
+        return np.asarray(rows.target - rows.columns @ full[rows.index])
 
     def scatter(self, chosen: NDArray[np.intp], values: Array) -> Array:
         """What the stretches of time say of the variance of the weighted errors' products with chosen columns.
@@ -187,3 +180,33 @@ class MixedModel:
             )
         count = int(np.sum(np.any(products != 0, axis=1)))
         return np.asarray(products.T @ products * count / max(count - 1, 1) + drift)
+
+    def held_out_errors(self, chosen: NDArray[np.intp], folds: int) -> list[Array]:
+        """Errors (rows,) of each joint where chosen columns and drift were fitted to the other folds of stretches.
+
+        A constant of each run is no part of the drift here: it would stand for a change.
+        """
+        designs, places, at = [], [], len(chosen)
+        waves = [each.drift[:, each.rows.waves] for each in self.joints]
+        where = np.full(self.size, -1)
+        where[chosen] = np.arange(len(chosen))
+        for each, drift in zip(self.joints, waves, strict=True):
+            used = np.flatnonzero(where[each.rows.index] >= 0)
+            designs.append(np.column_stack([each.rows.columns[:, used], drift]))
+            places.append(np.append(where[each.rows.index[used]], at + np.arange(drift.shape[1])))
+            at += drift.shape[1]
+        precisions = [np.full(int(each.rows.waves.sum()), 1 / each.variance) for each in self.joints]
+        prior = np.diag(np.concatenate([self.precision[chosen], *precisions]))
+        out = [np.empty(len(each.rows.target)) for each in self.joints]
+        for fold in range(folds):
+            matrix, towards = prior.copy(), np.zeros(at)
+            for each, design, place in zip(self.joints, designs, places, strict=True):
+                taught = each.rows.stretches % folds != fold
+                matrix[np.ix_(place, place)] += design[taught].T @ design[taught] / each.variance
+                towards[place] += design[taught].T @ each.rows.target[taught] / each.variance
+            scale = 1 / np.sqrt(np.diag(matrix))
+            values = scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * towards)
+            for errors, each, design, place in zip(out, self.joints, designs, places, strict=True):
+                judged = each.rows.stretches % folds == fold
+                errors[judged] = each.rows.target[judged] - design[judged] @ values[place]
+        return out

@@ -11,7 +11,7 @@ from armlab.diagnosis.columns import place_of
 from armlab.diagnosis.compare.changes import ChangeGroup, ChangeTable, Tested, find_rivals, held_out_errors
 from armlab.diagnosis.compare.pooled import Pooled, is_body
 from armlab.diagnosis.result import Rival
-from armlab.effects.contract import Candidate
+from armlab.effects.contract import Candidate, Value
 from armlab.effects.links import INERTIAL_ERROR_FACTS
 from armlab.effects.parameters import ParameterValue, half_widths, parameter_slopes, parameter_values
 
@@ -112,11 +112,12 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     changes = tuple(list_changes(pooled, table, found, tested))
     factor = half_width_factor(table)
     difference, covariance = _between_ends(table, tested)
-    if group.laws:
+    if group.laws or group.shaped is not None:
         parameters = tuple(
             ParameterValue(each.parameter, each.difference, each.interval, each.unit) for each in changes
         )
-        equation = f"friction of joint {group.candidate.joint} *= {1 + float(difference[0]):.4g}"
+        amounts = ", ".join(f"{each.parameter} {each.difference:+.4g} {each.unit}" for each in changes)
+        equation = f"{group.candidate.effect} of joint {group.candidate.joint}: {amounts}"
     else:
         parameters = parameter_values(group.candidate, difference, covariance, factor)
         equation = group.candidate.equation(difference)
@@ -188,12 +189,40 @@ def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], te
         if group.laws:
             own = np.outer(1 + offsets[:, 0], coefficients)
             spread = covariance[0, 0] * np.outer(coefficients, coefficients)
-            yield from _parameters(table, tested, candidate, own, coefficients * difference[0], spread, known=True)
+            law = _Law(candidate, known=True)
+            yield from _parameters(table, tested, law, own, coefficients * difference[0], spread)
+        elif group.shaped is not None:
+            law = _Law(candidate, known=True, coefficients=group.shaped)
+            own = np.array(candidate.shape) + offsets
+            yield from _parameters(table, tested, law, own, difference, covariance)
         else:
             known = _level_is_known(pooled, candidate)
             mean = at_mean[group.common] + _simulated(pooled, candidate) if known else np.zeros(len(difference))
-            own = mean + offsets
-            yield from _parameters(table, tested, candidate, own, difference, covariance, known=known)
+            yield from _parameters(table, tested, _Law(candidate, known=known), mean + offsets, difference, covariance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Law:
+    """A law whose numbers change. known: whether they have a level. coefficients: given where its shape changes."""
+
+    candidate: Candidate
+    known: bool
+    coefficients: Array | None = None
+
+    def parameters(self, numbers: Array) -> dict[str, Value]:
+        """Named parameters of the law with these coefficients, or this shape."""
+        if self.coefficients is None:
+            return self.candidate.parameters(numbers)
+        return self.candidate.with_shape(tuple(numbers.tolist())).parameters(self.coefficients)
+
+    def slopes(self, numbers: Array) -> dict[str, Array]:
+        """Derivatives (components, numbers) of the parameters."""
+        if self.coefficients is None:
+            return parameter_slopes(self.candidate, numbers, len(numbers))
+        shaped = self.candidate.with_shape(tuple(numbers.tolist()))
+        own = len(self.coefficients)
+        slopes = parameter_slopes(shaped, self.coefficients, own + len(numbers))
+        return {name: each[:, own:] for name, each in slopes.items()}
 
 
 def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
@@ -213,60 +242,46 @@ def _simulated(pooled: Pooled, candidate: Candidate) -> Array:
 
 
 def _parameters(
-    table: ChangeTable,
-    tested: Tested,
-    candidate: Candidate,
-    own: Array,
-    difference: Array,
-    covariance: Array,
-    *,
-    known: bool,
+    table: ChangeTable, tested: Tested, law: _Law, own: Array, difference: Array, covariance: Array
 ) -> Iterator[Change]:
-    """own: (recordings, coefficients) of each recording; difference, covariance: of last less first."""
-    at = own.mean(axis=0) if known else difference
-    slopes = parameter_slopes(candidate, at, len(at))
-    start, end = candidate.parameters(own[0]), candidate.parameters(own[-1])
-    alone = candidate.parameters(difference)
-    p_value = min(tested.p_value * len(table.groups), 1.0)
-    for name, value in alone.items():
+    """own: (recordings, numbers) of each recording; difference, covariance: of last less first."""
+    candidate = law.candidate
+    slopes = law.slopes(own.mean(axis=0) if law.known else difference)
+    start, end, zero = law.parameters(own[0]), law.parameters(own[-1]), np.zeros(len(difference))
+    shown = end if law.known else law.parameters(difference)
+    for name, value in shown.items():
         error = float(half_widths(slopes[name], covariance, 1.0)[0])
         if isinstance(value, tuple) or error <= 0:
             continue
-        levels, ratio = None, None
-        change = (
-            float(np.asarray(end[name]) - np.asarray(start[name])) if known else _own_change(candidate, name, value)
-        )
+        levels: tuple[float, ...] | None = None
+        ratio: tuple[float, float, float] | None = None
         half = half_width_factor(table) * error
-        interval = change - half, change + half
-        if known:
-            levels = tuple(float(np.asarray(candidate.parameters(each)[name])) for each in own)
+        if law.known:
+            change = value - float(np.asarray(start[name]))
+            levels = tuple(float(np.asarray(law.parameters(each)[name])) for each in own)
             ratio = _ratio(levels, change, half) if _is_positive(candidate, name) else None
-        elif name == "gain":
-            ratio = 1 + change, 1 + interval[0], 1 + interval[1]
+        else:
+            change = value - float(np.asarray(law.parameters(zero)[name])) if name == "gain" else value
+            ratio = (1 + change, 1 + change - half, 1 + change + half) if name == "gain" else None
         yield Change(
-            candidate.effect,
-            candidate.joint,
-            candidate.joints,
-            name,
-            levels,
-            change,
-            interval,
-            ratio,
-            candidate.unit(name),
-            p_value,
-            detectable_factor(table) * error,
-            table.is_sure(tested),
+            effect=candidate.effect,
+            joint=candidate.joint,
+            joints=candidate.joints,
+            parameter=name,
+            levels=levels,
+            difference=change,
+            interval=(change - half, change + half),
+            ratio=ratio,
+            unit=candidate.unit(name),
+            p_value=min(tested.p_value * len(table.groups), 1.0),
+            detectable=detectable_factor(table) * error,
+            changed=table.is_sure(tested),
         )
 
 
 def _is_positive(candidate: Candidate, name: str) -> bool:
     """Whether a parameter has a size that a change is a share of: a level of friction, and no zero of an encoder."""
     return any(each.name == name and each.positive for each in candidate.facts.parameters)
-
-
-def _own_change(candidate: Candidate, name: str, value: float) -> float:
-    """A parameter of a change as a difference: a gain counts from one."""
-    return value - float(np.asarray(candidate.parameters(np.zeros(candidate.size))[name])) if name == "gain" else value
 
 
 def _ratio(levels: Sequence[float], change: float, half: float) -> tuple[float, float, float] | None:
