@@ -48,6 +48,7 @@ _COMMANDS = {
     "next-loop": "armlab.cli.proof:next_loop",
     "score": "armlab.cli.proof:score",
     "prove": "armlab.cli.proof:prove",
+    "prove-changes": "armlab.cli.proof:prove_changes",
     "ablate": "armlab.cli.proof:ablate",
     "speed": "armlab.cli.maintenance:speed",
     "scale": "armlab.cli.maintenance:scale",

@@ -94,19 +94,25 @@ EFFECTS_WITH_CONSTANT = ("asymmetric_friction", "cable_stiffness", "gravity_comp
 
 def write_case(case: SimulatedCase, observations: Path, truth: Path) -> None:
     """Writes the recording folder `observations`, and `truth` (.json) with the clean torque beside it."""
-    runs = [log_run(case, run) for run in range(len(case.plan.runs))]
-    observations.mkdir(parents=True)
+    runs = write_observation(case, observations)
     truth.parent.mkdir(parents=True, exist_ok=True)
     joints = case.plan.machine.joints
-    for number, run in enumerate(runs, 1):
-        _write_table(observations / f"run-{number}.parquet", run, joints)
-    _write_yaml(observations / "robot.yaml", case.plan.machine.settings())
-    _write_yaml(observations / "recording.yaml", _recording_settings(case, runs))
     held_out = [run for run in runs if run.role == "validate"]
     _write_parquet(
         truth.with_suffix(".parquet"), {f"tau{joint + 1}": held_out[0].clean[:, joint] for joint in range(joints)}
     )
     write_model(make_truth(case, runs), truth)
+
+
+def write_observation(case: SimulatedCase, folder: Path) -> list[LoggedRun]:
+    """Writes the recording folder of a case, and returns its runs as logged."""
+    runs = [log_run(case, run) for run in range(len(case.plan.runs))]
+    folder.mkdir(parents=True)
+    for number, run in enumerate(runs, 1):
+        _write_table(folder / f"run-{number}.parquet", run, case.plan.machine.joints)
+    _write_yaml(folder / "robot.yaml", case.plan.machine.settings())
+    _write_yaml(folder / "recording.yaml", _recording_settings(case, runs))
+    return runs
 
 
 def make_truth(case: SimulatedCase, runs: list[LoggedRun]) -> Truth:

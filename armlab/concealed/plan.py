@@ -109,9 +109,9 @@ def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: 
     realistic = tier == "realistic"
     noise = draw_noise(rng, _draw_noise_kind(rng, kind, realistic, development), made.rating, realistic)
     arm, errors = _draw_arm(rng, made, realistic or kind == "decoy", kind)
-    background = _draw_background(rng, made) if realistic else ()
+    background = draw_background(rng, made) if realistic else ()
     rate = int(rng.choice([rate for rate, _ in PLAN.rates], p=[share for _, share in PLAN.rates]))
-    return Plan(seed, index, tier, kind, made, _draw_runs(rng), rate, noise, arm, errors, background)
+    return Plan(seed, index, tier, kind, made, draw_runs(rng), rate, noise, arm, errors, background)
 
 
 def draw_effects(plan: Plan, attempt: int) -> tuple[HiddenEffect, ...]:
@@ -193,7 +193,7 @@ def _draw_arm(rng: np.random.Generator, made: Machine, off: bool, kind: CaseKind
     return arm, tuple(errors)
 
 
-def _draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEffect, ...]:
+def draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEffect, ...]:
     """Coulomb and viscous friction on every joint, offsets on half of them."""
     out: list[HiddenEffect] = []
     for joint in range(made.joints):
@@ -208,7 +208,7 @@ def _draw_background(rng: np.random.Generator, made: Machine) -> tuple[HiddenEff
     return tuple(out)
 
 
-def _draw_runs(rng: np.random.Generator) -> tuple[RunPlan, ...]:
+def draw_runs(rng: np.random.Generator) -> tuple[RunPlan, ...]:
     """Two or three runs of one or two families, and one of another family to validate."""
     families = [str(name) for name in rng.permutation(list(FAMILIES))]
     number = int(rng.integers(2, 4))

@@ -131,8 +131,7 @@ def _diagnose_case(observation: Path, out: Path) -> str:
     with TemporaryDirectory() as desk:
         copy = shutil.copytree(observation, Path(desk) / observation.name)
         start = time.monotonic()
-        command = [sys.executable, "-m", "armlab.cli.main", "diagnose", str(copy), "--out", str(out.resolve())]
-        complaint = _run_and_get_error(command)
+        complaint = run_command(["diagnose", str(copy), "--out", str(out.resolve())])
         seconds = time.monotonic() - start
     if complaint is not None:
         (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
@@ -141,8 +140,9 @@ def _diagnose_case(observation: Path, out: Path) -> str:
     return observation.name
 
 
-def _run_and_get_error(command: list[str]) -> str | None:
-    """The error output of a command that failed, None for one that succeeded."""
+def run_command(arguments: list[str]) -> str | None:
+    """Runs armlab in a process of its own: the error output where it failed, None where it succeeded."""
+    command = [sys.executable, "-m", "armlab.cli.main", *arguments]
     about: dict[str, Any] = {"env": _one_thread_environment(), "cwd": _source_root(), "timeout": TIMEOUT_S}
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False, **about)
