@@ -1,6 +1,7 @@
 """Commands of the diagnosis: what physics is missing, and which experiment to do next."""
 
 import sys
+from datetime import date
 from pathlib import Path
 
 import click
@@ -64,6 +65,7 @@ def next_experiment(
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of random waves in surrogates.")
 @click.option("--compare", "old", type=click.Path(path_type=Path), help="An older recording: what changed since?")
+@click.option("--dates", help="With --compare: day of each recording, like 2026-01-31,2026-02-28.")
 @click.option("--without", multiple=True, metavar="GUARD", help="Switch a guard off, to see what it is worth.")
 @click.option(
     "--set", "changes", multiple=True, metavar="NUMBER=VALUE", help="Another tuning number, like noise.max_order=8."
@@ -74,6 +76,7 @@ def diagnose(
     baseline: str | None,
     seed: int,
     old: Path | None,
+    dates: str | None,
     without: tuple[str, ...],
     changes: tuple[str, ...],
 ) -> None:
@@ -94,7 +97,7 @@ def diagnose(
         lines = (
             diagnose_recording(recordings[0], out, baseline, seed, without, changes, progress.tell)
             if old is None
-            else compare_recordings((old, *recordings), out, baseline, seed, progress.tell)
+            else compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
         )
         for line in lines:
             progress.clear()
@@ -202,6 +205,16 @@ def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints:
 
     for line in write_card(robot, trajectory, joints, noise, out):
         click.echo(line)
+
+
+def _parse_dates(text: str | None) -> tuple[date, ...]:
+    """Days written with commas; InputError for what is no day."""
+    from armlab.common.errors import InputError
+
+    try:
+        return tuple(date.fromisoformat(each.strip()) for each in text.split(",")) if text else ()
+    except ValueError:
+        raise InputError(f"--dates {text}: should be days like 2026-01-31,2026-02-28") from None
 
 
 class ProgressLine:

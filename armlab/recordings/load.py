@@ -47,7 +47,8 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     simulation = folder / file.simulation if file.simulation else None
     if simulation and not simulation.is_file():
         raise InputError(f"no file {simulation}, which `simulation` in {folder / FILE_NAME} names")
-    return Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz), file
+    empty = Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz)
+    return replace(empty, recorded=file.recorded), file
 
 
 def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tuple[Run, ...]:

@@ -1,6 +1,7 @@
 """A recording: an arm, its runs in SI units on the joint side, and remarks about them."""
 
 from dataclasses import dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import Any, Literal
 
@@ -140,7 +141,7 @@ class Recording:
     """What `recording.yaml` and its runs hold, in SI units on the joint side.
 
     robot: as the file names it (a path beside it or a built-in name). simulation: the model to compare with,
-    None where the file names none. findings: those that concern more than one run.
+    None where the file names none. recorded: the day. findings: those that concern more than one run.
     """
 
     folder: Path
@@ -151,6 +152,7 @@ class Recording:
     simulation: Path | None = None
     sample_rate_hz: float | None = None
     findings: tuple[Finding, ...] = ()
+    recorded: date | None = None
 
     @property
     def name(self) -> str:

@@ -1,6 +1,7 @@
 """The folder of a recording: the keys of `recording.yaml`, the reader of the file, and the writer of a new folder."""
 
 from dataclasses import dataclass, field
+from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -115,7 +116,7 @@ class RecordingFile(Settings):
 
     robot: a path beside the file or the name of a built-in robot. simulation: the model to compare with, a path.
     units: of each signal, one for all its columns or one a column. gains: N m (N) per A or V, one a channel.
-    controller: of the simulation; null where it is unknown.
+    controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31.
     """
 
     schema_: Literal["recording/1"] = Field(alias="schema")
@@ -127,6 +128,7 @@ class RecordingFile(Settings):
     transmission: TransmissionEntry = TransmissionEntry()
     gains: tuple[float, ...] | None = None
     controller: ControllerEntry | None = None
+    recorded: date | None = None
     runs: Annotated[tuple[RunEntry, ...], Len(min_length=1)]
 
     @property

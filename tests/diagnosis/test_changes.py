@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from datetime import date
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -181,3 +182,32 @@ def test_the_command_writes_page_and_json(tmp_path: Path) -> None:
     assert "What changed between old and new" in page
     assert f"armlab {' '.join(arguments)}" in page
     assert json.loads((tmp_path / "out" / "comparison.json").read_text())["status"] == "changed"
+
+
+def worn(viscous: float, seed: int) -> Recording:
+    return recording(f"worn-{seed}", seed, (VISCOUS[0], viscous, VISCOUS[2]))
+
+
+def test_friction_that_changes_once_has_a_change_point() -> None:
+    found = compare(*(worn(size, 20 + number) for number, size in enumerate((1.0, 1.0, 1.0, 1.4, 1.4))))
+    (trend,) = found.trends
+    assert (trend.movement.effect, trend.movement.joint, trend.kind) == ("viscous_friction", 2, "step")
+    assert trend.change_point == 3
+    assert_allclose(trend.values, [1.0, 1.0, 1.0, 1.4, 1.4], atol=0.03)
+    content = json.loads(make_comparison_file(found).to_json())
+    check_against_schema(content, "comparison")
+    assert content["trends"][0]["change_point"] == 3
+    assert "changes once" in " ".join(comparison_lines(found))
+
+
+def test_friction_that_grows_steadily_has_a_slope_per_day() -> None:
+    days = [date(2026, 1, day) for day in (1, 11, 21, 31)]
+    found = compare(*(worn(1 + 0.1 * number, 40 + number) for number in range(4)), dates=days)
+    (trend,) = found.trends
+    assert trend.kind == "slope"
+    assert trend.slope == pytest.approx(0.01, abs=0.001)
+
+
+def test_dates_have_to_be_as_many_as_recordings() -> None:
+    message = refusal(compare, recording("cold", 0), recording("again", 10), dates=[date(2026, 1, 1)])
+    assert "1 dates for 2 recordings" in message

@@ -7,6 +7,7 @@ been seen (`list_table`).
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from datetime import date
 
 import numpy as np
 
@@ -16,11 +17,13 @@ from armlab.diagnosis.compare.named import (
     Change,
     NamedChange,
     held_out_gains,
+    list_movements,
     list_table,
     name_changes,
     predicts_better,
 )
-from armlab.diagnosis.compare.pooled import pool_recordings
+from armlab.diagnosis.compare.pooled import Pooled, pool_recordings
+from armlab.diagnosis.compare.trends import Trend, find_trends, recording_date
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
 from armlab.diagnosis.result import Diagnosis
@@ -35,7 +38,8 @@ GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same r
 class Comparison:
     """diagnoses: of each recording alone. named: what changed, the surest first. changes: every parameter compared.
 
-    reason: of an inconclusive comparison. notes: sentences on what was not used.
+    reason: of an inconclusive comparison. notes: sentences on what was not used. trends: of more than two recordings,
+    each parameter that moves; dates: of the recordings.
     """
 
     status: ComparisonStatus
@@ -44,6 +48,8 @@ class Comparison:
     changes: tuple[Change, ...] = ()
     reason: str = ""
     notes: tuple[str, ...] = ()
+    trends: tuple[Trend, ...] = ()
+    dates: tuple[date | None, ...] = ()
 
     @property
     def old(self) -> Diagnosis:
@@ -75,11 +81,21 @@ def compare(
     *more: Recording,
     baseline: Baseline | None = None,
     seed: int = 0,
+    dates: Sequence[date] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Comparison:
-    """What changed from the first recording to the later ones; InputError where they are not of one robot."""
+    """What changed from the first recording to the later ones.
+
+    dates: of the recordings; those of their files if left out. Raises InputError where the recordings are not of one
+    robot, or dates are not as many.
+    """
     for other in (new, *more):
         _check_same_robot(old, other)
+    if dates and len(dates) != 2 + len(more):
+        raise InputError(f"{len(dates)} dates for {2 + len(more)} recordings: give one each, or none")
+    known_dates: tuple[date | None, ...] = tuple(dates)
+    if not dates:
+        known_dates = tuple(recording_date(each) for each in (old, new, *more))
     recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
     diagnoses: list[Diagnosis] = []
     for number, each in enumerate(recordings, 1):
@@ -96,7 +112,25 @@ def compare(
     named = name_changes(pooled, table, found)
     status: ComparisonStatus = "changed" if named else "same"
     changes = list_table(pooled, table, found)
-    return Comparison(status, tuple(diagnoses), named, changes, notes=tuple(_notes(recordings, baseline)))
+    return Comparison(
+        status,
+        tuple(diagnoses),
+        named,
+        changes,
+        notes=tuple(_notes(recordings, baseline)),
+        trends=_find_trends(pooled, table, found, known_dates),
+        dates=known_dates,
+    )
+
+
+def _find_trends(
+    pooled: Pooled, table: ChangeTable, found: tuple[Tested, ...], dates: Sequence[date | None]
+) -> tuple[Trend, ...]:
+    """How what changed moves over more than two recordings."""
+    if len(dates) < 3:
+        return ()
+    movements = [movement for each in found for movement in list_movements(pooled, table, found, each)]
+    return find_trends(movements, dates)
 
 
 def _diagnose_once(

@@ -53,6 +53,23 @@ class Change:
 
 
 @dataclass(frozen=True, eq=False)
+class Movement:
+    """A parameter over all recordings. values: (recordings,), levels where they are known, else about their mean.
+
+    covariance: (recordings, recordings), of the values about their mean. half_widths: (recordings,), of 95 % intervals.
+    """
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    parameter: str
+    unit: str
+    values: Array
+    covariance: Array
+    half_widths: Array
+
+
+@dataclass(frozen=True, eq=False)
 class NamedChange:
     """One thing that changed. parameters: as changes. changes: the same with levels, where they are known.
 
@@ -177,28 +194,71 @@ def _between_ends(table: ChangeTable, tested: Tested) -> tuple[Array, Array]:
 
 def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Change]:
     """The scalar parameters of a group in the recordings."""
-    group = table.groups[tested.group]
-    parts = group.laws or ((group.candidate, np.empty(0)),)
-    columns = [table.model, *(table.groups[each.group].columns for each in found)]
-    inside = np.concatenate(columns).astype(np.intp)
-    at_mean = np.zeros(table.mixed.size)
-    at_mean[inside], _ = table.mixed.fit(inside)
-    difference, covariance = _between_ends(table, tested)
-    offsets = recording_values(table, tested)
-    for candidate, coefficients in parts:
-        if group.laws:
+    _, covariance = _between_ends(table, tested)
+    for law, own, spread in _laws(pooled, table, found, tested):
+        between = own[-1] - own[0]
+        own_spread = covariance if spread is None else covariance[0, 0] * spread
+        yield from _parameters(table, tested, law, own, between, own_spread)
+
+
+def list_movements(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Movement]:
+    """The scalar parameters of a group over all recordings."""
+    width = table.contrast.shape[1]
+    count = len(tested.values) // width
+    between = tested.covariance.reshape(count, width, count, width)
+    for law, own, spread in _laws(pooled, table, found, tested):
+        slopes = law.slopes(own.mean(axis=0))
+        for name, slope in slopes.items():
+            values = [law.parameters(each)[name] for each in own]
+            if any(isinstance(each, tuple) for each in values):
+                continue
+            if spread is None:
+                covariance = np.einsum(
+                    "i,iajb,j,ra,sb->rs", slope[0], between, slope[0], table.contrast, table.contrast
+                )
+            else:
+                covariance = (
+                    float(slope[0] @ spread @ slope[0]) * table.contrast @ between[0, :, 0, :] @ table.contrast.T
+                )
+            if np.trace(covariance) <= 0:
+                continue
+            candidate = law.candidate
+            yield Movement(
+                effect=candidate.effect,
+                joint=candidate.joint,
+                joints=candidate.joints,
+                parameter=name,
+                unit=candidate.unit(name),
+                values=np.array(values, dtype=float),
+                covariance=covariance,
+                half_widths=half_width_factor(table) * np.sqrt(np.maximum(np.diag(covariance), 0)),
+            )
+
+
+def _laws(
+    pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested
+) -> Iterator[tuple["_Law", Array, Array | None]]:
+    """Each law of a group with its numbers in the recordings, (recordings, numbers).
+
+    Where all change by one factor, also what the factor's variance is to be multiplied by, (numbers, numbers).
+    """
+    group, offsets = table.groups[tested.group], recording_values(table, tested)
+    if group.laws:
+        for candidate, coefficients in group.laws:
             own = np.outer(1 + offsets[:, 0], coefficients)
-            spread = covariance[0, 0] * np.outer(coefficients, coefficients)
-            law = _Law(candidate, known=True)
-            yield from _parameters(table, tested, law, own, coefficients * difference[0], spread)
-        elif group.shaped is not None:
-            law = _Law(candidate, known=True, coefficients=group.shaped)
-            own = np.array(candidate.shape) + offsets
-            yield from _parameters(table, tested, law, own, difference, covariance)
-        else:
-            known = _level_is_known(pooled, candidate)
-            mean = at_mean[group.common] + _simulated(pooled, candidate) if known else np.zeros(len(difference))
-            yield from _parameters(table, tested, _Law(candidate, known=known), mean + offsets, difference, covariance)
+            yield _Law(candidate, known=True), own, np.outer(coefficients, coefficients)
+    elif group.shaped is not None:
+        own = np.array(group.candidate.shape) + offsets
+        yield _Law(group.candidate, known=True, coefficients=group.shaped), own, None
+    elif _level_is_known(pooled, group.candidate):
+        columns = [table.model, *(table.groups[each.group].columns for each in found)]
+        inside = np.concatenate(columns).astype(np.intp)
+        at_mean = np.zeros(table.mixed.size)
+        at_mean[inside], _ = table.mixed.fit(inside)
+        mean = at_mean[group.common] + _simulated(pooled, group.candidate)
+        yield _Law(group.candidate, known=True), mean + offsets, None
+    else:
+        yield _Law(group.candidate, known=False), offsets, None
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ these files.
 
 import shlex
 from collections.abc import Callable, Iterator, Sequence
+from datetime import date
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, get_args
@@ -14,6 +15,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.named import Change, NamedChange
+from armlab.diagnosis.compare.trends import Trend
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
     ChangeEntry,
@@ -23,13 +25,22 @@ from armlab.diagnosis.formats import (
     FindingEntry,
     ParameterEntry,
     RivalEntry,
+    TrendEntry,
     kind_of_effect,
 )
 from armlab.diagnosis.report import sections
 from armlab.diagnosis.report.charts import (
     FOUND_LOOK,
     GIVEN_LOOK,
+    LAW_LOOK,
     PALE_COLOR,
+    Axis,
+    Layer,
+    Line,
+    Look,
+    Points,
+    draw_chart,
+    fit_axis,
     shorten_text,
     svg_element,
     svg_picture,
@@ -133,6 +144,10 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
         also = f"; it could also be {join_words(rivals)}" if rivals else ""
         text = f"{change_phrase(each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
         yield from wrap(text, LINE_WIDTH, initial_indent="  ", subsequent_indent="    ")
+    for trend in comparison.trends:
+        yield from wrap(
+            trend_phrase(trend, comparison.names), LINE_WIDTH, initial_indent="  ", subsequent_indent="    "
+        )
     for note in comparison.notes:
         yield from wrap(note, LINE_WIDTH, initial_indent="  ", subsequent_indent="  ")
     if comparison.changes:
@@ -146,6 +161,10 @@ def _rival_phrase(rival: Rival) -> str:
 
 def make_comparison_file(comparison: Comparison) -> ComparisonFile:
     """The content of `comparison.json`."""
+    more_than_two: dict[str, Any] = {}
+    if len(comparison.names) > 2:
+        dates = tuple(None if each is None else each.isoformat() for each in comparison.dates)
+        more_than_two = {"dates": dates, "trends": tuple(_trend_entry(each) for each in comparison.trends)}
     return ComparisonFile(
         schema=COMPARISON_SCHEMA,
         status=comparison.status,
@@ -158,6 +177,23 @@ def make_comparison_file(comparison: Comparison) -> ComparisonFile:
         changes=tuple(_change_entry(each) for each in comparison.changes),
         smallest_detectable=tuple(_detectable_entry(each) for each in comparison.changes),
         notes=comparison.notes,
+        **more_than_two,
+    )
+
+
+def _trend_entry(each: Trend) -> TrendEntry:
+    own = each.movement
+    return TrendEntry(
+        effect=own.effect,
+        joint=own.joint,
+        joints=own.joints,
+        parameter=own.parameter,
+        unit=own.unit,
+        values=tuple(each.values.tolist()),
+        ci95=tuple((low, high) for low, high in each.intervals.tolist()),
+        kind=each.kind,
+        change_point=each.change_point,
+        per_day=each.slope if each.per_day else None,
     )
 
 
@@ -219,6 +255,8 @@ def _detectable_entry(each: Change) -> DetectableEntry:
 TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p", "smallest seen")
 PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 178.0
 MAX_DRAWN_CHANGES = 24
+VALUE_LOOK = Look("value", LAW_LOOK.color, 4.0)
+INTERVAL_LOOK = Look("95 % interval", "#8b929b", 2.0)
 
 
 def comparison_page(comparison: Comparison, command: str) -> str:
@@ -229,6 +267,8 @@ def comparison_page(comparison: Comparison, command: str) -> str:
     parts = [sections.page_header(title, kind, first, second)]
     if comparison.named:
         parts.append(section("changed", "What changed", *(_card(each, comparison.names) for each in comparison.named)))
+    if comparison.trends:
+        parts.append(_trends_section(comparison))
     if comparison.changes:
         parts.append(_numbers_section(comparison))
     if comparison.notes:
@@ -249,6 +289,45 @@ def _card(named: NamedChange, names: Sequence[str]) -> str:
     ]
     table = html_table(["change of", "value", "95 % interval", "unit"], rows, (0, 3))
     return f'<article class="finding"><h3>{change_phrase(named)}</h3>{"".join(texts)}{table}</article>'
+
+
+def _trends_section(comparison: Comparison) -> str:
+    """A picture of each parameter that moves, with its shape in words."""
+    names = comparison.names
+    pictures = [draw_trend(each, names) for each in comparison.trends]
+    texts = [trend_phrase(each, names) for each in comparison.trends]
+    days = [f"{name}: {'no date' if day is None else day}" for name, day in zip(names, comparison.dates, strict=True)]
+    return section(
+        "trends", "Over the recordings", bullets(texts), figures(pictures), paragraph("; ".join(days), "pale")
+    )
+
+
+def trend_phrase(trend: Trend, names: Sequence[str]) -> str:
+    """How a parameter moves over the recordings."""
+    own, unit = trend.movement, format_unit(trend.movement.unit)
+    what = f"{own.parameter} of {effect_in_words(own.effect)} at {place_in_words(own.effect, own.joint, own.joints)}"
+    values = " to ".join(format_number(float(each)) for each in (trend.values[0], trend.values[-1]))
+    if trend.change_point is not None:
+        return f"{what} changes once, at {names[trend.change_point]}: {values} {unit}".rstrip() + "."
+    if trend.slope is not None:
+        step = "day" if trend.per_day else "recording"
+        return f"{what} moves steadily by {format_number(trend.slope)} {unit} a {step}: {values} {unit}".rstrip() + "."
+    return f"{what} moves up and down, between {format_number(float(trend.values.min()))} and " + (
+        f"{format_number(float(trend.values.max()))} {unit}".rstrip() + "."
+    )
+
+
+def draw_trend(trend: Trend, names: Sequence[str]) -> str:
+    """Values of a parameter over the recordings with their 95 % intervals."""
+    own, count = trend.movement, len(names)
+    x = Axis("recording", 0.5, count + 0.5)
+    y = fit_axis(f"{own.parameter}, {format_unit(own.unit)}", trend.intervals)
+    layers: list[Layer] = [
+        Line(np.full(2, number + 1.0), interval, INTERVAL_LOOK) for number, interval in enumerate(trend.intervals)
+    ]
+    layers.append(Points(np.arange(1.0, count + 1), trend.values, VALUE_LOOK))
+    title = f"{effect_in_words(own.effect)} at {place_in_words(own.effect, own.joint, own.joints)}"
+    return draw_chart(title, x, y, layers, f"{own.parameter} of {title} in {count} recordings")
 
 
 def _numbers_section(comparison: Comparison) -> str:
@@ -337,21 +416,23 @@ def compare_recordings(
     out: Path,
     baseline: str | None,
     seed: int,
+    dates: Sequence[date] = (),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
     """Compares, writes comparison.json and comparison.html into `out`, both or none, and yields lines to print.
 
-    folders: of the recordings, the oldest first. Raises InputError, in one line, for recordings that cannot be used or
-    are not of one robot.
+    folders: of the recordings, the oldest first. dates: of each; those of their files if left out. Raises InputError,
+    in one line, for recordings that cannot be used or are not of one robot.
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     first, second, *more = (load_recording(each) for each in folders)
     check_output_folder(out, second)
     try:
-        comparison = compare(first, second, *more, baseline=chosen, seed=seed, progress=progress)
+        comparison = compare(first, second, *more, baseline=chosen, seed=seed, dates=dates, progress=progress)
     except ValueError as error:
         raise InputError(f"{' and '.join(map(str, folders))}: {error}") from None
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
+    options += ["--dates", ",".join(each.isoformat() for each in dates)] if dates else []
     command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out), *options])
     texts = {
         "comparison.json": make_comparison_file(comparison).to_json(),
