@@ -4,7 +4,7 @@ BIN := .venv/bin
 COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real real-leave-one-out test lint structure speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real real-leave-one-out relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -58,6 +58,13 @@ real: .venv/dev ## identify and diagnose the public recordings of real arms: res
 
 real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
 	$(BIN)/armlab real --leave-one-out
+
+relations: .venv/dev ## relations that need no truth, on real and simulated recordings: results/relations/
+	$(BIN)/armlab conceal --cases 8 --seed 1800 --out .armlab/relations-set
+	$(BIN)/armlab relations .armlab/relations-set/observations/*
+
+prove-changes: .venv/dev ## the comparison judged on pairs with nothing or one thing changed: results/changes/
+	$(BIN)/armlab prove-changes --results results/changes
 
 prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
 	$(BIN)/armlab prove

@@ -169,6 +169,26 @@ def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | N
             click.echo(line)
 
 
+@click.command()
+@click.argument("folders", nargs=-1, type=click.Path(path_type=Path), metavar="[RECORDING]...")
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/relations"), show_default=True)
+@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--only", multiple=True, help="Name of a recording [default: all at hand].")
+@click.option("--quick", is_flag=True, help="The short relations alone.")
+def relations(folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], quick: bool) -> None:
+    """Check relations that need no truth on the public recordings at hand and on each RECORDING.
+
+    A recording against itself has no change, the found model explains its recording, other units change nothing, and
+    others. Writes relations.md; an interrupted command continues.
+    """
+    from armlab.diagnosis.relations.bench import bench_relations
+
+    with ProgressLine() as progress:
+        for line in bench_relations(results, recordings, folders, only, quick, progress.tell):
+            progress.clear()
+            click.echo(line)
+
+
 @click.command("real-concealed")
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)

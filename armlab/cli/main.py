@@ -41,6 +41,7 @@ _COMMANDS = {
     "real-concealed": "armlab.cli.diagnosis:real_concealed",
     "coverage": "armlab.cli.identification:coverage",
     "diagnose": "armlab.cli.diagnosis:diagnose",
+    "relations": "armlab.cli.diagnosis:relations",
     "tuning": "armlab.cli.diagnosis:tuning",
     "confusability": "armlab.cli.diagnosis:confusability",
     "conceal": "armlab.cli.proof:conceal",

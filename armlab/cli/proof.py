@@ -156,18 +156,22 @@ def prove(
 @click.command("prove-changes")
 @click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Pairs, nothing changed.")
 @click.option("--changed", type=click.IntRange(min=0), default=120, show_default=True, help="Pairs, one thing changed.")
-@click.option("--seed", type=int, required=True, help="1000-1999 are for development.")
-@click.option("--work", type=_FOLDER, help="Folder for pairs and verdicts [default: .armlab/changes-SEED].")
+@click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
+@click.option("--work", type=_FOLDER, help="Folder for pairs and verdicts [default: .armlab/changes/SEED].")
 @click.option("--results", type=_FOLDER, help="Folder for changes.md and changes.json [default: WORK/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
-def prove_changes(nulls: int, changed: int, seed: int, work: Path | None, results: Path | None, jobs: int) -> None:
+def prove_changes(
+    nulls: int, changed: int, seed: int | None, work: Path | None, results: Path | None, jobs: int
+) -> None:
     """Prove the comparison of recordings.
 
     Makes pairs of recordings of one robot, with nothing or one thing changed, compares them blindly, and scores. After
     an interruption the same command continues (extra `engines`).
     """
     from armlab.concealed.pairs.prove import PairSet, prove_pairs
+    from armlab.concealed.prove import head_commit, judged_seed
 
-    folder = work or Path(f".armlab/changes-{seed}")
-    for line in prove_pairs(PairSet(nulls, changed, seed), folder, results or folder / "score", jobs):
+    chosen = judged_seed(head_commit()) if seed is None else seed
+    folder = work or Path(f".armlab/changes/{chosen}")
+    for line in prove_pairs(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs):
         click.echo(line)

@@ -98,28 +98,36 @@ def compare(
         known_dates = tuple(recording_date(each) for each in (old, new, *more))
     recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
     diagnoses: list[Diagnosis] = []
-    for number, each in enumerate(recordings, 1):
-        diagnosis = _diagnose_once(recordings, diagnoses, baseline, seed, _progress_of(number, progress))
-        diagnoses.append(diagnosis)
-        if diagnosis.status == "inconclusive" and diagnosis.inertial is None:
-            return Comparison("inconclusive", tuple(diagnoses), reason=f"{each.name}: {diagnosis.summary}")
-    settings = Settings()
+    for number in range(len(recordings)):
+        diagnoses.append(_diagnose_once(recordings, diagnoses, baseline, seed, _progress_of(number + 1, progress)))
+    return compare_diagnosed(recordings, diagnoses, baseline, known_dates, progress)
+
+
+def compare_diagnosed(
+    recordings: Sequence[Recording],
+    diagnoses: Sequence[Diagnosis],
+    baseline: Baseline | None,
+    dates: Sequence[date | None],
+    progress: Callable[[str], None] = lambda message: None,
+) -> Comparison:
+    """What changed between recordings of one robot of which each is diagnosed."""
+    failed = next((each for each in diagnoses if each.model is None), None)
+    if failed is not None:
+        return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.summary}")
     progress("putting the recordings on one table")
-    pooled = pool_recordings(recordings, diagnoses, read_simulation(old, baseline), settings)
+    pooled = pool_recordings(recordings, diagnoses, read_simulation(recordings[0], baseline), Settings())
     progress("looking for changes")
     table = make_table(pooled)
     found = _without_failures(table, find_changes(table))
     named = name_changes(pooled, table, found)
-    status: ComparisonStatus = "changed" if named else "same"
-    changes = list_table(pooled, table, found)
     return Comparison(
-        status,
+        "changed" if named else "same",
         tuple(diagnoses),
         named,
-        changes,
+        list_table(pooled, table, found),
         notes=tuple(_notes(recordings, baseline)),
-        trends=_find_trends(pooled, table, found, known_dates),
-        dates=known_dates,
+        trends=_find_trends(pooled, table, found, dates),
+        dates=tuple(dates),
     )
 
 
