@@ -19,14 +19,17 @@ from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.named import Change
+from armlab.diagnosis.compare.named import ALL_FRICTION, Change
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.found_model import model_found
 from armlab.effects.contract import Scene
 from armlab.recordings.load import load_recording
+from armlab.recordings.public import local_copies
 from armlab.recordings.recording import Recording
 from problem.regressor import rigid_body_torque
 
+COPIES = local_copies()
+DAMPERS = None if COPIES is None or not (COPIES / "friction-damper").is_dir() else COPIES / "friction-damper"
 LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
 
 
@@ -49,7 +52,7 @@ def comparison(kind: str) -> Comparison:
 
 
 def changed(found: Comparison) -> list[Change]:
-    return [each for each in found.changes if each.changed]
+    return [each for each in found.changes if each.changed and each.parameter != ALL_FRICTION]
 
 
 def test_a_recording_compared_with_itself_has_no_difference_in_any_parameter() -> None:
@@ -122,6 +125,27 @@ def test_a_drift_of_the_offset_within_runs_is_no_change_of_the_offset(tmp_path: 
     assert compare(old, new).status == "same"
 
 
+def test_all_friction_of_a_joint_is_told_as_one_level() -> None:
+    (level,) = [each for each in comparison("warm").changes if each.parameter == ALL_FRICTION]
+    time = np.arange(1600) / 200
+    speed = np.concatenate([motion_at(time, seed).velocity[:, 1] for seed in (0, 1, 10, 11)])
+    mean = 1.5 * np.sign(speed) + (VISCOUS[1] - 0.15) * speed
+    change = -0.3 * float(speed @ mean) / float(np.sqrt(len(mean) * (mean @ mean)))
+    assert level.difference == pytest.approx(change, rel=0.1)
+    assert level.interval[0] < change < level.interval[1]
+
+
+@pytest.mark.skipif(not DAMPERS, reason="the recordings of the friction damper are not on this machine")
+def test_a_damper_at_another_tension_has_other_friction_and_no_other_fault() -> None:
+    opened = [load_recording(DAMPERS / f"tension-{tension}-lb") for tension in (20, 25)]
+    found = compare(opened[0], opened[1], baseline="refit")
+    laws = {"coulomb_friction", "viscous_friction", "presliding_hysteresis", "backlash", "asymmetric_friction"}
+    assert {each.effect for each in found.named} <= laws
+    (level,) = [each for each in found.changes if each.parameter == ALL_FRICTION]
+    assert level.ratio is not None
+    assert level.ratio[1] > 1.5
+
+
 def test_notes_say_which_columns_are_not_used() -> None:
     old, new = recording("cold", 0), recording("again", 10)
     runs = tuple(replace(run, simulated_torque=run.torque, simulated_position=run.position) for run in new.runs)
@@ -158,7 +182,7 @@ def test_a_recording_that_allows_no_verdict_allows_no_comparison(tmp_path: Path)
 def test_json_and_terminal_tell_the_change(tmp_path: Path) -> None:
     content = json.loads(make_comparison_file(comparison("warm")).to_json())
     check_against_schema(content, "comparison")
-    assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient"]
+    assert [each["parameter"] for each in content["changes"] if each["changed"]] == ["coefficient", ALL_FRICTION]
     assert [(each["effect"], each["joint"]) for each in content["findings"]] == [("viscous_friction", 2)]
     assert sum(each["probability"] for each in content["findings"][0]["class"]) == pytest.approx(1)
     text = " ".join(comparison_lines(comparison("warm")))

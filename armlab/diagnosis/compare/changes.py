@@ -91,7 +91,7 @@ class ChangeTable:
         return max(int(np.bincount(owners, minlength=len(self.contrast)).min()) - 1, 1)
 
     def evidence(self, chosen: Sequence[int]) -> Array:
-        """Log odds of each group beside chosen ones, errors taken as independent: (groups,)."""
+        """Log evidence of each group beside chosen ones, errors taken as independent: (groups,)."""
         mixed, inside = self.mixed, self.columns_with(chosen)
         matrix = mixed.information[np.ix_(inside, inside)] + np.diag(mixed.precision[inside])
         scale = 1 / np.sqrt(np.diag(matrix))
@@ -102,16 +102,28 @@ class ChangeTable:
             if number in chosen:
                 continue
             own = group.columns
-            data = mixed.information[np.ix_(own, own)] - half[:, own].T @ half[:, own]
-            towards = mixed.information[own, -1] - half[:, own].T @ half[:, -1]
-            out[number] = self.prior_odds(number) + _log_bayes_factor(
-                np.asarray(data), np.asarray(towards), group.scales
-            )
+            data = np.asarray(mixed.information[np.ix_(own, own)] - half[:, own].T @ half[:, own])
+            towards = np.asarray(mixed.information[own, -1] - half[:, own].T @ half[:, -1])
+            out[number] = _log_bayes_factor(data, towards, group.scales)
         return out
 
-    def prior_odds(self, number: int) -> float:
-        """Log odds before any data: what the model has changes sooner than a fault appears that it does not have."""
-        return self.tuning.familiar_odds if self.groups[number].familiar else 0.0
+    @cached_property
+    def prior_odds(self) -> Array:
+        """Log odds before any data, (groups,): what the model has changes sooner than a new fault appears."""
+        return np.array([self.tuning.familiar_odds if each.familiar else 0.0 for each in self.groups])
+
+    def odds(self, evidence: Array) -> Array:
+        """Log evidence where the scale of the errors is itself known by a few stretches alone (Student's t)."""
+        half = (self.degrees + 1) / 2
+        return np.asarray(half * np.sign(evidence) * np.log1p(2 * np.abs(evidence) / self.degrees))
+
+    def deficits(self, chosen: Sequence[int], tested: Tested) -> Array:
+        """How much worse each group would be in the place of a chosen one, log odds, (groups,): infinite for others."""
+        number = tested.group
+        gains = self.evidence([each for each in chosen if each != number])
+        known = np.isfinite(gains)
+        worse = np.where(known, (gains[number] - np.where(known, gains, 0.0)) / tested.inflation, 0.0)
+        return np.where(known, self.odds(worse) + self.prior_odds[number] - self.prior_odds, np.inf)
 
     def test(self, chosen: Sequence[int]) -> tuple[Tested, ...]:
         """Tests of chosen groups, all fitted together."""
@@ -248,6 +260,7 @@ def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array 
             random=(slow[rows], slow[rows] * level[rows, None]),
             waves=np.tile(np.arange(slow.shape[1]) % (pooled.tuning.drift_waves + 1) > 0, 2),
             stretches=pooled.stretches[rows],
+            runs=np.repeat(np.arange(len(pooled.owner)), [len(each.torque) for each in observed.signals])[rows],
             members=pooled.members[rows],
         )
     )
@@ -329,37 +342,48 @@ def _prior_scales(block: Block, pooled: Pooled) -> Array:
     return np.asarray(np.min(torque[:, None] / np.maximum(size, 1e-300), axis=0))
 
 
-def find_changes(table: ChangeTable) -> tuple[Tested, ...]:
-    """The changes that are sure, fitted together: added one by one, exchanged, taken out where others explain them."""
+def find_changes(table: ChangeTable, banned: frozenset[int] = frozenset()) -> tuple[Tested, ...]:
+    """The changes that are sure, fitted together: added one by one, exchanged, taken out where others explain them.
+
+    banned: groups that are no changes.
+    """
     chosen: tuple[int, ...] = ()
     for _ in range(table.tuning.max_changes):
-        added = _best_addition(table, chosen)
+        added = _best_addition(table, chosen, banned)
         if added is None:
             break
-        settled = _settle(table, (*chosen, added))
+        settled = _settle(table, (*chosen, added), banned)
         if set(settled) == set(chosen):
             break
         chosen = settled
     return table.test(chosen)
 
 
-def _best_addition(table: ChangeTable, chosen: tuple[int, ...]) -> int | None:
+def _best_addition(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> int | None:
     """The surest group beside chosen ones; None where none is sure."""
     gains = table.evidence(chosen)
+    gains[list(banned)] = -np.inf
     asked = [int(number) for number in np.argsort(-gains)[: table.tuning.max_asked] if gains[number] > 0]
     tested = [table.test((*chosen, number))[-1] for number in asked]
     sure = [each for each in tested if table.is_sure(each)]
-    return max(sure, key=lambda each: each.evidence + table.prior_odds(each.group)).group if sure else None
+    if not sure:
+        return None
+    odds = [float(table.odds(np.array(each.evidence)) + table.prior_odds[each.group]) for each in sure]
+    return sure[int(np.argmax(odds))].group
 
 
-def _settle(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+def _settle(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> tuple[int, ...]:
     """The groups, each in place of a worse one, without those that the others explain."""
     chosen = _without_unsure(table, _with_single_laws(table, chosen))
     for number in chosen:
-        rest = tuple(each for each in chosen if each != number)
-        gains = table.evidence(rest)
-        best = int(np.argmax(gains))
-        if best != number and gains[best] > gains[number]:
+        own = next((each for each in table.test(chosen) if each.group == number), None)
+        if own is None:
+            continue
+        deficits = table.deficits(chosen, own)
+        deficits[list(banned)] = np.inf
+        best = int(np.argmin(deficits))
+        if best != number and deficits[best] < 0:
+            rest = tuple(each for each in chosen if each != number)
             exchanged = _without_unsure(table, _with_single_laws(table, (*rest, best)))
             chosen = exchanged if best in exchanged else chosen
     return chosen
@@ -382,9 +406,8 @@ def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int,
         if not group.laws:
             continue
         laws = [place_of(law) for law, _ in group.laws]
-        single = [
-            other for other, each in enumerate(table.groups) if not each.laws and place_of(each.candidate) in laws
-        ]
+        plain = [(other, each) for other, each in enumerate(table.groups) if not each.laws and each.shaped is None]
+        single = [other for other, each in plain if place_of(each.candidate) in laws]
         if set(single) & set(chosen):
             chosen = tuple(dict.fromkeys((*(each for each in chosen if each != number), *single)))
     return chosen
@@ -392,12 +415,44 @@ def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int,
 
 def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tuple[tuple[int, float], ...]:
     """Groups that explain the difference nearly as well in the place of a chosen one, with their deficits."""
-    number = tested.group
-    rest = [each for each in chosen if each != number]
-    gains = table.evidence(rest)
-    deficits = (gains[number] - gains) / tested.inflation
+    deficits = table.deficits(chosen, tested)
     near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.max_rival_deficit]
-    return tuple((each, float(max(deficits[each], 0.0))) for each in near if each != number)[: table.tuning.max_rivals]
+    others = [(each, float(max(deficits[each], 0.0))) for each in near if each != tested.group]
+    return tuple(others[: table.tuning.max_rivals])
+
+
+def between_runs(table: ChangeTable, chosen: Sequence[int], number: int) -> Array:
+    """Variance of a change's coefficients by the scatter between the runs of a recording, (coefficients,).
+
+    What a run has more than the other runs of its recording, everything else held; zero where no recording has two.
+    """
+    mixed, group, width = table.mixed, table.groups[number], table.contrast.shape[1]
+    inside = table.columns_with(chosen)
+    values, _ = mixed.fit(inside)
+    count = len(group.columns) // width
+    runs = 1 + max(int(each.rows.runs.max()) for each in mixed.joints)
+    owner = np.zeros(runs, dtype=np.intp)
+    data, towards = np.zeros((runs, count, count)), np.zeros((runs, count))
+    for joint, each in enumerate(mixed.joints):
+        owner[each.rows.runs] = each.rows.members
+        place = np.flatnonzero(np.isin(each.rows.index, group.columns))
+        if not len(place):
+            continue
+        left = mixed.errors(joint, inside, values)
+        contrast = table.contrast[each.rows.members]
+        scaled = each.rows.columns[:, place].reshape(len(left), count, width)
+        own = np.einsum("rkw,rw->rk", scaled, contrast) / np.sum(contrast**2, axis=1)[:, None]
+        for run in range(runs):
+            rows = each.rows.runs == run
+            data[run] += own[rows].T @ own[rows] / each.variance
+            towards[run] += own[rows].T @ left[rows] / each.variance
+    prior = np.diag(group.scales[::width] ** -2.0)
+    apart = np.array([np.linalg.solve(data[run] + prior, towards[run]) for run in range(runs)])
+    sizes = [owner == recording for recording in (0, len(table.contrast) - 1)]
+    scatters = [np.var(apart[own], axis=0, ddof=1) for own in sizes if own.sum() > 1]
+    if not scatters:
+        return np.zeros(count)
+    return np.asarray(np.mean(scatters, axis=0) * sum(1 / own.sum() for own in sizes))
 
 
 def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:

@@ -21,6 +21,8 @@ from armlab.diagnosis.compare.named import (
     list_table,
     name_changes,
     predicts_better,
+    reason_impossible,
+    runs_differ_as_much,
 )
 from armlab.diagnosis.compare.pooled import Pooled, pool_recordings
 from armlab.diagnosis.compare.trends import Trend, find_trends, recording_date
@@ -118,7 +120,7 @@ def compare_diagnosed(
     pooled = pool_recordings(recordings, diagnoses, read_simulation(recordings[0], baseline), Settings())
     progress("looking for changes")
     table = make_table(pooled)
-    found = _without_failures(table, find_changes(table))
+    found = _find_sound_changes(pooled, table)
     named = name_changes(pooled, table, found)
     return Comparison(
         "changed" if named else "same",
@@ -169,8 +171,23 @@ def _progress_of(number: int, progress: Callable[[str], None]) -> Callable[[str]
     return lambda message: progress(f"recording {number}: {message}")
 
 
+def _find_sound_changes(pooled: Pooled, table: ChangeTable) -> tuple[Tested, ...]:
+    """The changes that are sure, that physics allows in every recording, and that help on held-out stretches."""
+    banned: frozenset[int] = frozenset()
+    while True:
+        found = find_changes(table, banned)
+        wrong = {each.group for each in found if reason_impossible(pooled, table, found, each) is not None}
+        if not wrong:
+            return _without_failures(table, found)
+        banned |= wrong
+
+
 def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Tested, ...]:
-    """The changes without those that do not help on held-out stretches of every recording, the worst first."""
+    """The changes without those by which runs of one recording differ as much, and without those that do not help on
+    held-out stretches of every recording, the worst first.
+    """
+    while wrong := next((each for each in found if runs_differ_as_much(table, found, each)), None):
+        found = table.test([each.group for each in found if each is not wrong])
     while found:
         chosen = [each.group for each in found]
         gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}

@@ -29,8 +29,8 @@ class JointRows:
     """The rows of one joint that count.
 
     columns: (rows, own), index: (own,) their numbers among all. target: (rows,). random: parts (rows, count), one
-    variance a part. waves: (count of all,), False for constants of a run. stretches, members: (rows,), stretch of time
-    and recording of each row.
+    variance a part. waves: (count of all,), False for constants of a run. stretches, runs, members: (rows,), stretch
+    of time, run and recording of each row.
     """
 
     columns: Array
@@ -39,6 +39,7 @@ class JointRows:
     random: tuple[Array, ...]
     waves: NDArray[np.bool_]
     stretches: NDArray[np.intp]
+    runs: NDArray[np.intp]
     members: NDArray[np.intp]
 
 

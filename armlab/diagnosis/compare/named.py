@@ -1,21 +1,36 @@
 """Changes with their names and numbers: what changed, by how much in units and percent, and what else it could be."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.columns import place_of
-from armlab.diagnosis.compare.changes import ChangeGroup, ChangeTable, Tested, find_rivals, held_out_errors
+from armlab.diagnosis.compare.changes import (
+    ChangeGroup,
+    ChangeTable,
+    Tested,
+    between_runs,
+    find_rivals,
+    held_out_errors,
+)
+from armlab.diagnosis.compare.mixed import JointRows
 from armlab.diagnosis.compare.pooled import Pooled, is_body
+from armlab.diagnosis.fitted_model import inertial_parameters
 from armlab.diagnosis.result import Rival
-from armlab.effects.contract import Candidate, Value
+from armlab.effects.contract import COULOMB_LEVEL, UNITS, Candidate, Scene, Value
+from armlab.effects.drive import ROTOR_INERTIA
 from armlab.effects.links import INERTIAL_ERROR_FACTS
 from armlab.effects.parameters import ParameterValue, half_widths, parameter_slopes, parameter_values
+from armlab.effects.term import SIGN_SIGMAS
+from problem.motion import Motion
 
 CONFIDENCE = 0.95
+ALL_FRICTION = "all friction"  # of a joint, as one level
+INERTIA_STATES = 50  # a run
 ONE_FACTOR = "all friction of the joint by one factor"
 
 
@@ -129,6 +144,7 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     changes = tuple(list_changes(pooled, table, found, tested))
     factor = half_width_factor(table)
     difference, covariance = _between_ends(table, tested)
+    covariance = _as_wide_as_runs(covariance, between_runs(table, chosen, tested.group))
     if group.laws or group.shaped is not None:
         parameters = tuple(
             ParameterValue(each.parameter, each.difference, each.interval, each.unit) for each in changes
@@ -192,9 +208,18 @@ def _between_ends(table: ChangeTable, tested: Tested) -> tuple[Array, Array]:
     return values, np.einsum("iajb,a,b->ij", covariance, ends, ends)
 
 
+def _as_wide_as_runs(covariance: Array, between: Array) -> Array:
+    """A covariance whose variances are no less than those between runs."""
+    variances = np.maximum(np.diag(covariance), 1e-300)
+    scale = np.sqrt(np.maximum(between / variances, 1.0))
+    return np.asarray(covariance * np.outer(scale, scale))
+
+
 def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Change]:
     """The scalar parameters of a group in the recordings."""
     _, covariance = _between_ends(table, tested)
+    if tested in found:
+        covariance = _as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
     for law, own, spread in _laws(pooled, table, found, tested):
         between = own[-1] - own[0]
         own_spread = covariance if spread is None else covariance[0, 0] * spread
@@ -285,6 +310,77 @@ class _Law:
         return {name: each[:, own:] for name, each in slopes.items()}
 
 
+def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> str | None:
+    """The law of physics that a change breaks in one of the recordings, in a few words; None where it breaks none."""
+    group = table.groups[tested.group]
+    if is_body(group.candidate):
+        return _reason_no_body(pooled, table, tested)
+    _, covariance = _between_ends(table, tested)
+    for law, own, spread in _laws(pooled, table, found, tested):
+        if not law.known or law.coefficients is not None:
+            continue
+        doubt = covariance if spread is None else covariance[0, 0] * spread
+        reasons = (law.candidate.objection(each, doubt) for each in own)
+        reason = next((each for each in reasons if each is not None), None)
+        if reason is not None:
+            return reason
+    return None
+
+
+def runs_differ_as_much(table: ChangeTable, found: Sequence[Tested], tested: Tested) -> bool:
+    """Whether the runs of one recording differ by as much as two recordings do; more recordings are not asked."""
+    if len(table.contrast) > 2:
+        return False
+    difference, covariance = _between_ends(table, tested)
+    wide = _as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
+    return bool(np.all(np.abs(difference) < half_width_factor(table) * np.sqrt(np.diag(wide))))
+
+
+def _reason_no_body(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:
+    """What speaks against a load: a joint that would have no inertia in one of the recordings."""
+    body = table.groups[tested.group].candidate
+    common, link = inertial_parameters(pooled.model), body.joints[0]
+    place = slice(10 * link - 10, 10 * link)
+    scenes = [_few_states(each) for each in pooled.design.scenes]
+
+    def inertia(change: Array) -> Array:
+        changed = common.copy()
+        added = body.added_body(change)
+        changed[place] += 0.0 if added is None else added
+        return np.asarray(
+            np.mean([replace(each, inertial=changed).own_inertia.mean(axis=0) for each in scenes], axis=0)
+        )
+
+    bare = inertia(np.zeros(body.size)) + _rotors(pooled)
+    slopes = np.stack([inertia(unit) + _rotors(pooled) - bare for unit in np.eye(body.size)], axis=-1)
+    _, covariance = _between_ends(table, tested)
+    doubt = SIGN_SIGMAS * np.sqrt(np.maximum(np.einsum("ji,ik,jk->j", slopes, covariance, slopes), 0.0))
+    for each in recording_values(table, tested):
+        negative = np.flatnonzero((bare + slopes @ each + doubt < 0) & (bare > 0))
+        if len(negative):
+            return f"joint {negative[0] + 1} would have a negative inertia"
+    return None
+
+
+def _few_states(scene: Scene) -> Scene:
+    """Some states of a run."""
+    every = slice(None, None, max(len(scene.time) // INERTIA_STATES, 1))
+    motion = Motion(
+        *(each[every] for each in (scene.motion.position, scene.motion.velocity, scene.motion.acceleration))
+    )
+    return replace(scene, time=scene.time[every], motion=motion, torque=scene.torque[every])
+
+
+def _rotors(pooled: Pooled) -> Array:
+    """Inertia of the rotors in simulation and common model, (joints,)."""
+    model, arm = pooled.model, pooled.design.simulation.arm
+    out = np.array(arm.rotor_inertia or [0.0] * len(arm), dtype=float)
+    for number, block in enumerate(model.design.blocks):
+        if block.candidate.effect == ROTOR_INERTIA.facts.id:
+            out[block.candidate.rows[0]] += float(model.solver.values(model.fit, number)[0])
+    return out
+
+
 def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
     """Whether the common model has a level of it: faults of channels and loads are known as differences alone."""
     place = place_of(candidate)
@@ -366,7 +462,86 @@ def list_table(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> t
             beside = table.test((*chosen, number))
             if _is_told(table, beside[-1]):
                 rows += [_unchanged(each) for each in list_changes(pooled, table, beside, beside[-1])]
-    return tuple(rows)
+    return (*rows, *friction_changes(pooled, table, found))
+
+
+def friction_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> Iterator[Change]:
+    """All friction of each joint where a law of it changed, as one level."""
+    joints = {table.groups[each.group].candidate.rows for each in found}
+    for joint in range(pooled.observed.joints):
+        changed = [each for each in found if is_friction(table.groups[each.group].candidate, joint)]
+        if (joint,) in joints and changed:
+            yield _friction_change(pooled, table, found, changed)
+
+
+def is_friction(candidate: Candidate, joint: int) -> bool:
+    """Whether it is a law of friction of a joint (from 0) alone: friction behind play has a level, too."""
+    level = any(each.name == COULOMB_LEVEL.name for each in candidate.facts.parameters)
+    return candidate.rows == (joint,) and len(candidate.joints) == 1 and (candidate.facts.dissipates or level)
+
+
+def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], changed: Sequence[Tested]) -> Change:
+    """All friction of a joint as one level, N m (N): the root mean square of its torque over the rows.
+
+    A run's level is what its torque has of the friction of the common model, everything else held. The interval is that
+    of the scatter between runs, or between stretches of time where that is larger. changed: laws of this joint.
+    """
+    first = table.groups[changed[0].group].candidate
+    joint, rows = first.rows[0], table.mixed.joints[first.rows[0]].rows
+    inside = np.concatenate([table.model, *(table.groups[each.group].columns for each in found)]).astype(np.intp)
+    values, _ = table.mixed.fit(inside)
+    at_mean = np.zeros(table.mixed.size)
+    at_mean[inside] = values
+    laws = [each.common for each in table.groups if each.shaped is None and is_friction(each.candidate, joint)]
+    mean = _torque_of(rows, np.concatenate([np.intersect1d(each, table.model) for each in laws]), at_mean)
+    own = _torque_of(rows, np.concatenate([table.groups[each.group].columns for each in changed]), at_mean)
+    whole = table.mixed.errors(joint, inside, values) + mean + own
+    last = pooled.recordings - 1
+    by_run, of_run = _levels(whole, mean, rows.runs, rows.members)
+    by_stretch, of_stretch = _levels(whole, mean, rows.stretches * pooled.recordings + rows.members, rows.members)
+    errors = [half_width_factor(table) * _error_of_difference(by_stretch, of_stretch, last)]
+    spare = sum(int(np.sum(of_run == each)) - 1 for each in (0, last))
+    if min(np.sum(of_run == 0), np.sum(of_run == last)) > 1:
+        factor = float(student.ppf((1 + CONFIDENCE) / 2, spare))
+        errors.append(factor * _error_of_difference(by_run, of_run, last))
+    size, half = float(np.sqrt(np.mean(mean**2))), max(errors)
+    levels = tuple(size * float(by_run[of_run == each].mean()) for each in range(pooled.recordings))
+    change = levels[-1] - levels[0]
+    return Change(
+        effect=first.effect,
+        joint=first.joint,
+        joints=first.joints,
+        parameter=ALL_FRICTION,
+        levels=levels,
+        difference=change,
+        interval=(change - size * half, change + size * half),
+        ratio=_ratio(levels, change, size * half),
+        unit=UNITS[pooled.design.simulation.arm.joints[joint].kind]["torque"],
+        p_value=min(min(each.p_value for each in changed) * len(table.groups), 1.0),
+        detectable=size * half,
+        changed=True,
+    )
+
+
+def _torque_of(rows: JointRows, numbers: Array, values: Array) -> Array:
+    """Torque of some columns at a joint, (rows,)."""
+    places = np.flatnonzero(np.isin(rows.index, numbers))
+    return np.asarray(rows.columns[:, places] @ values[rows.index[places]])
+
+
+def _levels(whole: Array, mean: Array, numbers: NDArray[np.intp], members: NDArray[np.intp]) -> tuple[Array, Array]:
+    """Share of the mean torque that the rows of each number have, and the recording of each."""
+    known, place = np.unique(numbers, return_inverse=True)
+    power = np.bincount(place, mean * mean, minlength=len(known))
+    size = np.bincount(place, whole * mean, minlength=len(known))
+    owner = np.bincount(place, members, minlength=len(known)) / np.bincount(place, minlength=len(known))
+    return size / np.maximum(power, 1e-300), np.rint(owner)
+
+
+def _error_of_difference(levels: Array, owner: Array, last: int) -> float:
+    """Standard error of the last recording's mean less the first one's."""
+    parts = [levels[owner == each] for each in (0, last)]
+    return float(np.sqrt(sum(np.var(part, ddof=1) / len(part) if len(part) > 1 else 0.0 for part in parts)))
 
 
 def _is_told(table: ChangeTable, tested: Tested) -> bool:

@@ -14,7 +14,7 @@ import numpy as np
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.named import Change, NamedChange
+from armlab.diagnosis.compare.named import ALL_FRICTION, ONE_FACTOR, Change, NamedChange
 from armlab.diagnosis.compare.trends import Trend
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
@@ -80,7 +80,17 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     phrases = [change_phrase(each) for each in comparison.named[:MAX_NAMED_CHANGES]]
     rest = len(comparison.named) - len(phrases)
     more = f", and {rest} more" if rest else ""
-    return f"Between {names} this changed: {join_words(phrases)}{more}.", f"Nothing else changed. {seen}".strip()
+    whole = " ".join(_whole_friction(comparison))
+    second = f"{whole} Nothing else changed. {seen}".strip()
+    return f"Between {names} this changed: {join_words(phrases)}{more}.", second
+
+
+def _whole_friction(comparison: Comparison) -> Iterator[str]:
+    """All friction of each joint of which single laws changed."""
+    factors = {each.joint for each in comparison.named if each.form == ONE_FACTOR}
+    for each in comparison.changes:
+        if each.parameter == ALL_FRICTION and each.joint not in factors and each.ratio is not None:
+            yield f"All friction of joint {each.joint} together: {_percents(each.ratio)}."
 
 
 def change_phrase(named: NamedChange) -> str:
