@@ -16,6 +16,7 @@ from armlab.diagnosis.compare.changes import ChangeTable, Tested, find_changes, 
 from armlab.diagnosis.compare.named import (
     Change,
     NamedChange,
+    common_values,
     held_out_gains,
     list_movements,
     list_table,
@@ -24,7 +25,7 @@ from armlab.diagnosis.compare.named import (
     reason_impossible,
     runs_differ_as_much,
 )
-from armlab.diagnosis.compare.pooled import Pooled, pool_recordings
+from armlab.diagnosis.compare.pooled import Pooled, follow_levels, pool_recordings
 from armlab.diagnosis.compare.trends import Trend, find_trends, recording_date
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
@@ -121,6 +122,11 @@ def compare_diagnosed(
     progress("looking for changes")
     table = make_table(pooled)
     found = _find_sound_changes(pooled, table)
+    if found:
+        progress("fitting what is common beside the changes")
+        pooled = follow_levels(pooled, common_values(table, found)[table.model])
+        table = make_table(pooled)
+        found = _find_sound_changes(pooled, table)
     named = name_changes(pooled, table, found)
     return Comparison(
         "changed" if named else "same",

@@ -260,6 +260,15 @@ def list_movements(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], 
             )
 
 
+def common_values(table: ChangeTable, found: Sequence[Tested]) -> Array:
+    """Values (size,) of the common model and of the changes, fitted together without other candidates."""
+    columns = [table.model, *(table.groups[each.group].columns for each in found)]
+    inside = np.concatenate(columns).astype(np.intp)
+    out = np.zeros(table.mixed.size)
+    out[inside], _ = table.mixed.fit(inside)
+    return out
+
+
 def _laws(
     pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested
 ) -> Iterator[tuple["_Law", Array, Array | None]]:
@@ -276,10 +285,7 @@ def _laws(
         own = np.array(group.candidate.shape) + offsets
         yield _Law(group.candidate, known=True, coefficients=group.shaped), own, None
     elif _level_is_known(pooled, group.candidate):
-        columns = [table.model, *(table.groups[each.group].columns for each in found)]
-        inside = np.concatenate(columns).astype(np.intp)
-        at_mean = np.zeros(table.mixed.size)
-        at_mean[inside], _ = table.mixed.fit(inside)
+        at_mean = common_values(table, found)
         mean = at_mean[group.common] + _simulated(pooled, group.candidate)
         yield _Law(group.candidate, known=True), mean + offsets, None
     else:
@@ -488,14 +494,12 @@ def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]
     """
     first = table.groups[changed[0].group].candidate
     joint, rows = first.rows[0], table.mixed.joints[first.rows[0]].rows
-    inside = np.concatenate([table.model, *(table.groups[each.group].columns for each in found)]).astype(np.intp)
-    values, _ = table.mixed.fit(inside)
-    at_mean = np.zeros(table.mixed.size)
-    at_mean[inside] = values
+    at_mean = common_values(table, found)
+    everything = np.arange(table.mixed.size)
     laws = [each.common for each in table.groups if each.shaped is None and is_friction(each.candidate, joint)]
     mean = _torque_of(rows, np.concatenate([np.intersect1d(each, table.model) for each in laws]), at_mean)
     own = _torque_of(rows, np.concatenate([table.groups[each.group].columns for each in changed]), at_mean)
-    whole = table.mixed.errors(joint, inside, values) + mean + own
+    whole = table.mixed.errors(joint, everything, at_mean) + mean + own
     last = pooled.recordings - 1
     by_run, of_run = _levels(whole, mean, rows.runs, rows.members)
     by_stretch, of_stretch = _levels(whole, mean, rows.stretches * pooled.recordings + rows.members, rows.members)

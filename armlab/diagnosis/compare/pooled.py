@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import block_numbers
 from armlab.diagnosis.columns import Block, Place, place_of
 from armlab.diagnosis.data import Observed, observe
@@ -144,6 +145,18 @@ def pool_recordings(
     first = _fit_common(design)
     model = _fit_common(follow_model(design, first))
     return Pooled(model, owner, len(recordings), tuple(_changing_blocks(model)))
+
+
+def follow_levels(pooled: Pooled, values: Array) -> Pooled:
+    """The same with columns that follow the common model with other values (columns,): those beside the changes.
+
+    The common model alone averages over what changed, and a gain is a share of the torque that a model predicts.
+    """
+    model = pooled.model
+    model.solver.hold(model.state, values * model.moments.lengths)
+    moved = _fit_common(follow_model(model.design, model))
+    moved.solver.hold(moved.state, values * moved.moments.lengths)
+    return replace(pooled, model=moved, changes=tuple(_changing_blocks(moved)))
 
 
 def _labelled_runs(recording: Recording, number: int) -> Iterator[Run]:
