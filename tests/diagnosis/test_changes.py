@@ -19,7 +19,8 @@ from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.named import ALL_FRICTION, Change
+from armlab.diagnosis.compare.friction_level import ALL_FRICTION
+from armlab.diagnosis.compare.numbers import Change
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.found_model import model_found
 from armlab.effects.contract import Scene

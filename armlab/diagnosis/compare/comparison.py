@@ -12,20 +12,11 @@ from datetime import date
 import numpy as np
 
 from armlab.common.errors import InputError
-from armlab.diagnosis.compare.changes import ChangeTable, Tested, find_changes, held_out_errors, make_table
-from armlab.diagnosis.compare.named import (
-    Change,
-    NamedChange,
-    common_values,
-    held_out_gains,
-    list_movements,
-    list_table,
-    name_changes,
-    predicts_better,
-    reason_impossible,
-    runs_differ_as_much,
-)
+from armlab.diagnosis.compare.changes import ChangeTable, Tested, make_table
+from armlab.diagnosis.compare.named import NamedChange, list_table, name_changes
+from armlab.diagnosis.compare.numbers import Change, common_values, list_movements
 from armlab.diagnosis.compare.pooled import Pooled, follow_levels, pool_recordings
+from armlab.diagnosis.compare.soundness import find_sound_changes
 from armlab.diagnosis.compare.trends import Trend, find_trends, recording_date
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
@@ -121,12 +112,12 @@ def compare_diagnosed(
     pooled = pool_recordings(recordings, diagnoses, read_simulation(recordings[0], baseline), Settings())
     progress("looking for changes")
     table = make_table(pooled)
-    found = _find_sound_changes(pooled, table)
+    found = find_sound_changes(pooled, table)
     if found:
         progress("fitting what is common beside the changes")
         pooled = follow_levels(pooled, common_values(table, found)[table.model])
         table = make_table(pooled)
-        found = _find_sound_changes(pooled, table)
+        found = find_sound_changes(pooled, table)
     named = name_changes(pooled, table, found)
     return Comparison(
         "changed" if named else "same",
@@ -175,36 +166,6 @@ def _same_rows(one: Recording, other: Recording) -> bool:
 
 def _progress_of(number: int, progress: Callable[[str], None]) -> Callable[[str], None]:
     return lambda message: progress(f"recording {number}: {message}")
-
-
-def _find_sound_changes(pooled: Pooled, table: ChangeTable) -> tuple[Tested, ...]:
-    """The changes that are sure, that physics allows in every recording, and that help on held-out stretches."""
-    banned: frozenset[int] = frozenset()
-    while True:
-        found = find_changes(table, banned)
-        wrong = {each.group for each in found if reason_impossible(pooled, table, found, each) is not None}
-        if not wrong:
-            return _without_failures(table, found)
-        banned |= wrong
-
-
-def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Tested, ...]:
-    """The changes without those by which runs of one recording differ as much, and without those that do not help on
-    held-out stretches of every recording, the worst first.
-    """
-    while wrong := next((each for each in found if runs_differ_as_much(table, found, each)), None):
-        found = table.test([each.group for each in found if each is not wrong])
-    while found:
-        chosen = [each.group for each in found]
-        gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}
-        worst = min(gains, key=lambda each: min(gains[each]))
-        if all(predicts_better(each, table.tuning.least_gain) for each in gains.values()):
-            break
-        if predicts_better(gains[worst], table.tuning.least_gain):
-            worst = min(gains, key=lambda each: float(np.mean(gains[each])))
-        found = tuple(each for each in table.test([each for each in chosen if each != worst]) if table.is_sure(each))
-        found = table.test([each.group for each in found])
-    return found
 
 
 def _notes(recordings: Sequence[Recording], baseline: Baseline | None) -> Iterator[str]:

@@ -14,7 +14,9 @@ import numpy as np
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
-from armlab.diagnosis.compare.named import ALL_FRICTION, ONE_FACTOR, Change, NamedChange
+from armlab.diagnosis.compare.friction_level import ALL_FRICTION
+from armlab.diagnosis.compare.named import ONE_FACTOR, NamedChange
+from armlab.diagnosis.compare.numbers import Change
 from armlab.diagnosis.compare.trends import Trend
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,

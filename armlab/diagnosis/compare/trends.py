@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.compare.named import Movement
+from armlab.diagnosis.compare.numbers import Movement
 from armlab.recordings.recording import Recording
 
 FIRST_EPOCH_S = 5e8  # stamps beyond this count seconds since 1970

@@ -8,7 +8,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from armlab.diagnosis.compare.comparison import Comparison, compare_diagnosed
-from armlab.diagnosis.compare.named import ONE_FACTOR, Change
+from armlab.diagnosis.compare.named import ONE_FACTOR
+from armlab.diagnosis.compare.numbers import Change
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.relations.variants import (

@@ -1,0 +1,267 @@
+"""Numbers of a change: levels of the recordings, differences with intervals, ratios, and the smallest that is seen."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.columns import place_of
+from armlab.diagnosis.compare.changes import ChangeTable, Tested
+from armlab.diagnosis.compare.pooled import Pooled, is_body
+from armlab.diagnosis.compare.search import between_runs
+from armlab.effects.contract import Candidate, Value
+from armlab.effects.parameters import half_widths, parameter_slopes
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Change:
+    """One parameter in the recordings.
+
+    levels: of each recording, None where only the difference is known. difference: last less first. interval: 95 %, of
+    it. ratio: last over first with its interval, None where there is no level. p_value: of no difference, corrected
+    for all that is compared. detectable: the smallest difference that would have been named.
+    """
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    parameter: str
+    levels: tuple[float, ...] | None
+    difference: float
+    interval: tuple[float, float]
+    ratio: tuple[float, float, float] | None
+    unit: str
+    p_value: float
+    detectable: float
+    changed: bool
+
+    @property
+    def old(self) -> float | None:
+        """Level in the first recording."""
+        return None if self.levels is None else self.levels[0]
+
+    @property
+    def new(self) -> float | None:
+        """Level in the last recording."""
+        return None if self.levels is None else self.levels[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A parameter over all recordings. values: (recordings,), levels where they are known, else about their mean.
+
+    covariance: (recordings, recordings), of the values about their mean. half_widths: (recordings,), of 95 % intervals.
+    """
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    parameter: str
+    unit: str
+    values: Array
+    covariance: Array
+    half_widths: Array
+
+
+def half_width_factor(table: ChangeTable) -> float:
+    """From a standard error to half an interval."""
+    return float(student.ppf((1 + CONFIDENCE) / 2, table.degrees))
+
+
+def detectable_factor(table: ChangeTable) -> float:
+    """From a standard error to the smallest change that is named: the level of the test, corrected."""
+    return float(student.isf(table.tuning.level / 2 / len(table.groups), table.degrees))
+
+
+def recording_values(table: ChangeTable, tested: Tested) -> Array:
+    """Coefficients of a change in each recording, less their mean: (recordings, coefficients)."""
+    return np.asarray(table.contrast @ tested.values.reshape(-1, table.contrast.shape[1]).T)
+
+
+def between_ends(table: ChangeTable, tested: Tested) -> tuple[Array, Array]:
+    """Last less first recording, and its covariance."""
+    ends = table.contrast[-1] - table.contrast[0]
+    width = len(ends)
+    values = tested.values.reshape(-1, width) @ ends
+    covariance = tested.covariance.reshape(len(values), width, len(values), width)
+    return values, np.einsum("iajb,a,b->ij", covariance, ends, ends)
+
+
+def as_wide_as_runs(covariance: Array, between: Array) -> Array:
+    """A covariance whose variances are no less than those between runs."""
+    variances = np.maximum(np.diag(covariance), 1e-300)
+    scale = np.sqrt(np.maximum(between / variances, 1.0))
+    return np.asarray(covariance * np.outer(scale, scale))
+
+
+def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Change]:
+    """The scalar parameters of a group in the recordings."""
+    _, covariance = between_ends(table, tested)
+    if tested in found:
+        covariance = as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
+    for law, own, spread in laws_of(pooled, table, found, tested):
+        between = own[-1] - own[0]
+        own_spread = covariance if spread is None else covariance[0, 0] * spread
+        yield from _parameters(table, tested, law, own, between, own_spread)
+
+
+def list_movements(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Movement]:
+    """The scalar parameters of a group over all recordings."""
+    width = table.contrast.shape[1]
+    count = len(tested.values) // width
+    between = tested.covariance.reshape(count, width, count, width)
+    for law, own, spread in laws_of(pooled, table, found, tested):
+        slopes = law.slopes(own.mean(axis=0))
+        for name, slope in slopes.items():
+            values = [law.parameters(each)[name] for each in own]
+            if any(isinstance(each, tuple) for each in values):
+                continue
+            if spread is None:
+                covariance = np.einsum(
+                    "i,iajb,j,ra,sb->rs", slope[0], between, slope[0], table.contrast, table.contrast
+                )
+            else:
+                covariance = (
+                    float(slope[0] @ spread @ slope[0]) * table.contrast @ between[0, :, 0, :] @ table.contrast.T
+                )
+            if np.trace(covariance) <= 0:
+                continue
+            candidate = law.candidate
+            yield Movement(
+                effect=candidate.effect,
+                joint=candidate.joint,
+                joints=candidate.joints,
+                parameter=name,
+                unit=candidate.unit(name),
+                values=np.array(values, dtype=float),
+                covariance=covariance,
+                half_widths=half_width_factor(table) * np.sqrt(np.maximum(np.diag(covariance), 0)),
+            )
+
+
+def common_values(table: ChangeTable, found: Sequence[Tested]) -> Array:
+    """Values (size,) of the common model and of the changes, fitted together without other candidates."""
+    columns = [table.model, *(table.groups[each.group].columns for each in found)]
+    inside = np.concatenate(columns).astype(np.intp)
+    out = np.zeros(table.mixed.size)
+    out[inside], _ = table.mixed.fit(inside)
+    return out
+
+
+def laws_of(
+    pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested
+) -> Iterator[tuple["Law", Array, Array | None]]:
+    """Each law of a group with its numbers in the recordings, (recordings, numbers).
+
+    Where all change by one factor, also what the factor's variance is to be multiplied by, (numbers, numbers).
+    """
+    group, offsets = table.groups[tested.group], recording_values(table, tested)
+    if group.laws:
+        for candidate, coefficients in group.laws:
+            own = np.outer(1 + offsets[:, 0], coefficients)
+            yield Law(candidate, known=True), own, np.outer(coefficients, coefficients)
+    elif group.shaped is not None:
+        own = np.array(group.candidate.shape) + offsets
+        yield Law(group.candidate, known=True, coefficients=group.shaped), own, None
+    elif _level_is_known(pooled, group.candidate):
+        at_mean = common_values(table, found)
+        mean = at_mean[group.common] + _simulated(pooled, group.candidate)
+        yield Law(group.candidate, known=True), mean + offsets, None
+    else:
+        yield Law(group.candidate, known=False), offsets, None
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A law whose numbers change. known: whether they have a level. coefficients: given where its shape changes."""
+
+    candidate: Candidate
+    known: bool
+    coefficients: Array | None = None
+
+    def parameters(self, numbers: Array) -> dict[str, Value]:
+        """Named parameters of the law with these coefficients, or this shape."""
+        if self.coefficients is None:
+            return self.candidate.parameters(numbers)
+        return self.candidate.with_shape(tuple(numbers.tolist())).parameters(self.coefficients)
+
+    def slopes(self, numbers: Array) -> dict[str, Array]:
+        """Derivatives (components, numbers) of the parameters."""
+        if self.coefficients is None:
+            return parameter_slopes(self.candidate, numbers, len(numbers))
+        shaped = self.candidate.with_shape(tuple(numbers.tolist()))
+        own = len(self.coefficients)
+        slopes = parameter_slopes(shaped, self.coefficients, own + len(numbers))
+        return {name: each[:, own:] for name, each in slopes.items()}
+
+
+def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
+    """Whether the common model has a level of it: faults of channels and loads are known as differences alone."""
+    place = place_of(candidate)
+    return not is_body(candidate) and any(place_of(each.candidate) == place for each in pooled.design.blocks)
+
+
+def _simulated(pooled: Pooled, candidate: Candidate) -> Array:
+    """Coefficients of the same law in the simulation, whose torque is taken off before anything is fitted."""
+    model = pooled.design.simulation.model
+    out = np.zeros(candidate.size)
+    for each in () if model is None else model.effects:
+        if place_of(each.candidate) == place_of(candidate) and len(each.coefficients) == len(out):
+            out = out + each.coefficients
+    return out
+
+
+def _parameters(
+    table: ChangeTable, tested: Tested, law: Law, own: Array, difference: Array, covariance: Array
+) -> Iterator[Change]:
+    """own: (recordings, numbers) of each recording; difference, covariance: of last less first."""
+    candidate = law.candidate
+    slopes = law.slopes(own.mean(axis=0) if law.known else difference)
+    start, end, zero = law.parameters(own[0]), law.parameters(own[-1]), np.zeros(len(difference))
+    shown = end if law.known else law.parameters(difference)
+    for name, value in shown.items():
+        error = float(half_widths(slopes[name], covariance, 1.0)[0])
+        if isinstance(value, tuple) or error <= 0:
+            continue
+        levels: tuple[float, ...] | None = None
+        ratio: tuple[float, float, float] | None = None
+        half = half_width_factor(table) * error
+        if law.known:
+            change = value - float(np.asarray(start[name]))
+            levels = tuple(float(np.asarray(law.parameters(each)[name])) for each in own)
+            ratio = ratio_of_levels(levels, change, half) if _is_positive(candidate, name) else None
+        else:
+            change = value - float(np.asarray(law.parameters(zero)[name])) if name == "gain" else value
+            ratio = (1 + change, 1 + change - half, 1 + change + half) if name == "gain" else None
+        yield Change(
+            effect=candidate.effect,
+            joint=candidate.joint,
+            joints=candidate.joints,
+            parameter=name,
+            levels=levels,
+            difference=change,
+            interval=(change - half, change + half),
+            ratio=ratio,
+            unit=candidate.unit(name),
+            p_value=min(tested.p_value * len(table.groups), 1.0),
+            detectable=detectable_factor(table) * error,
+            changed=table.is_sure(tested),
+        )
+
+
+def _is_positive(candidate: Candidate, name: str) -> bool:
+    """Whether a parameter has a size that a change is a share of: a level of friction, and no zero of an encoder."""
+    return any(each.name == name and each.positive for each in candidate.facts.parameters)
+
+
+def ratio_of_levels(levels: Sequence[float], change: float, half: float) -> tuple[float, float, float] | None:
+    """Last over first level; the interval keeps their mean, which is known far better."""
+    mean = (levels[0] + levels[-1]) / 2
+    if mean == 0 or abs(change) + half >= 2 * abs(mean):
+        return None
+    ends = sorted((mean + each / 2) / (mean - each / 2) for each in (change - half, change + half))
+    return levels[-1] / levels[0], ends[0], ends[1]

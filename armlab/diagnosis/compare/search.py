@@ -1,0 +1,132 @@
+"""The search for changes: candidates that are added, exchanged and taken out, and their rivals."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.columns import place_of
+from armlab.diagnosis.compare.changes import ChangeTable, Tested
+
+
+def find_changes(table: ChangeTable, banned: frozenset[int] = frozenset()) -> tuple[Tested, ...]:
+    """The changes that are sure, fitted together: added one by one, exchanged, taken out where others explain them.
+
+    banned: groups that are no changes.
+    """
+    chosen: tuple[int, ...] = ()
+    for _ in range(table.tuning.max_changes):
+        added = _best_addition(table, chosen, banned)
+        if added is None:
+            break
+        settled = _settle(table, (*chosen, added), banned)
+        if set(settled) == set(chosen):
+            break
+        chosen = settled
+    return table.test(chosen)
+
+
+def _best_addition(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> int | None:
+    """The surest group beside chosen ones; None where none is sure."""
+    gains = table.evidence(chosen)
+    gains[list(banned)] = -np.inf
+    asked = [int(number) for number in np.argsort(-gains)[: table.tuning.max_asked] if gains[number] > 0]
+    tested = [table.test((*chosen, number))[-1] for number in asked]
+    sure = [each for each in tested if table.is_sure(each)]
+    if not sure:
+        return None
+    odds = [float(table.odds(np.array(each.evidence)) + table.prior_odds[each.group]) for each in sure]
+    return sure[int(np.argmax(odds))].group
+
+
+def _settle(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> tuple[int, ...]:
+    """The groups, each in place of a worse one, without those that the others explain."""
+    chosen = _without_unsure(table, _with_single_laws(table, chosen))
+    for number in chosen:
+        own = next((each for each in table.test(chosen) if each.group == number), None)
+        if own is None:
+            continue
+        deficits = table.deficits(chosen, own)
+        deficits[list(banned)] = np.inf
+        best = int(np.argmin(deficits))
+        if best != number and deficits[best] < 0:
+            rest = tuple(each for each in chosen if each != number)
+            exchanged = _without_unsure(table, _with_single_laws(table, (*rest, best)))
+            chosen = exchanged if best in exchanged else chosen
+    return chosen
+
+
+def _without_unsure(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    while chosen:
+        tested = table.test(chosen)
+        worst = min(tested, key=lambda each: each.evidence)
+        if table.is_sure(worst):
+            break
+        chosen = tuple(each for each in chosen if each != worst.group)
+    return chosen
+
+
+def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Laws of friction one by one where they did not change by one factor."""
+    for number in chosen:
+        group = table.groups[number]
+        if not group.laws:
+            continue
+        laws = [place_of(law) for law, _ in group.laws]
+        plain = [(other, each) for other, each in enumerate(table.groups) if not each.laws and each.shaped is None]
+        single = [other for other, each in plain if place_of(each.candidate) in laws]
+        if set(single) & set(chosen):
+            chosen = tuple(dict.fromkeys((*(each for each in chosen if each != number), *single)))
+    return chosen
+
+
+def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tuple[tuple[int, float], ...]:
+    """Groups that explain the difference nearly as well in the place of a chosen one, with their deficits."""
+    deficits = table.deficits(chosen, tested)
+    near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.max_rival_deficit]
+    others = [(each, float(max(deficits[each], 0.0))) for each in near if each != tested.group]
+    return tuple(others[: table.tuning.max_rivals])
+
+
+def between_runs(table: ChangeTable, chosen: Sequence[int], number: int) -> Array:
+    """Variance of a change's coefficients by the scatter between the runs of a recording, (coefficients,).
+
+    What a run has more than the other runs of its recording, everything else held; zero where no recording has two.
+    """
+    mixed, group, width = table.mixed, table.groups[number], table.contrast.shape[1]
+    inside = table.columns_with(chosen)
+    values, _ = mixed.fit(inside)
+    count = len(group.columns) // width
+    runs = 1 + max(int(each.rows.runs.max()) for each in mixed.joints)
+    owner = np.zeros(runs, dtype=np.intp)
+    data, towards = np.zeros((runs, count, count)), np.zeros((runs, count))
+    for joint, each in enumerate(mixed.joints):
+        owner[each.rows.runs] = each.rows.members
+        place = np.flatnonzero(np.isin(each.rows.index, group.columns))
+        if not len(place):
+            continue
+        left = mixed.errors(joint, inside, values)
+        contrast = table.contrast[each.rows.members]
+        scaled = each.rows.columns[:, place].reshape(len(left), count, width)
+        own = np.einsum("rkw,rw->rk", scaled, contrast) / np.sum(contrast**2, axis=1)[:, None]
+        for run in range(runs):
+            rows = each.rows.runs == run
+            data[run] += own[rows].T @ own[rows] / each.variance
+            towards[run] += own[rows].T @ left[rows] / each.variance
+    prior = np.diag(group.scales[::width] ** -2.0)
+    apart = np.array([np.linalg.solve(data[run] + prior, towards[run]) for run in range(runs)])
+    sizes = [owner == recording for recording in (0, len(table.contrast) - 1)]
+    scatters = [np.var(apart[own], axis=0, ddof=1) for own in sizes if own.sum() > 1]
+    if not scatters:
+        return np.zeros(count)
+    return np.asarray(np.mean(scatters, axis=0) * sum(1 / own.sum() for own in sizes))
+
+
+def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:
+    """Errors (rows,) of each joint without and with a change, each stretch predicted by the others."""
+    without = table.columns_with([each for each in chosen if each != number])
+    folds = table.tuning.folds
+    return (
+        table.mixed.held_out_errors(without, folds),
+        table.mixed.held_out_errors(table.columns_with(chosen), folds),
+    )

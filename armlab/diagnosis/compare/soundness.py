@@ -1,0 +1,138 @@
+"""Changes that may be named: sure, allowed by physics in every recording, and helpful on held-out stretches."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.compare.changes import ChangeTable, Tested
+from armlab.diagnosis.compare.numbers import as_wide_as_runs, between_ends, half_width_factor, laws_of, recording_values
+from armlab.diagnosis.compare.pooled import Pooled, is_body
+from armlab.diagnosis.compare.search import between_runs, find_changes, held_out_errors
+from armlab.diagnosis.fitted_model import inertial_parameters
+from armlab.effects.contract import Scene
+from armlab.effects.drive import ROTOR_INERTIA
+from armlab.effects.term import SIGN_SIGMAS
+from problem.motion import Motion
+
+INERTIA_STATES = 50  # a run
+
+
+def find_sound_changes(pooled: Pooled, table: ChangeTable) -> tuple[Tested, ...]:
+    """The changes that are sure, that physics allows in every recording, and that help on held-out stretches."""
+    banned: frozenset[int] = frozenset()
+    while True:
+        found = find_changes(table, banned)
+        wrong = {each.group for each in found if reason_impossible(pooled, table, found, each) is not None}
+        if not wrong:
+            return _without_failures(table, found)
+        banned |= wrong
+
+
+def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Tested, ...]:
+    """The changes without those by which runs of one recording differ as much, and without those that do not help on
+    held-out stretches of every recording, the worst first.
+    """
+    while wrong := next((each for each in found if runs_differ_as_much(table, found, each)), None):
+        found = table.test([each.group for each in found if each is not wrong])
+    while found:
+        chosen = [each.group for each in found]
+        gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}
+        worst = min(gains, key=lambda each: min(gains[each]))
+        if all(predicts_better(each, table.tuning.least_gain) for each in gains.values()):
+            break
+        if predicts_better(gains[worst], table.tuning.least_gain):
+            worst = min(gains, key=lambda each: float(np.mean(gains[each])))
+        found = tuple(each for each in table.test([each for each in chosen if each != worst]) if table.is_sure(each))
+        found = table.test([each.group for each in found])
+    return found
+
+
+def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> str | None:
+    """The law of physics that a change breaks in one of the recordings, in a few words; None where it breaks none."""
+    group = table.groups[tested.group]
+    if is_body(group.candidate):
+        return _reason_no_body(pooled, table, tested)
+    _, covariance = between_ends(table, tested)
+    for law, own, spread in laws_of(pooled, table, found, tested):
+        if not law.known or law.coefficients is not None:
+            continue
+        doubt = covariance if spread is None else covariance[0, 0] * spread
+        reasons = (law.candidate.objection(each, doubt) for each in own)
+        reason = next((each for each in reasons if each is not None), None)
+        if reason is not None:
+            return reason
+    return None
+
+
+def runs_differ_as_much(table: ChangeTable, found: Sequence[Tested], tested: Tested) -> bool:
+    """Whether the runs of one recording differ by as much as two recordings do; more recordings are not asked."""
+    if len(table.contrast) > 2:
+        return False
+    difference, covariance = between_ends(table, tested)
+    wide = as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
+    return bool(np.all(np.abs(difference) < half_width_factor(table) * np.sqrt(np.diag(wide))))
+
+
+def _reason_no_body(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:
+    """What speaks against a load: a joint that would have no inertia in one of the recordings."""
+    body = table.groups[tested.group].candidate
+    common, link = inertial_parameters(pooled.model), body.joints[0]
+    place = slice(10 * link - 10, 10 * link)
+    scenes = [_few_states(each) for each in pooled.design.scenes]
+
+    def inertia(change: Array) -> Array:
+        changed = common.copy()
+        added = body.added_body(change)
+        changed[place] += 0.0 if added is None else added
+        return np.asarray(
+            np.mean([replace(each, inertial=changed).own_inertia.mean(axis=0) for each in scenes], axis=0)
+        )
+
+    bare = inertia(np.zeros(body.size)) + _rotors(pooled)
+    slopes = np.stack([inertia(unit) + _rotors(pooled) - bare for unit in np.eye(body.size)], axis=-1)
+    _, covariance = between_ends(table, tested)
+    doubt = SIGN_SIGMAS * np.sqrt(np.maximum(np.einsum("ji,ik,jk->j", slopes, covariance, slopes), 0.0))
+    for each in recording_values(table, tested):
+        negative = np.flatnonzero((bare + slopes @ each + doubt < 0) & (bare > 0))
+        if len(negative):
+            return f"joint {negative[0] + 1} would have a negative inertia"
+    return None
+
+
+def _few_states(scene: Scene) -> Scene:
+    """Some states of a run."""
+    every = slice(None, None, max(len(scene.time) // INERTIA_STATES, 1))
+    motion = Motion(
+        *(each[every] for each in (scene.motion.position, scene.motion.velocity, scene.motion.acceleration))
+    )
+    return replace(scene, time=scene.time[every], motion=motion, torque=scene.torque[every])
+
+
+def _rotors(pooled: Pooled) -> Array:
+    """Inertia of the rotors in simulation and common model, (joints,)."""
+    model, arm = pooled.model, pooled.design.simulation.arm
+    out = np.array(arm.rotor_inertia or [0.0] * len(arm), dtype=float)
+    for number, block in enumerate(model.design.blocks):
+        if block.candidate.effect == ROTOR_INERTIA.facts.id:
+            out[block.candidate.rows[0]] += float(model.solver.values(model.fit, number)[0])
+    return out
+
+
+def held_out_gains(table: ChangeTable, errors: tuple[list[Array], list[Array]]) -> tuple[float, ...]:
+    """Share by which the squared held-out error of each recording falls, joints weighted by their noise."""
+    out = []
+    for recording in range(len(table.contrast)):
+        less, left = 0.0, 0.0
+        for before, after, joint in zip(*errors, table.mixed.joints, strict=True):
+            own = joint.rows.members == recording
+            less += float(np.sum(before[own] ** 2 - after[own] ** 2)) / joint.variance
+            left += float(np.sum(after[own] ** 2)) / joint.variance
+        out.append(less / max(left, 1e-300))
+    return tuple(out)
+
+
+def predicts_better(gains: Sequence[float], least: float) -> bool:
+    """Whether a change lowers the held-out error of each recording, and of all together enough."""
+    return min(gains) > 0 and float(np.mean(gains)) > least
