@@ -100,7 +100,11 @@ def odd_against_even(recording: Recording, desk: Desk) -> tuple[bool | None, str
         parts = [every_other_second(recording, first, seconds) for first in (0, 1)]
         if min(len(each.runs) for each in parts) < 2:
             continue
-        holds, detail = _no_change(desk.compare(*parts))
+        try:
+            holds, detail = _no_change(desk.compare(*parts))
+        except ValueError as error:  # stretches in motion that are too short for a diagnosis
+            reason = str(error)
+            continue
         if holds is not None:
             return holds, f"stretches of {seconds:g} s: {detail}"
         reason = detail
