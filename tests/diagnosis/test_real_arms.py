@@ -195,6 +195,14 @@ def test_a_level_agrees_where_its_interval_overlaps_what_the_force_shows() -> No
     assert not overlaps("level", 411, 500)
 
 
+def test_an_interval_contains_the_medians_of_the_directions_in_which_its_level_acts() -> None:
+    forward, back = DirectLevel("a", 1, 400, 390, 410, 5), DirectLevel("a", -1, 300, 290, 310, 5)
+    both = ParameterValue("level", 350, (295, 405), "N")
+    assert all(checks._contains(both, each) for each in (forward, back))
+    assert not checks._contains(ParameterValue("positive", 350, (295, 405), "N"), back)
+    assert not checks._contains(ParameterValue("level", 350, (301, 399), "N"), forward)
+
+
 def test_a_damper_without_a_named_level_is_answered_with_no(recordings: Path) -> None:
     recording = load_recording(recordings / "emps")
     diagnosis = Diagnosis(recording, read_simulation(recording, "refit"), "none", "nothing is missing")

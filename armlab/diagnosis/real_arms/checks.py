@@ -168,7 +168,8 @@ def level_check(arm: str, baseline: str, diagnosis: Diagnosis, read: Sequence[Di
         for each in read
     )
     holds = bool(levels) and all(_overlaps(each, read) for each in levels)
-    found = f"{named or 'no level named'}; force shows {shown} {unit}"
+    inside = sum(any(_contains(level, each) for level in levels) for each in read)
+    found = f"{named or 'no level named'}; force shows {shown} {unit}; {inside} of {len(read)} lie in the interval"
     return Check(arm, baseline, "level of friction agrees with the force itself", holds, found)
 
 
@@ -178,6 +179,12 @@ def _overlaps(level: ParameterValue, read: Sequence[DirectLevel]) -> bool:
     low = min(each.lowest for each in read if each.direction in ways)
     high = max(each.highest for each in read if each.direction in ways)
     return bool(own.min() <= high and own.max() >= low)
+
+
+def _contains(level: ParameterValue, read: DirectLevel) -> bool:
+    """Whether the interval of a level contains the median that the force shows in a direction that it acts in."""
+    own = np.abs(np.array(level.interval or (level.value, level.value), dtype=float))
+    return read.direction in LEVEL_DIRECTIONS[level.name] and bool(own.min() <= read.median <= own.max())
 
 
 # --- the load of an arm from each of its runs
