@@ -30,7 +30,7 @@ def make_claims(
     if not effects and not links:
         return ()
     wide = extend_with_shapes(model)
-    claims = [_effect_claim(model, wide, group, prediction.named[group], each) for group, each in effects.items()]
+    claims = [_effect_claim(model, wide, group, prediction.places[group], each) for group, each in effects.items()]
     claims += _link_claims(model, wide, links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
     most = model.design.settings.tuning.claims.max_rivals

@@ -34,12 +34,13 @@ from armlab.recordings.recording import Role, Run
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """A model that predicts. named: its group for each group of the model that was named; the others are present, and
-    not claimed. held_out: ||tau - tau_hat|| / ||tau|| of the torque as recorded on blocks held out in turn.
+    """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
+    claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the torque as recorded on blocks held out
+    in turn.
     """
 
     model: FittedModel
-    named: dict[int, int]
+    places: dict[int, int]
     held_out: float
 
     def with_names_alone(self, names: Iterable[int]) -> FittedModel:
@@ -72,7 +73,7 @@ def fit_prediction(named: FittedModel) -> Prediction:
             best, error = trial, changed
     state = best.improve(tuning)
     model = replace(best.model, state=state)
-    places = {group: place for place, group in enumerate(own) if place in state.groups}
+    places = {group: place for place, group in enumerate(numbers) if place in state.groups}
     return Prediction(model, places, best.held_out(state))
 
 
