@@ -15,7 +15,7 @@ from armlab.diagnosis.claims import make_claims
 from armlab.diagnosis.data import observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.evidence import Evidence, count_looks
-from armlab.diagnosis.expected_friction import claim_expected_friction
+from armlab.diagnosis.expected_parts import claim_expected_parts
 from armlab.diagnosis.fits import joint_fits
 from armlab.diagnosis.fitted_model import (
     FittedModel,
@@ -104,7 +104,7 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     named = name_effects(prefer_one_body(find_friction_curves(prune(searched))))
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
-    model, effects = unclaim_implausible(*claim_expected_friction(named.model, named.effects, prediction))
+    model, effects = unclaim_implausible(*claim_expected_parts(named.model, named.effects, prediction))
     tuning = model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]

@@ -8,7 +8,7 @@ import pytest
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import prepare
-from armlab.diagnosis.expected_friction import claim_expected_friction
+from armlab.diagnosis.expected_parts import claim_expected_parts
 from armlab.diagnosis.fitted_model import FittedModel, fit_background
 from armlab.diagnosis.prediction import fit_prediction
 from armlab.diagnosis.settings import Settings
@@ -37,7 +37,7 @@ def nothing_named() -> FittedModel:
 def test_friction_that_predictions_need_is_claimed_by_its_likeliest_law_and_no_other(
     nothing_named: FittedModel,
 ) -> None:
-    model, effects = claim_expected_friction(nothing_named, {}, fit_prediction(nothing_named))
+    model, effects = claim_expected_parts(nothing_named, {}, fit_prediction(nothing_named))
     named = [nothing_named.solver.groups[group].candidate for group in effects]
     assert [(each.effect, each.joint) for each in named] == [("viscous_friction", 2)]
     assert set(effects) <= set(model.state.groups)
@@ -52,4 +52,4 @@ def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: Fitte
         if (each.candidate.effect, each.candidate.joint) == ("coulomb_friction", 2)
     )
     named = replace(nothing_named, state=nothing_named.state.plus(own))
-    assert claim_expected_friction(named, {}, fit_prediction(named)) == (named, {})
+    assert claim_expected_parts(named, {}, fit_prediction(named)) == (named, {})
