@@ -32,11 +32,8 @@ class ShapedFit:
 
     def covariance(self, group: int) -> Array:
         """Of a group's coefficients and shapes, unscaled, (coefficients + shapes,) squared."""
-        found = self.model
-        columns = found.solver.groups[group].columns
-        start = found.fit.links.shape[1] + int(np.flatnonzero(found.fit.columns == columns[0])[0])
-        chosen = [*range(start, start + len(columns)), *_places(self.places.get(group))]
-        lengths = np.append(found.moments.lengths[columns], np.ones(len(chosen) - len(columns)))
+        chosen = _numbers_of(self.model, group, self.places.get(group))
+        lengths = _units(self.model, group, len(chosen))
         return np.asarray(self.spread.covariance[np.ix_(chosen, chosen)] / np.outer(lengths, lengths))
 
     def base(self) -> tuple[Array, Array]:
@@ -72,8 +69,27 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
         start += count
     settings, lengths = bench.settings, model.moments.lengths
     rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, bench.observed, settings.tuning.blocks)
-    spread = block_covariance(rows, prior_precision(model.solver, fit, start), settings.guards.robust_variance)
-    return ShapedFit(model, spread, places)
+    precision = prior_precision(model.solver, fit, start)
+    for group in fit.state.groups:
+        known = model.solver.groups[group].candidate.known(model.solver.values(fit, group))
+        if known is not None:
+            chosen = _numbers_of(model, group, places.get(group))
+            lengths = _units(model, group, len(chosen))
+            precision[np.ix_(chosen, chosen)] += known / np.outer(lengths, lengths)
+    return ShapedFit(model, block_covariance(rows, precision, settings.guards.robust_variance), places)
+
+
+def _numbers_of(model: FittedModel, group: int, shapes: slice | None) -> list[int]:
+    """Where a group's coefficients stand among the parameters of a fit, and then its shapes."""
+    columns = model.solver.groups[group].columns
+    start = model.fit.links.shape[1] + int(np.flatnonzero(model.fit.columns == columns[0])[0])
+    return [*range(start, start + len(columns)), *_places(shapes)]
+
+
+def _units(model: FittedModel, group: int, count: int) -> Array:
+    """Lengths of a group's columns, and one for each of its shapes: (count,)."""
+    lengths = model.moments.lengths[model.solver.groups[group].columns]
+    return np.append(lengths, np.ones(count - len(lengths)))
 
 
 def _shape_derivative(model: FittedModel, group: int, which: int) -> Array:

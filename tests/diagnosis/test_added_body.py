@@ -10,7 +10,7 @@ BODY = np.asarray(link_from_centre_of_mass(120.0, np.array([0.0, 0.1, 0.2]), np.
 
 
 def test_a_body_that_the_data_determine_is_found_as_it_is() -> None:
-    found, gain = _likeliest_body(np.eye(10), BODY)
+    found, gain = _likeliest_body(1e6 * np.eye(10), 1e6 * BODY)
     np.testing.assert_allclose(found, BODY, rtol=1e-3, atol=1e-2)
     assert gain > 0
 
