@@ -94,6 +94,21 @@ def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
     return _settle_links(_remove_failing(less, groups | other_bodies(model)))
 
 
+def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
+    """The same with what a search finds beside it, where all of that passes and is more likely in the end.
+
+    withdrawn: groups of whose places nothing is looked for.
+    """
+    model, groups = pruned[0], pruned[0].solver.groups
+    places = {groups[group].place for group in withdrawn}
+    banned = other_bodies(model) | {number for number, each in enumerate(groups) if each.place in places}
+    searched = _search_again(model, banned, fixed=False)
+    if searched.state == model.state:
+        return pruned
+    again = _settle_links(_remove_failing(searched, banned))
+    return again if again[0].fit.score > model.fit.score else pruned
+
+
 def prefer_one_body(pruned: Pruned) -> Pruned:
     """One body that can exist in the place of bodies and links of what passed, see `hold_body`, where that passes.
 
