@@ -315,3 +315,19 @@ def neighbours_that_fit(model: FittedModel, group: int) -> tuple[Rival, ...]:
         and own.gain - each.gain <= tuning.max_body_deficit * own.gain
         and predicts_as_well(each, own.error, tuning.body_tolerance)
     )
+
+
+def bodies_that_fit(model: FittedModel, link: int) -> tuple[Rival, ...]:
+    """Payloads that fit these data as well as a link (from 1) that is off: by score and held-out rows."""
+    widths = model.state.widths
+    if widths is None or model.design.prior is None:
+        return ()
+    tuning = model.design.settings.tuning.claims
+    less = tuple(0.0 if other == link else width for other, width in enumerate(widths, 1))
+    without, error = State(model.state.groups, less), model.moments.heldout_error(model.fit.coefficients)
+    gain = model.fit.score - model.solver.fit(without).score
+    return tuple(
+        Rival(PAYLOAD_FACTS.id, each.link, (), False, max(gain - each.gain, 0.0))
+        for each in place_body(model, without)
+        if gain - each.gain <= tuning.max_body_deficit * gain and predicts_as_well(each, error, tuning.body_tolerance)
+    )

@@ -17,18 +17,18 @@ from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis
 from problem.regressor import observation_matrix, rigid_body_torque
 
-BODY_PARAMETERS = (Parameter("mass", "kg"), Parameter("centre", "m"), Parameter("inertia", "kg.m2"))
+PLACE_PARAMETERS = (Parameter("centre", "m"), Parameter("inertia", "kg.m2"))
 PAYLOAD_FACTS = Effect(
     "payload",
     "a body carried by a link",
-    BODY_PARAMETERS,
+    (Parameter("mass", "kg", positive=True), *PLACE_PARAMETERS),
     where="link",
     experiment="repeat the motion without the payload",
 )
 INERTIAL_ERROR_FACTS = Effect(
     "inertial_parameter_error",
     "a link that is not as the simulation has it",
-    BODY_PARAMETERS,
+    (Parameter("mass", "kg"), *PLACE_PARAMETERS),
     where="link",
     in_links=True,
     experiment="weigh the link, or repeat the motion with a payload of known mass",
