@@ -99,10 +99,11 @@ def fit_body(model: FittedModel, without: State, group: int, link: int) -> Place
 
 
 def _likeliest_body(hessian: Array, slope: Array) -> tuple[Array, float]:
-    """The ten parameters x of the body that maximises slope'x - x'Hx/2 + log det P(x), and that without the last term.
+    """The ten parameters x of the body that maximises slope'x - x'Hx/2 + log det P(x) - 4 log tr P(x).
 
-    P is the pseudo-inertia in kilograms. Its determinant keeps a body possible in directions of which data do not tell
-    (Lee, Wensing and Park 2020). Newton's method from some masses.
+    Also that maximum without the last two terms. P is the pseudo-inertia in kilograms: its determinant keeps a body
+    possible (Lee, Wensing and Park 2020), its trace keeps it small where data do not tell. Both together are the same
+    for any mass. Newton's method from some masses.
     """
     parts = pseudo_inertia_parts()
     found = [_climb(hessian, slope, parts, mass) for mass in FIRST_MASSES]
@@ -114,8 +115,9 @@ def _climb(hessian: Array, slope: Array, parts: Array, mass: float) -> Array:
     """Newton's method from a ball of this mass, with steps that stay among bodies."""
     ten = np.asarray(np.linalg.lstsq(parts.reshape(10, 16).T, mass * np.eye(4).ravel())[0], dtype=np.float64)
     for _ in range(MAX_NEWTON_STEPS):
-        inverse = np.linalg.inv(np.einsum("p,pab->ab", ten, parts))
-        gradient = slope - hessian @ ten + np.einsum("ab,pba->p", inverse, parts)
+        inverse = np.linalg.pinv(np.einsum("p,pab->ab", ten, parts), hermitian=True)
+        traces = np.einsum("paa->p", parts)
+        gradient = slope - hessian @ ten + np.einsum("ab,pba->p", inverse, parts) - 4 * traces / float(traces @ ten)
         curvature = hessian + body_information(ten)
         size = np.sqrt(np.diag(curvature))  # of data and of the determinant may be ten orders of magnitude apart
         step = np.linalg.lstsq(curvature / np.outer(size, size), gradient / size)[0] / size
@@ -133,7 +135,9 @@ def _climb(hessian: Array, slope: Array, parts: Array, mass: float) -> Array:
 def _chance(hessian: Array, slope: Array, parts: Array, ten: Array) -> float:
     """What `_likeliest_body` maximises; no chance where there is no such body."""
     values = np.linalg.eigvalsh(np.einsum("p,pab->ab", ten, parts))
-    return float(slope @ ten - ten @ hessian @ ten / 2 + np.sum(np.log(values))) if values[0] > 0 else -np.inf
+    if values[0] <= 0:
+        return -np.inf
+    return float(slope @ ten - ten @ hessian @ ten / 2 + np.sum(np.log(values / np.sum(values))))
 
 
 def is_possible_body(ten: Array, tolerance: float = EIGENVALUE_SHARE) -> bool:
@@ -154,9 +158,9 @@ def possible_links(model: FittedModel, links: dict[int, Evidence]) -> tuple[Fitt
     return replace(model, steps=(*model.steps, *gone)), kept
 
 
-def predicts_as_well(body: PlacedBody, error: Array, tolerance: float) -> bool:
-    """Whether held-out rows leave no more with this body, in the mean of the joints' logarithms."""
-    ratio = np.log(np.maximum(body.error, 1e-300)) - np.log(np.maximum(error, 1e-300))
+def predicts_as_well(error: Array, other: Array, tolerance: float) -> bool:
+    """Whether held-out rows leave no more than another model does, (joints,), in the mean of the joints' logarithms."""
+    ratio = np.log(np.maximum(error, 1e-300)) - np.log(np.maximum(other, 1e-300))
     return bool(np.mean(ratio) <= 2 * np.log1p(tolerance))
 
 
@@ -229,7 +233,7 @@ def _stands_in(model: FittedModel, trial: BodyTrial) -> bool:
     tuning = model.design.settings.tuning.claims
     error = model.moments.heldout_error(model.fit.coefficients)
     as_likely = model.fit.score - trial.score <= tuning.max_deficit
-    return as_likely and predicts_as_well(trial.body, error, tuning.body_tolerance)
+    return as_likely and predicts_as_well(trial.body.error, error, tuning.body_tolerance)
 
 
 def _is_possible(model: FittedModel, group: int) -> bool:
@@ -313,7 +317,7 @@ def neighbours_that_fit(model: FittedModel, group: int) -> tuple[Rival, ...]:
         for link, each in placed.items()
         if link != own.link
         and own.gain - each.gain <= tuning.max_body_deficit * own.gain
-        and predicts_as_well(each, own.error, tuning.body_tolerance)
+        and predicts_as_well(each.error, own.error, tuning.body_tolerance)
     )
 
 
@@ -329,5 +333,6 @@ def bodies_that_fit(model: FittedModel, link: int) -> tuple[Rival, ...]:
     return tuple(
         Rival(PAYLOAD_FACTS.id, each.link, (), False, max(gain - each.gain, 0.0))
         for each in place_body(model, without)
-        if gain - each.gain <= tuning.max_body_deficit * gain and predicts_as_well(each, error, tuning.body_tolerance)
+        if gain - each.gain <= tuning.max_body_deficit * gain
+        and predicts_as_well(each.error, error, tuning.body_tolerance)
     )

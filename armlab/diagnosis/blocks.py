@@ -95,8 +95,7 @@ def block_numbers(observed: Observed, length_s: float, least: int) -> NDArray[np
 def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> BlockCovariance:
     """Covariance of the parameters. precision: (parameters, parameters) of their prior."""
     gram = sum(design.T @ design for design in rows.designs) + precision
-    units = np.sqrt(np.maximum(np.diag(gram), 1e-300))  # shapes have units of their own
-    inverse = np.linalg.pinv(gram / np.outer(units, units), rcond=1e-12, hermitian=True) / np.outer(units, units)
+    inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
     count = len(np.unique(np.concatenate(rows.blocks)))
     degrees = float(max(count - 1, 1))
     variance = sum(float(error @ error) for error in rows.errors) / max(sum(map(len, rows.errors)) - len(gram), 1)

@@ -9,6 +9,7 @@ from armlab.diagnosis.added_body import (
     impossible_bodies,
     other_bodies,
     payload_groups,
+    predicts_as_well,
 )
 from armlab.diagnosis.evidence import Evidence, Judge
 from armlab.diagnosis.fitted_model import FittedModel
@@ -54,7 +55,7 @@ def prune(model: FittedModel) -> Pruned:
 
 
 def _prune_and_search(model: FittedModel, banned: frozenset[int], fixed: bool = False) -> _Passed:
-    """What passes of a model, and of what the search finds once more, where that is more likely in the end.
+    """What passes of a model, and of what the search finds once more, where that predicts as well in the end.
 
     What is found may be a copy of what passed, so that neither is needed beside the other and both are lost.
     fixed: whether the links' widths stay. They stay beside a body that is held, too: links that are off would take what
@@ -66,7 +67,7 @@ def _prune_and_search(model: FittedModel, banned: frozenset[int], fixed: bool = 
         if searched.state == passed[0].state:
             break
         again = _remove_failing(searched, passed[2])
-        if again[0].fit.score <= passed[0].fit.score:
+        if not _lasts(passed[0], again[0]):
             step = Step("back to what passed before: what was found beside it does not last", passed[0].fit.score)
             return replace(passed[0], steps=(*again[0].steps, step)), passed[1], again[2]
         passed = again
@@ -106,7 +107,14 @@ def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
     if searched.state == model.state:
         return pruned
     again = _settle_links(_remove_failing(searched, banned))
-    return again if again[0].fit.score > model.fit.score else pruned
+    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
+
+
+def _lasts(before: FittedModel, after: FittedModel) -> bool:
+    """Whether what a search has changed predicts held-out rows as well as before."""
+    tolerance = after.design.settings.tuning.claims.body_tolerance
+    errors = [each.moments.heldout_error(each.fit.coefficients) for each in (before, after)]
+    return predicts_as_well(errors[1], errors[0], tolerance)
 
 
 def prefer_one_body(pruned: Pruned) -> Pruned:
