@@ -207,16 +207,26 @@ def holds_body(model: FittedModel) -> bool:
 def _trials(model: FittedModel, present: Sequence[int]) -> list[BodyTrial]:
     """A body at each link in the place of the present ones, with links as far off as they are, or fewer of them.
 
-    A body beside all links that are off is in the place of nothing where none is present.
+    A body beside all links that are off is in the place of nothing where none is present. Where ten parameters that are
+    no body predict held-out rows better, a link is off and carries nothing.
     """
     rest, widths = tuple(each for each in model.state.groups if each not in present), model.state.widths
     solver, out = model.solver, []
+    if not body_groups(solver):
+        return []
     for tried in _fewer_off(widths) + ([widths] if present else []):
         without = State(rest, tried)
         crowd = solver.tuning.crowd_penalty * solver.crowd(without.groups)
+        free = max(
+            (solver.fit(without.plus(group)) for group in body_groups(solver).values()), key=lambda fit: fit.score
+        )
+        error, tolerance = (
+            model.moments.heldout_error(free.coefficients),
+            model.design.settings.tuning.claims.body_tolerance,
+        )
         for body in place_body(model, without):
             score = solver.fit(without).score + body.gain - float(solver.prices[body.group]) - crowd
-            if body.gain > 0:
+            if body.gain > 0 and predicts_as_well(body.error, error, tolerance):
                 out.append(BodyTrial(body, without, score))
     return out
 
