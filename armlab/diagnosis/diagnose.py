@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from armlab.diagnosis.added_body import possible_links, prefer_one_body, with_possible_bodies
+from armlab.diagnosis.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.claims import make_claims
 from armlab.diagnosis.data import observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
@@ -38,7 +38,7 @@ from armlab.diagnosis.prediction import (
     fit_prediction,
     with_smoothing_of,
 )
-from armlab.diagnosis.pruning import Pruned, prune, withdraw
+from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable

@@ -14,7 +14,7 @@ from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import extend_with_shapes
-from armlab.diagnosis.pruning import Pruned, withdraw
+from armlab.diagnosis.pruning import Pruned, look_again, withdraw
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.tuning import PlausibilityTuning
@@ -24,16 +24,19 @@ from armlab.effects.parameters import ParameterValue, parameter_values
 
 def withdraw_implausible(pruned: Pruned) -> Pruned:
     """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
-    ones: usual friction takes their place.
+    ones: usual friction takes their place. Then the search looks once more.
 
     Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept
     without the guard `physics_signs`.
     """
+    withdrawn = frozenset[int]()
     while doubts := _doubtful_friction(pruned[0], pruned[1]):
         model, effects, _ = pruned
         weakest = min(doubts, key=lambda group: (effects[group].usual, effects[group].score))
         pruned = withdraw(model, frozenset({weakest}), doubts[weakest])
-    return pruned
+        withdrawn |= {weakest}
+    again = look_again(pruned, withdrawn) if withdrawn else pruned
+    return pruned if _doubtful_friction(again[0], again[1]) else again
 
 
 def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
