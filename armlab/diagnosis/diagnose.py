@@ -109,7 +109,7 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
-    claims = links_that_data_tell(make_claims(model, effects, named.links, prediction))
+    model, claims = links_that_data_tell(model, make_claims(model, effects, named.links, prediction), remains)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
     return with_story(_assemble(recording, model, prediction, claims, unknowns, remains))
 

@@ -112,6 +112,8 @@ def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array
     position = observed.kept("position")[:, joint]
     velocity = observed.kept("velocity")[:, joint]
     others = push == 0
+    if not others.any():
+        return "it goes on all the time"
     for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(torque))):
         low, high = values[others].min(), values[others].max()
         if np.mean((values[pushed] < low) | (values[pushed] > high)) > tuning.max_extreme_share:

@@ -574,6 +574,12 @@ class PlausibilityTuning:
         meaning="half width of the interval of a wave's order",
         source="beyond half a cycle the wave at one end of the travel says nothing of that at the other",
     )
+    max_unknown_ratio: float = tuned(
+        0.5,
+        unit="of the rms torque of a link or load at a joint",
+        meaning="structure without a name beside which that link or load is known",
+        source="the KUKA's single runs: where an unnamed spring is as large, the load is off by half",
+    )
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,11 @@ from told_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
 
 from armlab.diagnosis.added_body import _fewer_off, _likeliest_body, is_possible_body
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.plausibility import reason_link_unknown
+from armlab.diagnosis.result import Claim
+from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.links import BODY_SIZE_M, SolidBody, body_information
 from armlab.recordings.load import load_recording
 from problem.arm import Link
@@ -87,3 +92,17 @@ def test_what_no_body_can_be_is_an_error_of_the_link_and_no_payload(tmp_path: Pa
     low, high = np.asarray(mass.interval)
     assert link.joint == 3
     assert low < 2.0 < high
+
+
+def test_a_load_is_not_told_beside_structure_as_large_as_its_own_torque() -> None:
+    torque = np.sin(np.linspace(0, 20, 500))[:, None] * [0.0, 10.0, 5.0]
+    evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
+    load = Claim("payload", 3, (3,), (), "", evidence, torque, candidate=SolidBody.of_body(ARM, 3, BODY))
+
+    def reason(joint: int, size: float) -> str | None:
+        left = Structure(joint, 0.9, 1e-9, 0.9, 0.9, size * np.cos(np.linspace(0, 20, 500)), ("position_2",))
+        return reason_link_unknown(load, [left], PlausibilityTuning())
+
+    assert reason(1, 4.0) is None
+    assert "joint 2" in str(reason(1, 6.0))
+    assert reason(0, 6.0) is None
