@@ -72,9 +72,28 @@ def fit_prediction(named: FittedModel) -> Prediction:
         if changed < (1 - tuning.min_cutoff_gain) * error:
             best, error = trial, changed
     state = best.improve(tuning)
-    model = replace(best.model, state=state)
+    model = _settled(replace(best.model, state=state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in state.groups}
     return Prediction(model, places, best.held_out(state))
+
+
+def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
+    """The model with columns that follow itself: a large gain is a share of a torque that it changes.
+
+    Fitted anew until the torque hardly changes. The model as it is where it has no such columns, or does not settle.
+    """
+    if not any(model.solver.groups[group].candidate.follows_model for group in model.state.groups):
+        return model
+    present, residual = model, model.residual(model.fit)
+    for _ in range(tuning.max_follow_rounds):
+        design = follow_model(present.design, present)
+        present = replace(_fitted(design, present.noise, present.state.widths), state=present.state)
+        left = present.residual(present.fit)
+        change = np.sum((left - residual) ** 2)
+        residual = left
+        if change < tuning.follow_tolerance**2 * np.sum(left**2):
+            return present
+    return model
 
 
 def _has_rows(observed: Observed) -> bool:

@@ -283,6 +283,12 @@ class PredictionTuning:
         least=0.01,
     )
     max_changes: int = tuned(60, unit="changes", meaning="most parts that are added or left out", least=0)
+    max_follow_rounds: int = tuned(
+        8, unit="fits", meaning="fits with columns that follow the model, before it counts as one that does not settle"
+    )
+    follow_tolerance: float = tuned(
+        0.01, unit="of the rms error", meaning="change of the errors from one such fit to the next that is settled"
+    )
 
 
 @dataclass(frozen=True)
