@@ -92,7 +92,7 @@ def test_the_page_tells_findings_with_intervals_checks_and_what_each_run_says_al
     assert "| viscous friction | joint 2 | `tau_2 += " in page
     assert "| kuka-kr300 | nominal | friction at joint 2 is named | yes | " in page
     assert "### kuka-kr300, each run alone" in page
-    assert "| kuka-kr300 | nominal | all runs that alone tell of a load tell of the same one at the same link | " in page
+    assert "| kuka-kr300 | nominal | runs that alone tell of a load agree on it and its link | " in page
     assert "<svg" in (folder / "arms.svg").read_text()
 
 

@@ -242,7 +242,7 @@ def _payload_check(study: ArmStudy) -> Check:
     sentence, p_value = mass_agreement([each.mass for each in sized])
     one_link = len({each.link for each in sized}) == 1
     holds = None if p_value is None else one_link and p_value > MIN_AGREEMENT_P_VALUE
-    asked = "all runs that alone tell of a load tell of the same one at the same link"
+    asked = "runs that alone tell of a load agree on it and its link"
     return Check(study.name, "nominal", asked, holds, f"{'; '.join(texts)}. {sentence}")
 
 
