@@ -9,23 +9,31 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.evidence import Evidence, Judge
+from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel, inertial_parameters
+from armlab.diagnosis.links import Widths
 from armlab.diagnosis.prediction import Prediction
-from armlab.diagnosis.pruning import Pruned, reason_to_reject
 from armlab.diagnosis.result import Rival
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.solver import Solver, State
-from armlab.effects.links import BODY_SIZE_M, EIGENVALUE_TOLERANCE, PAYLOAD_FACTS, Payload, felt_values
-from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertias
+from armlab.effects.links import (
+    BODY_SIZE_M,
+    EIGENVALUE_TOLERANCE,
+    PAYLOAD_FACTS,
+    Payload,
+    SolidBody,
+    body_information,
+    felt_values,
+    pseudo_inertia_parts,
+)
+from problem.pseudo_inertia import pseudo_inertias
 
-SCALE = np.diag(
-    [BODY_SIZE_M, BODY_SIZE_M, BODY_SIZE_M, 1.0]
-)  # of a pseudo-inertia's factor, so that it is in kilograms
 FIRST_MASSES = (1.0, 10.0, 100.0)  # kg, where the search for a body begins
+MAX_NEWTON_STEPS, MIN_STEP_SHARE = 200, 1e-9
+NEWTON_TOLERANCE = 1e-6  # of the log likelihood
+BODY_CHANGE = 0.01  # of a body's ten parameters: less does not change what is beside it
 EIGENVALUE_SHARE = 0.02  # of a pseudo-inertia's largest eigenvalue: a point has no spread, and a little less is noise
 
 
@@ -69,8 +77,7 @@ def place_body(model: FittedModel, without: State) -> tuple[PlacedBody, ...]:
 def fit_body(model: FittedModel, without: State, group: int, link: int) -> PlacedBody:
     """The likeliest body that can exist at a link, everything else fitted beside it.
 
-    With the other parameters eliminated, half the chi-square is -x'Hx/2 + g'x of the ten parameters x, whose pseudo-
-    inertia is S L L' S: unconstrained in the triangular L.
+    With the other parameters eliminated, half the chi-square is -x'Hx/2 + g'x of the ten parameters x.
     """
     solver = model.solver
     columns, gram = solver.groups[group].columns, model.moments.gram
@@ -92,30 +99,45 @@ def fit_body(model: FittedModel, without: State, group: int, link: int) -> Place
 
 
 def _likeliest_body(hessian: Array, slope: Array) -> tuple[Array, float]:
-    """The ten parameters of the body that maximises slope'x - x'Hx/2, and that maximum."""
-    units = np.stack([link_from_pseudo_inertia(unit.reshape(4, 4)).parameters for unit in np.eye(16)], axis=1)
-    rows, places = np.tril_indices(4)
-    best: tuple[Array, float] = np.zeros(10), 0.0
-    for mass in FIRST_MASSES:
-        start = np.sqrt(mass) * np.eye(4)
-        size = max(abs(float(slope @ (units @ (SCALE @ start @ start.T @ SCALE).ravel()))), 1.0)
+    """The ten parameters x of the body that maximises slope'x - x'Hx/2 + log det P(x) - 4 log tr P(x).
 
-        def loss(entries: Array, size: float = size) -> tuple[float, Array]:
-            lower = np.zeros((4, 4))
-            lower[rows, places] = entries
-            body = units @ (SCALE @ lower @ lower.T @ SCALE).ravel()
-            pull = hessian @ body - slope
-            turned = SCALE @ (units.T @ pull).reshape(4, 4) @ SCALE
-            return float(body @ hessian @ body / 2 - slope @ body) / size, ((turned + turned.T) @ lower)[
-                rows, places
-            ] / size
+    Also that maximum without the last two terms. P is the pseudo-inertia in kilograms: its determinant keeps a body
+    possible (Lee, Wensing and Park 2020), its trace keeps it small where data do not tell. Both together are the same
+    for any mass. Newton's method from some masses.
+    """
+    parts = pseudo_inertia_parts()
+    found = [_climb(hessian, slope, parts, mass) for mass in FIRST_MASSES]
+    best = max(found, key=lambda ten: _chance(hessian, slope, parts, ten))
+    return best, float(slope @ best - best @ hessian @ best / 2)
 
-        found = minimize(loss, start[rows, places], jac=True, method="BFGS", options={"maxiter": 500})
-        if -found.fun * size > best[1]:
-            lower = np.zeros((4, 4))
-            lower[rows, places] = found.x
-            best = units @ (SCALE @ lower @ lower.T @ SCALE).ravel(), float(-found.fun * size)
-    return best
+
+def _climb(hessian: Array, slope: Array, parts: Array, mass: float) -> Array:
+    """Newton's method from a ball of this mass, with steps that stay among bodies."""
+    ten = np.asarray(np.linalg.lstsq(parts.reshape(10, 16).T, mass * np.eye(4).ravel())[0], dtype=np.float64)
+    for _ in range(MAX_NEWTON_STEPS):
+        inverse = np.linalg.pinv(np.einsum("p,pab->ab", ten, parts), hermitian=True)
+        traces = np.einsum("paa->p", parts)
+        gradient = slope - hessian @ ten + np.einsum("ab,pba->p", inverse, parts) - 4 * traces / float(traces @ ten)
+        curvature = hessian + body_information(ten)
+        size = np.sqrt(np.diag(curvature))  # of data and of the determinant may be ten orders of magnitude apart
+        step = np.linalg.lstsq(curvature / np.outer(size, size), gradient / size)[0] / size
+        if float(gradient @ step) < NEWTON_TOLERANCE:
+            break
+        now, share = _chance(hessian, slope, parts, ten), 1.0
+        while share > MIN_STEP_SHARE and not _chance(hessian, slope, parts, ten + share * step) > now:
+            share /= 2
+        if share <= MIN_STEP_SHARE:
+            break
+        ten = np.asarray(ten + share * step, dtype=np.float64)
+    return ten
+
+
+def _chance(hessian: Array, slope: Array, parts: Array, ten: Array) -> float:
+    """What `_likeliest_body` maximises; no chance where there is no such body."""
+    values = np.linalg.eigvalsh(np.einsum("p,pab->ab", ten, parts))
+    if values[0] <= 0:
+        return -np.inf
+    return float(slope @ ten - ten @ hessian @ ten / 2 + np.sum(np.log(values / np.sum(values))))
 
 
 def is_possible_body(ten: Array, tolerance: float = EIGENVALUE_SHARE) -> bool:
@@ -136,43 +158,138 @@ def possible_links(model: FittedModel, links: dict[int, Evidence]) -> tuple[Fitt
     return replace(model, steps=(*model.steps, *gone)), kept
 
 
-def predicts_as_well(body: PlacedBody, error: Array, tolerance: float) -> bool:
-    """Whether held-out rows leave no more with this body, in the mean of the joints' logarithms."""
-    ratio = np.log(np.maximum(body.error, 1e-300)) - np.log(np.maximum(error, 1e-300))
+def predicts_as_well(error: Array, other: Array, tolerance: float) -> bool:
+    """Whether held-out rows leave no more than another model does, (joints,), in the mean of the joints' logarithms."""
+    ratio = np.log(np.maximum(error, 1e-300)) - np.log(np.maximum(other, 1e-300))
     return bool(np.mean(ratio) <= 2 * np.log1p(tolerance))
 
 
-def prefer_one_body(pruned: Pruned) -> Pruned:
-    """One body that can exist in the place of bodies that cannot, or of several where it predicts as well.
+@dataclass(frozen=True, eq=False)
+class BodyTrial:
+    """A body in the place of what a model has of bodies: beside which state, and the score of the model with it."""
 
-    Where no body does, those that cannot exist are withdrawn: these data do not tell.
+    body: PlacedBody
+    without: State
+    score: float
+
+
+def hold_body(model: FittedModel) -> FittedModel:
+    """The model with one body that can exist in the place of added bodies, or of links that are off.
+
+    Where no added body of the model is impossible, it takes their place if it explains as much and predicts held-out
+    rows as well. Its form is held, so that it stays a body whatever else the model has. The same model where nothing
+    changes.
     """
-    model, effects, links = pruned
-    present = payload_groups(model)
-    if not present or model.design.prior is None or not model.design.settings.guards.physics_signs:
-        return pruned
-    groups = model.solver.groups
-    bodies = {group: groups[group].candidate.added_body(model.solver.values(model.fit, group)) for group in present}
-    impossible = [group for group, ten in bodies.items() if ten is None or not is_possible_body(ten)]
-    if not impossible and len(present) == 1:
-        return pruned
-    without = State(tuple(each for each in model.state.groups if each not in present), model.state.widths)
+    if model.design.prior is None or not model.design.settings.guards.physics_signs:
+        return model
+    present, widths = payload_groups(model), model.state.widths or ()
+    groups, held = model.solver.groups, set(_held_groups(model))
+    point = len(present) == 1 and len(groups[present[0]].columns) == 1 and not held & set(present)
+    if not any(widths) and (point or not present):
+        return model
+    trials = _trials(model, present)
+    if all(_is_possible(model, group) for group in present):
+        trials = [each for each in trials if _stands_in(model, each)]
+    best = max(trials, key=lambda each: each.score, default=None)
+    return model if best is None or _has_body(model, best) else _with_held_body(model, best, present)
+
+
+def find_body_anew(model: FittedModel) -> FittedModel:
+    """The model with its held body as it is beside what the model has now; the same model where it has none."""
+    return hold_body(model) if holds_body(model) else model
+
+
+def holds_body(model: FittedModel) -> bool:
+    """Whether a model has a body of held form."""
+    return bool(set(_held_groups(model)) & set(model.state.groups))
+
+
+def _trials(model: FittedModel, present: Sequence[int]) -> list[BodyTrial]:
+    """A body at each link in the place of the present ones, with links as far off as they are, or fewer of them.
+
+    A body beside all links that are off is in the place of nothing where none is present. Where ten parameters that are
+    no body predict held-out rows better, a link is off and carries nothing.
+    """
+    rest, widths = tuple(each for each in model.state.groups if each not in present), model.state.widths
+    solver, out = model.solver, []
+    if not body_groups(solver):
+        return []
+    for tried in _fewer_off(widths) + ([widths] if present else []):
+        without = State(rest, tried)
+        crowd = solver.tuning.crowd_penalty * solver.crowd(without.groups)
+        free = max(
+            (solver.fit(without.plus(group)) for group in body_groups(solver).values()), key=lambda fit: fit.score
+        )
+        error, tolerance = (
+            model.moments.heldout_error(free.coefficients),
+            model.design.settings.tuning.claims.body_tolerance,
+        )
+        for body in place_body(model, without):
+            score = solver.fit(without).score + body.gain - float(solver.prices[body.group]) - crowd
+            if body.gain > 0 and predicts_as_well(body.error, error, tolerance):
+                out.append(BodyTrial(body, without, score))
+    return out
+
+
+def _fewer_off(widths: Widths | None) -> list[Widths | None]:
+    """Widths of links of which one that is off, or all, are as simulated."""
+    off = [link for link, width in enumerate(widths or ()) if width]
+    fewer = [tuple(0.0 if other == link else each for other, each in enumerate(widths or ())) for link in off]
+    return list(dict.fromkeys([*fewer, (0.0,) * len(widths or ())])) if off else []
+
+
+def _stands_in(model: FittedModel, trial: BodyTrial) -> bool:
+    """Whether a model with a body explains as much as the model does, and predicts as well."""
+    tuning = model.design.settings.tuning.claims
     error = model.moments.heldout_error(model.fit.coefficients)
-    tolerance = model.design.settings.tuning.claims.body_tolerance
-    placed = [each for each in place_body(model, without) if each.gain > 0]
-    if placed and (impossible or predicts_as_well(placed[0], error, tolerance)):
-        chosen = _with_body(model, without, placed[0])
-        evidence = Judge(chosen, chosen.state).effects()
-        if reason_to_reject(evidence[placed[0].group], model.design.settings) is None:
-            kept = {group: each for group, each in evidence.items() if group in effects or group == placed[0].group}
-            step = Step(f"one body at link {placed[0].link} in the place of {_names(model, present)}", placed[0].gain)
-            return replace(chosen, steps=(*chosen.steps, step)), kept, links
-    if not impossible:
-        return pruned
-    step = Step(f"withdrawn: {_names(model, impossible)}: no body has such a mass, centre and inertia", 0.0)
-    state = State(tuple(each for each in model.state.groups if each not in impossible), model.state.widths)
-    left = {group: each for group, each in effects.items() if group not in impossible}
-    return replace(model, state=state, steps=(*model.steps, step)), left, links
+    as_likely = model.fit.score - trial.score <= tuning.max_deficit
+    return as_likely and predicts_as_well(trial.body.error, error, tuning.body_tolerance)
+
+
+def _is_possible(model: FittedModel, group: int) -> bool:
+    ten = model.solver.groups[group].candidate.added_body(model.solver.values(model.fit, group))
+    return ten is not None and is_possible_body(ten)
+
+
+def _held_groups(model: FittedModel) -> tuple[int, ...]:
+    """The group of the body whose form is held, in the model or not."""
+    return tuple(number for number, each in enumerate(model.solver.groups) if isinstance(each.candidate, SolidBody))
+
+
+def _has_body(model: FittedModel, trial: BodyTrial) -> bool:
+    """Whether a model has nearly this body already, beside these groups and links."""
+    held = [each for each in _held_groups(model) if each in model.state.groups]
+    if not held or _link(model, held[0]) != trial.body.link or model.state.widths != trial.without.widths:
+        return False
+    ten = model.solver.groups[held[0]].candidate.added_body(model.solver.values(model.fit, held[0]))
+    return ten is not None and bool(np.linalg.norm(trial.body.ten - ten) <= BODY_CHANGE * np.linalg.norm(ten))
+
+
+def _with_held_body(model: FittedModel, trial: BodyTrial, present: Sequence[int]) -> FittedModel:
+    """The model with a body of held form."""
+    design, held = model.design, _held_groups(model)
+    block = design.block(SolidBody.of_body(design.simulation.arm, trial.body.link, trial.body.ten), 0)
+    number = held[0] if held else len(design.blocks)
+    design = design.with_blocks({number: block}) if held else replace(design, blocks=(*design.blocks, block))
+    moments, solver = design.solver(model.noise)
+    gone = [_names(model, present)] if present else []
+    gone += [f"links off by {model.state.widths}"] if trial.without.widths != model.state.widths else []
+    step = Step(f"one body at link {trial.body.link} in the place of {' and '.join(gone)}", trial.score)
+    return FittedModel(design, model.noise, moments, solver, trial.without.plus(number), (*model.steps, step))
+
+
+def other_bodies(model: FittedModel) -> frozenset[int]:
+    """Groups that would add another body to a model that has one of held form."""
+    held = set(_held_groups(model)) & set(model.state.groups)
+    bodies = {number for number, each in enumerate(model.solver.groups) if each.candidate.effect == PAYLOAD_FACTS.id}
+    return frozenset(bodies - held) if held else frozenset()
+
+
+def impossible_bodies(model: FittedModel) -> tuple[int, ...]:
+    """Groups of a model that add a body which cannot exist."""
+    if model.design.prior is None or not model.design.settings.guards.physics_signs:
+        return ()
+    return tuple(each for each in payload_groups(model) if not _is_possible(model, each))
 
 
 def with_possible_bodies(prediction: Prediction) -> Prediction:
@@ -186,13 +303,6 @@ def with_possible_bodies(prediction: Prediction) -> Prediction:
             body = fit_body(model, model.state.minus(group), group, _link(model, group))
             model.solver.hold(model.state, body.coefficients)
     return prediction
-
-
-def _with_body(model: FittedModel, without: State, body: PlacedBody) -> FittedModel:
-    """The model with this body, its parameters as they were found among possible ones."""
-    state = without.plus(body.group)
-    model.solver.hold(state, body.coefficients)
-    return replace(model, state=state)
 
 
 def _names(model: FittedModel, groups: Sequence[int]) -> str:
@@ -217,5 +327,22 @@ def neighbours_that_fit(model: FittedModel, group: int) -> tuple[Rival, ...]:
         for link, each in placed.items()
         if link != own.link
         and own.gain - each.gain <= tuning.max_body_deficit * own.gain
-        and predicts_as_well(each, own.error, tuning.body_tolerance)
+        and predicts_as_well(each.error, own.error, tuning.body_tolerance)
+    )
+
+
+def bodies_that_fit(model: FittedModel, link: int) -> tuple[Rival, ...]:
+    """Payloads that fit these data as well as a link (from 1) that is off: by score and held-out rows."""
+    widths = model.state.widths
+    if widths is None or model.design.prior is None:
+        return ()
+    tuning = model.design.settings.tuning.claims
+    less = tuple(0.0 if other == link else width for other, width in enumerate(widths, 1))
+    without, error = State(model.state.groups, less), model.moments.heldout_error(model.fit.coefficients)
+    gain = model.fit.score - model.solver.fit(without).score
+    return tuple(
+        Rival(PAYLOAD_FACTS.id, each.link, (), False, max(gain - each.gain, 0.0))
+        for each in place_body(model, without)
+        if gain - each.gain <= tuning.max_body_deficit * gain
+        and predicts_as_well(each.error, error, tuning.body_tolerance)
     )

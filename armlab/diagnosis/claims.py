@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.added_body import neighbours_that_fit
+from armlab.diagnosis.added_body import bodies_that_fit, neighbours_that_fit
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes
@@ -30,7 +30,7 @@ def make_claims(
     if not effects and not links:
         return ()
     wide = extend_with_shapes(model)
-    claims = [_effect_claim(model, wide, group, prediction.named[group], each) for group, each in effects.items()]
+    claims = [_effect_claim(model, wide, group, prediction.places[group], each) for group, each in effects.items()]
     claims += _link_claims(model, wide, links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
     most = model.design.settings.tuning.claims.max_rivals
@@ -142,6 +142,9 @@ def _link_claim(
     change[10 * link - 10 : 10 * link] = mean
     torque[: len(bench.base)] = bench.base.grouping @ change
     rivals = tuple(Rival(each, link, (), True) for each in law.rivals)
+    known = {(candidate.effect, link), *((each.effect, each.joint) for each in rivals)}
+    rivals += tuple(each for each in bodies_that_fit(model, link) if (each.effect, each.joint) not in known)
+    rivals = rivals[: bench.settings.tuning.claims.max_rivals]
     return Claim(
         effect=candidate.effect,
         joint=link,

@@ -10,11 +10,12 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from armlab.diagnosis.added_body import possible_links, prefer_one_body, with_possible_bodies
+from armlab.diagnosis.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.claims import make_claims
 from armlab.diagnosis.data import observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.evidence import Evidence, count_looks
+from armlab.diagnosis.expected_parts import claim_expected_parts
 from armlab.diagnosis.fits import joint_fits
 from armlab.diagnosis.fitted_model import (
     FittedModel,
@@ -37,7 +38,7 @@ from armlab.diagnosis.prediction import (
     fit_prediction,
     with_smoothing_of,
 )
-from armlab.diagnosis.pruning import Pruned, prune, withdraw
+from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
@@ -103,12 +104,12 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     named = name_effects(prefer_one_body(find_friction_curves(prune(searched))))
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
-    model, effects = unclaim_implausible(named.model, named.effects)
+    model, effects = unclaim_implausible(*claim_expected_parts(named.model, named.effects, prediction))
     tuning = model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
-    claims = links_that_data_tell(make_claims(model, effects, named.links, prediction))
+    model, claims = links_that_data_tell(model, make_claims(model, effects, named.links, prediction), remains)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
     return with_story(_assemble(recording, model, prediction, claims, unknowns, remains))
 

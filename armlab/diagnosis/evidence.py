@@ -1,5 +1,6 @@
 """The evidence for each effect of a model: a robust test, the gain on held-out data, and the laws of physics."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -111,6 +112,8 @@ def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array
     position = observed.kept("position")[:, joint]
     velocity = observed.kept("velocity")[:, joint]
     others = push == 0
+    if not others.any():
+        return "it goes on all the time"
     for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(torque))):
         low, high = values[others].min(), values[others].max()
         if np.mean((values[pushed] < low) | (values[pushed] > high)) > tuning.max_extreme_share:
@@ -210,6 +213,18 @@ class Judge:
                 objection = self._pushed(group)
             out[group] = replace(evidence, objection=objection, usual=candidate.facts.usual)
         return out
+
+    def jointly(self, groups: Sequence[int]) -> Evidence:
+        """Evidence for some groups at one place together, of which nothing else was looked at."""
+        fit = self.model.solver.fit(self.state)
+        less = State(tuple(each for each in self.state.groups if each not in groups), self.state.widths)
+        columns = np.concatenate([self.model.solver.groups[each].columns for each in groups])
+        place = [at for each in groups for at in self._place(fit, each)]
+        largest = self.model.design.settings.tuning.blocks.max_variance_ratio
+        p_value = self.compared.covariance_of(self.state).p_value(fit.coefficients[columns], place, largest)
+        rows = self.model.solver.groups[groups[0]].candidate.rows
+        evidence = self._against(less, (p_value, 1), rows, fit.score - self.model.solver.fit(less).score)
+        return replace(evidence, usual=all(self.model.solver.groups[each].candidate.facts.usual for each in groups))
 
     def links(self) -> dict[int, Evidence]:
         """Evidence for each link (from 0) that is off."""

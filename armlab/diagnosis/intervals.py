@@ -1,6 +1,6 @@
 """Named parameters with intervals: robust covariance, nonlinear parameters included, by the delta method."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -17,12 +17,13 @@ SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 class ShapedFit:
     """The fit of a round with the derivatives by all shapes: covariance of links, effects, and shapes.
 
-    places: where a group's shapes stand, by group.
+    places: where a group's shapes stand, by group. lengths: of the shapes' whitened columns, by which they are scaled.
     """
 
     model: FittedModel
     spread: BlockCovariance
     places: dict[int, slice]
+    lengths: Array
 
     @property
     def factor(self) -> float:
@@ -32,11 +33,8 @@ class ShapedFit:
 
     def covariance(self, group: int) -> Array:
         """Of a group's coefficients and shapes, unscaled, (coefficients + shapes,) squared."""
-        found = self.model
-        columns = found.solver.groups[group].columns
-        start = found.fit.links.shape[1] + int(np.flatnonzero(found.fit.columns == columns[0])[0])
-        chosen = [*range(start, start + len(columns)), *_places(self.places.get(group))]
-        lengths = np.append(found.moments.lengths[columns], np.ones(len(chosen) - len(columns)))
+        chosen = _numbers_of(self.model, group, self.places.get(group))
+        lengths = _units(self.model, group, self.lengths, self.places.get(group))
         return np.asarray(self.spread.covariance[np.ix_(chosen, chosen)] / np.outer(lengths, lengths))
 
     def base(self) -> tuple[Array, Array]:
@@ -72,8 +70,32 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
         start += count
     settings, lengths = bench.settings, model.moments.lengths
     rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, bench.observed, settings.tuning.blocks)
-    spread = block_covariance(rows, prior_precision(model.solver, fit, start), settings.guards.robust_variance)
-    return ShapedFit(model, spread, places)
+    own = np.sum([np.sum(design[:, len(fit.inverse) :] ** 2, axis=0) for design in rows.designs], axis=0)
+    shapes = np.sqrt(np.where(own > 0, own, 1.0))
+    scale = np.append(np.ones(len(fit.inverse)), shapes)
+    rows = replace(rows, designs=tuple(design / scale for design in rows.designs))
+    precision = prior_precision(model.solver, fit, start)
+    for group in fit.state.groups:
+        known = model.solver.groups[group].candidate.known(model.solver.values(fit, group))
+        if known is not None:
+            chosen = _numbers_of(model, group, places.get(group))
+            units = _units(model, group, shapes, places.get(group))
+            precision[np.ix_(chosen, chosen)] += known / np.outer(units, units)
+    return ShapedFit(model, block_covariance(rows, precision, settings.guards.robust_variance), places, shapes)
+
+
+def _numbers_of(model: FittedModel, group: int, place: slice | None) -> list[int]:
+    """Where a group's coefficients stand among the parameters of a fit, and then its shapes."""
+    columns = model.solver.groups[group].columns
+    start = model.fit.links.shape[1] + int(np.flatnonzero(model.fit.columns == columns[0])[0])
+    return [*range(start, start + len(columns)), *_places(place)]
+
+
+def _units(model: FittedModel, group: int, shapes: Array, place: slice | None) -> Array:
+    """Lengths of a group's columns, and of those of its shapes. shapes: lengths of all."""
+    before = len(model.fit.inverse)
+    own = [shapes[number - before] for number in _places(place)]
+    return np.append(model.moments.lengths[model.solver.groups[group].columns], own)
 
 
 def _shape_derivative(model: FittedModel, group: int, which: int) -> Array:

@@ -14,9 +14,10 @@ from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import extend_with_shapes
-from armlab.diagnosis.pruning import Pruned, withdraw
+from armlab.diagnosis.pruning import Pruned, look_again, withdraw
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.search import Step
+from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
 from armlab.effects.parameters import ParameterValue, parameter_values
@@ -24,16 +25,19 @@ from armlab.effects.parameters import ParameterValue, parameter_values
 
 def withdraw_implausible(pruned: Pruned) -> Pruned:
     """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
-    ones: usual friction takes their place.
+    ones: usual friction takes their place. Then the search looks once more.
 
     Another effect of which that is so stays in the model without a claim, see `unclaim_implausible`. All are kept
     without the guard `physics_signs`.
     """
+    withdrawn = frozenset[int]()
     while doubts := _doubtful_friction(pruned[0], pruned[1]):
         model, effects, _ = pruned
         weakest = min(doubts, key=lambda group: (effects[group].usual, effects[group].score))
         pruned = withdraw(model, frozenset({weakest}), doubts[weakest])
-    return pruned
+        withdrawn |= {weakest}
+    again = look_again(pruned, withdrawn) if withdrawn else pruned
+    return pruned if _doubtful_friction(again[0], again[1]) else again
 
 
 def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
@@ -73,9 +77,38 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence]) -> dict[int
     return out
 
 
-def links_that_data_tell(claims: Sequence[Claim]) -> tuple[Claim, ...]:
-    """The claims without those on a link of which no parameter differs from zero: these data do not tell of it."""
-    return tuple(each for each in claims if not each.in_links or _differs_from_zero(each))
+def links_that_data_tell(
+    model: FittedModel, claims: Sequence[Claim], left: Sequence[Structure]
+) -> tuple[FittedModel, tuple[Claim, ...]]:
+    """The claims without those on a link or a load of which these data do not tell; the log says why not.
+
+    No parameter of a link that is off differs from zero; or a joint that feels the link has structure left without a
+    name that is comparable with what the claim explains there. left: what is structured beyond chance.
+    """
+    kept, steps = [], list(model.steps)
+    for each in claims:
+        reason = reason_link_unknown(each, left, model.design.settings.tuning.plausibility)
+        if reason is None:
+            kept.append(each)
+        else:
+            steps.append(Step(f"present, not claimed: {each.effect} {each.joint}: {reason}", 0.0))
+    return replace(model, steps=tuple(steps)), tuple(kept)
+
+
+def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: PlausibilityTuning) -> str | None:
+    """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims."""
+    if claim.candidate is None or claim.candidate.facts.where != "link":
+        return None
+    if claim.in_links and not _differs_from_zero(claim):
+        return "no parameter differs from zero"
+    for each in left:
+        own, unknown = (float(np.std(of)) for of in (claim.prediction[:, each.joint], each.prediction))
+        if own > 0 and unknown > tuning.max_unknown_ratio * own:
+            share = format(unknown / own, ".2g")
+            return (
+                f"what is left without a name at joint {each.joint + 1} is {share} times as large as its torque there"
+            )
+    return None
 
 
 def _differs_from_zero(claim: Claim) -> bool:

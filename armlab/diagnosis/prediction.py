@@ -34,12 +34,13 @@ from armlab.recordings.recording import Role, Run
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """A model that predicts. named: its group for each group of the model that was named; the others are present, and
-    not claimed. held_out: ||tau - tau_hat|| / ||tau|| of the torque as recorded on blocks held out in turn.
+    """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
+    claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the torque as recorded on blocks held out
+    in turn.
     """
 
     model: FittedModel
-    named: dict[int, int]
+    places: dict[int, int]
     held_out: float
 
     def with_names_alone(self, names: Iterable[int]) -> FittedModel:
@@ -71,9 +72,28 @@ def fit_prediction(named: FittedModel) -> Prediction:
         if changed < (1 - tuning.min_cutoff_gain) * error:
             best, error = trial, changed
     state = best.improve(tuning)
-    model = replace(best.model, state=state)
-    places = {group: place for place, group in enumerate(own) if place in state.groups}
+    model = _settled(replace(best.model, state=state), tuning)
+    places = {group: place for place, group in enumerate(numbers) if place in state.groups}
     return Prediction(model, places, best.held_out(state))
+
+
+def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
+    """The model with columns that follow itself: a large gain is a share of a torque that it changes.
+
+    Fitted anew until the torque hardly changes. The model as it is where it has no such columns, or does not settle.
+    """
+    if not any(model.solver.groups[group].candidate.follows_model for group in model.state.groups):
+        return model
+    present, residual = model, model.residual(model.fit)
+    for _ in range(tuning.max_follow_rounds):
+        design = follow_model(present.design, present)
+        present = replace(_fitted(design, present.noise, present.state.widths), state=present.state)
+        left = present.residual(present.fit)
+        change = np.sum((left - residual) ** 2)
+        residual = left
+        if change < tuning.follow_tolerance**2 * np.sum(left**2):
+            return present
+    return model
 
 
 def _has_rows(observed: Observed) -> bool:

@@ -2,6 +2,15 @@
 
 from dataclasses import replace
 
+from armlab.diagnosis.added_body import (
+    find_body_anew,
+    hold_body,
+    holds_body,
+    impossible_bodies,
+    other_bodies,
+    payload_groups,
+    predicts_as_well,
+)
 from armlab.diagnosis.evidence import Evidence, Judge
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.search import Search, Step
@@ -9,7 +18,7 @@ from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.solver import State
 
 Pruned = tuple[FittedModel, dict[int, Evidence], dict[int, Evidence]]
-_State = tuple[State, dict[int, Evidence], frozenset[int]]
+_Passed = tuple[FittedModel, dict[int, Evidence], frozenset[int]]
 
 
 def reason_to_reject(evidence: Evidence, settings: Settings) -> str | None:
@@ -38,25 +47,40 @@ def prune(model: FittedModel) -> Pruned:
     """The round with the effects that pass, and the evidence of those and of the links that do (from 0).
 
     After a withdrawal nothing is searched until all that is left passes: what stands in for a withdrawn effect would
-    be its copy. Then the search looks once more, without the places that were withdrawn.
+    be its copy. Then the search looks once more, without the places that were withdrawn. A body that can exist is held
+    from the start, and found anew after withdrawals: they change what is left to it.
     """
-    steps = list(model.steps)
-    return _settle_links(model, _prune_and_search(model, model.state, frozenset(), steps), steps)
+    held = hold_body(model)
+    return _settle_links(_prune_and_search(held, other_bodies(held)))
 
 
-def _prune_and_search(
-    model: FittedModel, state: State, banned: frozenset[int], steps: list[Step], fixed: bool = False
-) -> _State:
-    """What passes of a state, and of what the search finds once more. fixed: whether the links' widths stay."""
+def _prune_and_search(model: FittedModel, banned: frozenset[int], fixed: bool = False) -> _Passed:
+    """What passes of a model, and of what the search finds once more, where that predicts as well in the end.
+
+    What is found may be a copy of what passed, so that neither is needed beside the other and both are lost.
+    fixed: whether the links' widths stay. They stay beside a body that is held, too: links that are off would take what
+    its form, which was found before, does not explain.
+    """
+    passed = _remove_failing(model, banned)
     for _ in range(model.design.settings.tuning.pruning.max_cycles):
-        state, effects, banned = _remove_failing(model, state, banned, steps)
-        known = fixed or state.widths is None
-        search = Search(model.solver, model.design.settings, known, len(state.widths or ()), banned)
-        again = search.climb(state, steps)
-        if again == state:
-            return state, effects, banned
-        state = again
-    return _remove_failing(model, state, banned, steps)
+        searched = _search_again(passed[0], passed[2], fixed)
+        if searched.state == passed[0].state:
+            break
+        again = _remove_failing(searched, passed[2])
+        if not _lasts(passed[0], again[0]):
+            step = Step("back to what passed before: what was found beside it does not last", passed[0].fit.score)
+            return replace(passed[0], steps=(*again[0].steps, step)), passed[1], again[2]
+        passed = again
+    return passed
+
+
+def _search_again(model: FittedModel, banned: frozenset[int], fixed: bool) -> FittedModel:
+    """What a search finds beside effects that passed."""
+    steps, widths = list(model.steps), model.state.widths
+    known = fixed or widths is None or holds_body(model)
+    search = Search(model.solver, model.design.settings, known, len(widths or ()), banned)
+    state = search.climb(model.state, steps)
+    return replace(model, state=state, steps=tuple(steps))
 
 
 def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
@@ -67,29 +91,71 @@ def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
         steps.append(Step(f"withdrawn: {candidate.effect} {candidate.joint}: {why}", 0.0))
     back = {other for group in groups for other in judge.in_place_of(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
-    return _settle_links(model, _remove_failing(model, state, groups, steps), steps)
+    less = replace(model, state=state, steps=tuple(steps))
+    return _settle_links(_remove_failing(less, groups | other_bodies(model)))
 
 
-def _settle_links(model: FittedModel, passed: _State, steps: list[Step]) -> Pruned:
+def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
+    """The same with what a search finds beside it, where all of that passes and is more likely in the end.
+
+    withdrawn: groups of whose places nothing is looked for.
+    """
+    model, groups = pruned[0], pruned[0].solver.groups
+    places = {groups[group].place for group in withdrawn}
+    banned = other_bodies(model) | {number for number, each in enumerate(groups) if each.place in places}
+    searched = _search_again(model, banned, fixed=False)
+    if searched.state == model.state:
+        return pruned
+    again = _settle_links(_remove_failing(searched, banned))
+    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
+
+
+def _lasts(before: FittedModel, after: FittedModel) -> bool:
+    """Whether what a search has changed predicts held-out rows as well as before."""
+    tolerance = after.design.settings.tuning.claims.body_tolerance
+    errors = [each.moments.heldout_error(each.fit.coefficients) for each in (before, after)]
+    return predicts_as_well(errors[1], errors[0], tolerance)
+
+
+def prefer_one_body(pruned: Pruned) -> Pruned:
+    """One body that can exist in the place of bodies and links of what passed, see `hold_body`, where that passes.
+
+    Bodies that cannot exist are withdrawn: these data do not tell.
+    """
+    held = hold_body(pruned[0])
+    if held is not pruned[0]:
+        tested = withdraw(held, frozenset(), "")
+        pruned = tested if payload_groups(tested[0]) else pruned
+    impossible = frozenset(impossible_bodies(pruned[0]))
+    return withdraw(pruned[0], impossible, "no body has such a mass, centre and inertia") if impossible else pruned
+
+
+def _settle_links(passed: _Passed) -> Pruned:
     """With the links that pass; where they do not, all is tested and searched again with links as simulated."""
-    state, effects, banned = passed
-    state, links = _test_links(model, state, steps)
+    model, effects, banned = passed
+    model, links = _test_links(model)
     if links is None:
-        state, effects, banned = _prune_and_search(model, state, banned, steps, fixed=True)
-    return replace(model, state=state, steps=tuple(steps)), effects, links or {}
+        model, effects, _ = _prune_and_search(model, banned, fixed=True)
+    return model, effects, links or {}
 
 
-def _remove_failing(model: FittedModel, state: State, banned: frozenset[int], steps: list[Step]) -> _State:
-    """The state without its failing effects, the weakest first; usual friction in the place of special laws."""
-    groups, settings = model.solver.groups, model.design.settings
+def _remove_failing(model: FittedModel, banned: frozenset[int]) -> _Passed:
+    """The model without its failing effects, the weakest first; usual friction in the place of special laws."""
+    settings, found_anew = model.design.settings, 0
     while True:
+        groups, state = model.solver.groups, model.state
         judge = Judge(model, state)
         effects = judge.effects()
         bad = {group: why for group, each in effects.items() if (why := reason_to_reject(each, settings)) is not None}
         if not bad:
-            return state, effects, banned
+            held = find_body_anew(model)
+            if held is model or found_anew >= settings.tuning.pruning.max_cycles:
+                return model, effects, banned
+            model, found_anew = held, found_anew + 1
+            continue
         weakest = min(bad, key=lambda group: (not judge.simpler(group), effects[group].score))
         gone = _groups_to_remove(judge, weakest)
+        steps = list(model.steps)
         for group in gone:
             what = groups[group].candidate
             steps.append(Step(f"withdrawn: {what.effect} {what.joint}: {bad.get(group, bad[weakest])}", 0.0))
@@ -97,6 +163,7 @@ def _remove_failing(model: FittedModel, state: State, banned: frozenset[int], st
         banned |= {number for number, each in enumerate(groups) if each.place in places}
         back = {other for group in gone for other in judge.in_place_of(group)}
         state = State(tuple(sorted(set(state.groups) - gone | back)), state.widths)
+        model = replace(model, state=state, steps=tuple(steps))
 
 
 def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
@@ -111,19 +178,21 @@ def _groups_to_remove(judge: Judge, weakest: int) -> set[int]:
     return {weakest} if solver.fit(state.minus(weakest)).score > solver.fit(plain).score else special
 
 
-def _test_links(model: FittedModel, state: State, steps: list[Step]) -> tuple[State, dict[int, Evidence] | None]:
-    """The state, and the links that may be claimed: those that pass alone, or the likeliest if they do together.
+def _test_links(model: FittedModel) -> tuple[FittedModel, dict[int, Evidence] | None]:
+    """The model, and the links that may be claimed: those that pass alone, or the likeliest if they do together.
 
     They stay as wide as they were found as long as any passes: that they are off is no claim about each. None where
     they had to be brought back to the simulation.
     """
-    judge, settings = Judge(model, state), model.design.settings
+    state, settings = model.state, model.design.settings
+    judge = Judge(model, state)
     links = judge.links()
     if not links:
-        return state, {}
+        return model, {}
     passed = {link: each for link, each in links.items() if reason_to_reject(each, settings) is None}
     together = judge.together()
     if passed or reason_to_reject(together, settings) is None:
-        return state, passed or {max(links, key=lambda link: links[link].score): together}
-    steps.append(Step(f"withdrawn: links: {reason_to_reject(together, settings)}", 0.0))
-    return State(state.groups, (0.0,) * len(state.widths or ())), None
+        return model, passed or {max(links, key=lambda link: links[link].score): together}
+    step = Step(f"withdrawn: links: {reason_to_reject(together, settings)}", 0.0)
+    back = State(state.groups, (0.0,) * len(state.widths or ()))
+    return replace(model, state=back, steps=(*model.steps, step)), None

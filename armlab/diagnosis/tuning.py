@@ -283,6 +283,12 @@ class PredictionTuning:
         least=0.01,
     )
     max_changes: int = tuned(60, unit="changes", meaning="most parts that are added or left out", least=0)
+    max_follow_rounds: int = tuned(
+        8, unit="fits", meaning="fits with columns that follow the model, before it counts as one that does not settle"
+    )
+    follow_tolerance: float = tuned(
+        0.01, unit="of the rms error", meaning="change of the errors from one such fit to the next that is settled"
+    )
 
 
 @dataclass(frozen=True)
@@ -573,6 +579,12 @@ class PlausibilityTuning:
         unit="cycles over the joint's travel",
         meaning="half width of the interval of a wave's order",
         source="beyond half a cycle the wave at one end of the travel says nothing of that at the other",
+    )
+    max_unknown_ratio: float = tuned(
+        0.5,
+        unit="of the rms torque of a link or load at a joint",
+        meaning="structure without a name beside which that link or load is known",
+        source="the KUKA's single runs: where an unnamed spring is as large, the load is off by half",
     )
 
 

@@ -258,6 +258,10 @@ class Candidate(ABC):
         """Standard deviation of its coefficients; infinite where nothing is known. inertial: (10 * joints,)."""
         return self.facts.prior_scale
 
+    def known(self, coefficients: Array) -> Array | None:
+        """Inverse covariance of its coefficients and shapes by what physics tells of them; None for nothing."""
+        return None
+
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
         """Fields of a simulator's joint that stand for this law, in SI units; empty where none comes near enough.
 

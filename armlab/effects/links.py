@@ -17,18 +17,18 @@ from problem.motion import Motion
 from problem.pseudo_inertia import pseudo_inertia_basis
 from problem.regressor import observation_matrix, rigid_body_torque
 
-BODY_PARAMETERS = (Parameter("mass", "kg"), Parameter("centre", "m"), Parameter("inertia", "kg.m2"))
+PLACE_PARAMETERS = (Parameter("centre", "m"), Parameter("inertia", "kg.m2"))
 PAYLOAD_FACTS = Effect(
     "payload",
     "a body carried by a link",
-    BODY_PARAMETERS,
+    (Parameter("mass", "kg", positive=True), *PLACE_PARAMETERS),
     where="link",
     experiment="repeat the motion without the payload",
 )
 INERTIAL_ERROR_FACTS = Effect(
     "inertial_parameter_error",
     "a link that is not as the simulation has it",
-    BODY_PARAMETERS,
+    (Parameter("mass", "kg"), *PLACE_PARAMETERS),
     where="link",
     in_links=True,
     experiment="weigh the link, or repeat the motion with a payload of known mass",
@@ -197,6 +197,7 @@ BODY_SIZE_M = 0.1  # the size of a body, which brings its pseudo-inertia to kilo
 EIGENVALUE_TOLERANCE = 0.1  # of the largest eigenvalue: a point has no spread, and its fit may have a little less
 MAX_PAYLOAD_RATIO = 3.0  # times the mean mass of the links: in the mean square (chosen by eye)
 MAX_CENTRE_M = 0.5  # m: a payload's centre is no further from its link's frame
+MAX_REACH_M = 10.0  # m, and m2: no part of a body is further from its link's frame
 POINT_CENTRES = tuple(product((0.0, 0.15), repeat=3))  # m, of a first look
 
 
@@ -290,6 +291,67 @@ def _negative_mass(mass: float, covariance: Array | None, place: int) -> str | N
     return "a negative mass" if mass + spread < 0 else None
 
 
+@dataclass(frozen=True)
+class SolidBody(LinkTerm):
+    """A body of known form and unknown mass, carried by a link.
+
+    shape: the centre, m, and the inertia about the link's frame, m2, of one kilogram of it. A search finds other forms;
+    this one holds a body that can exist while the rest of a model changes.
+    """
+
+    facts = PAYLOAD_FACTS
+    form = "body"
+    identical = ("inertial_parameter_error",)
+    names = ("mass", "centre", "inertia")
+
+    @classmethod
+    def of_body(cls, arm: Arm, link: int, ten: Array) -> Self:
+        """The form of a body with these ten parameters about the link's frame; its mass is not zero."""
+        shape = tuple((ten[1:] / ten[0]).tolist())
+        return cls.at(arm, link, shape=shape, bounds=((-MAX_REACH_M, MAX_REACH_M),) * 9)
+
+    @classmethod
+    def is_visible(cls, arm: Arm, link: int) -> bool:
+        """Whether the arm can weigh the link."""
+        return Payload.is_visible(arm, link)
+
+    def columns(self, scene: Scene) -> Array:
+        """Torque of one kilogram of it."""
+        return torque_of_parameters(scene, self.link, self._unit_mass()[None])
+
+    def _unit_mass(self) -> Array:
+        return np.array([1.0, *self.shape])
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        mass = float(coefficients[0])
+        return {"mass": mass, "centre": self.shape[:3], "inertia": tuple(mass * each for each in self.shape[3:])}
+
+    def known(self, coefficients: Array) -> Array:
+        """That it is a body, see `body_information`."""
+        ten = self.added_body(coefficients)
+        slopes = np.column_stack([self._unit_mass(), float(coefficients[0]) * np.eye(10)[:, 1:]])
+        return np.asarray(slopes.T @ body_information(ten) @ slopes)
+
+    def added_body(self, coefficients: Array) -> Array:
+        """All ten parameters about the link's frame."""
+        return float(coefficients[0]) * self._unit_mass()
+
+    def equation(self, coefficients: Array) -> str:
+        """The mass and where it is."""
+        place = ", ".join(format_number(value) for value in self.shape[:3])
+        return f"link {self.link} carries a body of {format_number(coefficients[0])} kg at ({place}) m"
+
+    def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
+        """A negative mass."""
+        return _negative_mass(coefficients[0], covariance, 0)
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        mass, centre = float(parameters["mass"]), np.array(parameters["centre"])
+        ten = np.array([mass, *(mass * centre), *np.array(parameters["inertia"])])
+        return cls.of_body(arm, joints[0], ten), np.array([mass])
+
+
 PAYLOAD = LinkFamily(PAYLOAD_FACTS, (Payload, PointPayload))
 
 
@@ -336,10 +398,22 @@ def link_law(arm: Arm, link: int, mean: Array, spread: Array, added: bool) -> Li
 
 def _may_be_body(ten: Array, covariance: Array) -> bool:
     """Whether ten parameters could be a body: positive mass, and a positive semidefinite pseudo-inertia."""
-    to_kilograms = np.array([1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1.0])
-    parts = pseudo_inertia_basis() * np.outer(to_kilograms, to_kilograms)
+    parts = pseudo_inertia_parts()
     values, vectors = np.linalg.eigh(np.einsum("p,pab->ab", ten, parts))
     slopes = np.einsum("a,pab,b->p", vectors[:, 0], parts, vectors[:, 0])
     doubt = 1.5 * SIGN_SIGMAS * np.sqrt(max(float(slopes @ covariance @ slopes), 0.0))
     tolerance = EIGENVALUE_TOLERANCE * float(np.abs(values).max())
     return bool(ten[0] > 0 and values[0] + doubt + tolerance >= 0)
+
+
+def pseudo_inertia_parts() -> Array:
+    """Pseudo-inertia of each of the ten parameters at one, in kilograms, (10, 4, 4)."""
+    to_kilograms = np.array([1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1 / BODY_SIZE_M, 1.0])
+    return np.asarray(pseudo_inertia_basis() * np.outer(to_kilograms, to_kilograms))
+
+
+def body_information(ten: Array) -> Array:
+    """What being a body tells of ten parameters: the curvature of -log det of the pseudo-inertia, (10, 10)."""
+    parts = pseudo_inertia_parts()
+    turned = np.linalg.inv(np.einsum("p,pab->ab", ten, parts)) @ parts
+    return np.asarray(np.einsum("pab,qba->pq", turned, turned))

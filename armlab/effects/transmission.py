@@ -61,8 +61,8 @@ BACKLASH_FACTS = Effect(
 
 PLAYS = (0.03, 0.1)  # of the joint's travel: gaps before friction, for a first look
 PLAY_RANGE = (0.02, 0.5)  # a smaller one looks like presliding friction, or like a shift in time of some samples
-WAY_RATIOS = (0.1, 0.5)  # of the gap: the way over which friction turns behind it, for a first look
-WAY_RATIO_RANGE = (0.02, 0.5)
+WAY_RATIOS = (0.1, 0.3, 1.0)  # of the gap: the way over which friction turns behind it, for a first look
+WAY_RATIO_RANGE = (0.02, 1.0)
 PHASE_STEP = 0.1  # rad of the fastest oscillation a step
 WALL_HZ = 80.0  # of the walls of a play, damped so that nothing bounces: stiff gears
 MAX_RESONANCE_HZ = 400.0  # of a resonance: stiffer springs follow their load at once, whatever the model's inertia is
@@ -335,8 +335,9 @@ class FrictionBehindPlay(Term):
 
 def way_within_limits(position: Array, limit: float) -> Array:
     """What a slider is behind a joint at `position` (samples,) that drags it along beyond `limit`, (samples,)."""
-    steps = np.sign(np.diff(position))
-    ends = np.flatnonzero(steps[1:] * steps[:-1] < 0) + 1
+    moving = np.flatnonzero(np.diff(position))  # where it stands still it does not turn
+    steps = np.sign(np.diff(position)[moving])
+    ends = moving[np.flatnonzero(steps[1:] != steps[:-1]) + 1]
     out, start = np.zeros(len(position)), 0
     for end in [*ends.tolist(), len(position) - 1]:
         moved = position[start : end + 1] - position[start]

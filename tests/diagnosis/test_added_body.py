@@ -1,16 +1,29 @@
 """Bodies that are added to a link can exist."""
 
-import numpy as np
+from pathlib import Path
 
-from armlab.diagnosis.added_body import _likeliest_body, is_possible_body
+import numpy as np
+from effect_scenes import scene_of
+from told_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
+
+from armlab.diagnosis.added_body import _fewer_off, _likeliest_body, is_possible_body
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.plausibility import reason_link_unknown
+from armlab.diagnosis.result import Claim
+from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.tuning import PlausibilityTuning
+from armlab.effects.links import BODY_SIZE_M, SolidBody, body_information
+from armlab.recordings.load import load_recording
 from problem.arm import Link
 from problem.pseudo_inertia import link_from_centre_of_mass
+from problem.regressor import rigid_body_torque
 
 BODY = np.asarray(link_from_centre_of_mass(120.0, np.array([0.0, 0.1, 0.2]), np.diag([2.0, 2.5, 3.0])).parameters)
 
 
 def test_a_body_that_the_data_determine_is_found_as_it_is() -> None:
-    found, gain = _likeliest_body(np.eye(10), BODY)
+    found, gain = _likeliest_body(1e6 * np.eye(10), 1e6 * BODY)
     np.testing.assert_allclose(found, BODY, rtol=1e-3, atol=1e-2)
     assert gain > 0
 
@@ -27,3 +40,69 @@ def test_a_body_without_mass_or_with_an_impossible_spread_of_it_is_none() -> Non
     assert not is_possible_body(-BODY)
     parameters = np.asarray(Link(1.0, (0.0, 0.0, 0.0), (1.0, 1.0, 5.0, 0.0, 0.0, 0.0)).parameters)
     assert not is_possible_body(parameters)
+
+
+def test_a_body_is_small_where_data_do_not_tell_of_its_spread() -> None:
+    told = np.diag([1e4] * 4 + [0.0] * 6)
+    found, _ = _likeliest_body(told, told @ BODY)
+    np.testing.assert_allclose(found[:4], BODY[:4], rtol=1e-3, atol=1e-2)
+    assert is_possible_body(found, 0.0)
+    assert np.all(found[4:7] < found[0] * (BODY[1:4] @ BODY[1:4] / BODY[0] ** 2 + 20 * BODY_SIZE_M**2))
+
+
+def test_a_body_of_held_form_adds_the_torque_of_its_parameters_and_keeps_them() -> None:
+    ten = 2.0 * np.array(PAYLOAD)
+    held = SolidBody.of_body(ARM, 3, ten)
+    time = np.arange(0, 2, 0.1)
+    scene = scene_of(ARM, motion_at(time, 1), time)
+    bare, loaded = np.zeros(30), np.append(np.zeros(20), ten)
+    torque = rigid_body_torque(ARM, scene.motion, loaded) - rigid_body_torque(ARM, scene.motion, bare)
+    np.testing.assert_allclose(held.columns(scene)[:, :, 0] * 2.0, torque, atol=1e-9)
+    np.testing.assert_allclose(held.added_body(np.array([2.0])), ten)
+    again, mass = SolidBody.from_parameters(ARM, (3,), held.parameters(np.array([2.0])))
+    np.testing.assert_allclose(again.added_body(mass), ten)
+
+
+def test_a_body_of_held_form_with_a_negative_mass_is_none() -> None:
+    held = SolidBody.of_body(ARM, 3, np.array(PAYLOAD))
+    assert held.objection(np.array([-1.0])) == "a negative mass"
+    assert held.objection(np.array([-1.0]), np.array([[1.0]])) is None
+
+
+def test_what_physics_tells_of_a_body_grows_with_certainty_near_a_point() -> None:
+    ball = np.asarray(link_from_centre_of_mass(1.0, np.zeros(3), 0.01 * np.eye(3)).parameters)
+    point = np.asarray(link_from_centre_of_mass(1.0, np.zeros(3), 0.0001 * np.eye(3)).parameters)
+    assert np.all(np.linalg.eigvalsh(body_information(ball)) > 0)
+    assert np.all(np.diag(body_information(point))[4:] > 1e3 * np.diag(body_information(ball))[4:])
+
+
+def test_fewer_links_are_off_one_by_one_and_all() -> None:
+    assert _fewer_off((0.5, 0.0, 0.1)) == [(0.0, 0.0, 0.1), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    assert _fewer_off((0.0, 0.0)) == []
+    assert _fewer_off(None) == []
+
+
+def test_what_no_body_can_be_is_an_error_of_the_link_and_no_payload(tmp_path: Path) -> None:
+    assert not is_possible_body(np.array(PAYLOAD))
+    folder = recording_in(tmp_path / "loaded", frame(21, mass=2.0), frame(22, mass=2.0))
+    found = diagnose(load_recording(folder), "nominal")
+    assert "payload" not in {each.effect for each in found.claims}
+    (link,) = [each for each in found.claims if each.in_links]
+    (mass,) = [each for each in link.parameters if each.name == "mass"]
+    low, high = np.asarray(mass.interval)
+    assert link.joint == 3
+    assert low < 2.0 < high
+
+
+def test_a_load_is_not_told_beside_structure_as_large_as_its_own_torque() -> None:
+    torque = np.sin(np.linspace(0, 20, 500))[:, None] * [0.0, 10.0, 5.0]
+    evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
+    load = Claim("payload", 3, (3,), (), "", evidence, torque, candidate=SolidBody.of_body(ARM, 3, BODY))
+
+    def reason(joint: int, size: float) -> str | None:
+        left = Structure(joint, 0.9, 1e-9, 0.9, 0.9, size * np.cos(np.linspace(0, 20, 500)), ("position_2",))
+        return reason_link_unknown(load, [left], PlausibilityTuning())
+
+    assert reason(1, 4.0) is None
+    assert "joint 2" in str(reason(1, 6.0))
+    assert reason(0, 6.0) is None

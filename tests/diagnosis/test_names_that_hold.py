@@ -68,6 +68,12 @@ def test_a_push_at_an_end_of_the_range_that_was_reached_once_may_be_a_law() -> N
     assert strong == "no other stretch has such a torque"
 
 
+def test_a_push_that_never_ends_is_none() -> None:
+    time = np.arange(0, 20, 0.01)
+    found = reason_no_contact(np.full(len(time), 3.0), 0, _observed(np.sin(time), np.cos(time)), time, TUNING.evidence)
+    assert found == "it goes on all the time"
+
+
 def test_a_short_push_is_a_reversal() -> None:
     time = np.arange(0, 20, 0.01)
     push = np.where((time > 5) & (time < 5.1), 3.0, 0.0)

@@ -92,7 +92,7 @@ def test_the_page_tells_findings_with_intervals_checks_and_what_each_run_says_al
     assert "| viscous friction | joint 2 | `tau_2 += " in page
     assert "| kuka-kr300 | nominal | friction at joint 2 is named | yes | " in page
     assert "### kuka-kr300, each run alone" in page
-    assert "| kuka-kr300 | nominal | each run alone names the same load at the same link | " in page
+    assert "| kuka-kr300 | nominal | runs that alone tell of a load agree on it and its link | " in page
     assert "<svg" in (folder / "arms.svg").read_text()
 
 
@@ -193,6 +193,14 @@ def test_a_level_agrees_where_its_interval_overlaps_what_the_force_shows() -> No
     assert overlaps("positive", 409, 500)
     assert not overlaps("positive", 300, 320)
     assert not overlaps("level", 411, 500)
+
+
+def test_an_interval_contains_the_medians_of_the_directions_in_which_its_level_acts() -> None:
+    forward, back = DirectLevel("a", 1, 400, 390, 410, 5), DirectLevel("a", -1, 300, 290, 310, 5)
+    both = ParameterValue("level", 350, (295, 405), "N")
+    assert all(checks._contains(both, each) for each in (forward, back))
+    assert not checks._contains(ParameterValue("positive", 350, (295, 405), "N"), back)
+    assert not checks._contains(ParameterValue("level", 350, (301, 399), "N"), forward)
 
 
 def test_a_damper_without_a_named_level_is_answered_with_no(recordings: Path) -> None:

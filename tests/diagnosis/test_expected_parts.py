@@ -1,0 +1,55 @@
+"""Friction of a joint that a search missed: claimed where predictions need it, and only there."""
+
+from dataclasses import replace
+
+import engine_cases as cases
+import numpy as np
+import pytest
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.diagnose import prepare
+from armlab.diagnosis.expected_parts import claim_expected_parts
+from armlab.diagnosis.fitted_model import FittedModel, fit_background
+from armlab.diagnosis.prediction import fit_prediction
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.solver import State
+from armlab.effects.library import library
+from problem.motion import Motion
+
+
+def friction_of_joint_2(motion: Motion, time: Array) -> Array:
+    """Coulomb and viscous friction of one joint; of another what noise hides."""
+    out = np.zeros(motion.position.shape)
+    out[:, 1] = 3.0 * motion.velocity[:, 1] + 2.0 * np.sign(motion.velocity[:, 1])
+    out[:, 2] = 0.001 * motion.velocity[:, 2]
+    return out
+
+
+@pytest.fixture(scope="module")
+def nothing_named() -> FittedModel:
+    """Links as simulated, and no effect."""
+    recording = cases.recording(friction_of_joint_2)
+    design = prepare(recording, None, Settings(), lambda message: None)
+    model = fit_background(design, library(), 0, lambda message: None)
+    return replace(model, state=State((), model.state.widths))
+
+
+def test_friction_that_predictions_need_is_claimed_by_its_likeliest_law_and_no_other(
+    nothing_named: FittedModel,
+) -> None:
+    model, effects = claim_expected_parts(nothing_named, {}, fit_prediction(nothing_named))
+    named = [nothing_named.solver.groups[group].candidate for group in effects]
+    assert [(each.effect, each.joint) for each in named] == [("viscous_friction", 2)]
+    assert set(effects) <= set(model.state.groups)
+    assert "which predicts" in model.steps[-1].what
+
+
+def test_a_joint_whose_friction_is_named_gets_no_second_law(nothing_named: FittedModel) -> None:
+    groups = nothing_named.solver.groups
+    own = next(
+        number
+        for number, each in enumerate(groups)
+        if (each.candidate.effect, each.candidate.joint) == ("coulomb_friction", 2)
+    )
+    named = replace(nothing_named, state=nothing_named.state.plus(own))
+    assert claim_expected_parts(named, {}, fit_prediction(named)) == (named, {})
