@@ -1,6 +1,5 @@
 """From the columns of a table to joint signals: SI units, gains, gear ratios, couplings between motors, and offsets."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from armlab.common.settings import suggest_name
 from armlab.recordings.recording import Finding, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry
 from armlab.recordings.table import Table
-from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, Unit, resolve_units
+from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, TIME_UNITS, Unit, resolve_units
 from problem.arm import Arm
 
 DRIVE_SIGNALS = ("torque", "current")
@@ -150,9 +149,25 @@ def to_joint_side(run: Run, transmission: Transmission) -> Run:
     return run.with_signals(run.time, signals)
 
 
+SLOWEST_HZ = 5.0  # no drive is recorded more slowly
+RATE_TOLERANCE = 0.02  # relative: clocks that are off by so little are one clock
+
+
 def check_rate(run: Run, nominal_hz: float | None) -> Run:
-    """A warning where the time column and the nominal rate differ; the time column decides."""
-    if nominal_hz is None or abs(run.rate_hz / nominal_hz - 1) < 0.02:
+    """A warning where the time column and the nominal rate differ, or where no drive is recorded so slowly.
+
+    The time column decides. Raises InputError where it counts in another unit than it is said to.
+    """
+    if nominal_hz is None:
+        if run.rate_hz >= SLOWEST_HZ:
+            return run
+        text = f"time column says {run.rate_hz:.3g} Hz, slower than any drive is recorded: stamps in milliseconds?"
+        return run.with_findings(Finding("rate", "warning", text))
+    ratio = nominal_hz / run.rate_hz
+    if abs(ratio - 1) < RATE_TOLERANCE:
         return run
-    text = f"time column says {run.rate_hz:.6g} Hz, sample_rate_hz says {nominal_hz:g}; the time column decides"
-    return replace(run, findings=(*run.findings, Finding("rate", "warning", text)))
+    said = f"time column says {run.rate_hz:.6g} Hz, sample_rate_hz says {nominal_hz:g}"
+    for name, unit in TIME_UNITS.items():
+        if unit.factor != 1 and abs(ratio * unit.factor - 1) < RATE_TOLERANCE:
+            raise InputError(f"{run.file}: {said}: its stamps are in {name}, give `units: {{time: {name}}}`")
+    return run.with_findings(Finding("rate", "warning", f"{said}; the time column decides"))

@@ -76,6 +76,10 @@ def _find_limit_violations(run: Run, arm: Arm, joint: int) -> list[Finding]:
             f"{limits.position[0]:.4g} and {limits.position[1]:.4g}: another unit, zero or robot?"
         )
         found += _joint_warning("beyond_limits", joint, text)
+    fastest = float(np.abs(_block_means(np.gradient(run.position[:, [joint]], run.time, axis=0))).max())
+    if fastest > LIMIT_TOLERANCE_FACTOR * limits.velocity:
+        text = f"joint {joint + 1} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}: another unit or clock?"
+        found += _joint_warning("beyond_limits", joint, text)
     peak = float(np.abs(run.torque[:, joint]).max())
     if peak > LIMIT_TOLERANCE_FACTOR * limits.torque:
         text = f"torque of joint {joint + 1} reaches {peak:.4g}, its limit is {limits.torque:.4g}: another unit?"

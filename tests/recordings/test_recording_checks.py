@@ -59,7 +59,13 @@ def test_a_torque_that_freezes_while_the_joint_moves_is_named() -> None:
 def test_positions_in_degrees_that_were_called_radians_pass_the_limits() -> None:
     table = frame()
     table["q1"] = np.rad2deg(table["q1"])
-    assert said(run_of(table)) == [("beyond_limits", 1)]
+    assert said(run_of(table)) == [("beyond_limits", 1)] * 2  # position and speed
+
+
+def test_a_joint_that_is_faster_than_it_can_be_is_named() -> None:
+    table = frame()
+    table["t"] /= 100
+    assert {kind for kind, _ in said(run_of(table))} == {"beyond_limits"}
 
 
 @pytest.mark.parametrize(

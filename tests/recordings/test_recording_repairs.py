@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from recording_folders import POSITION, RATE_HZ, SETTINGS, folder_with, frame, motion_at
 from refusals import refusal
 
+from armlab.common.errors import InputError
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Run
 
@@ -170,3 +171,20 @@ def test_the_time_column_decides_against_the_nominal_rate(tmp_path: Path) -> Non
     run = load_recording(folder_with(tmp_path, frame(), {"sample_rate_hz": 500.0})).runs[0]
     assert run.rate_hz == pytest.approx(RATE_HZ)
     assert kinds(run) == [("rate", "warning")]
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6)])
+def test_stamps_in_another_unit_than_the_rate_tells_are_refused_with_their_unit(
+    tmp_path: Path, unit: str, factor: float
+) -> None:
+    table = frame()
+    table["t"] *= factor
+    with pytest.raises(InputError, match=f"its stamps are in {unit}"):
+        load_recording(folder_with(tmp_path, table, {"sample_rate_hz": RATE_HZ}))
+
+
+def test_a_clock_that_no_drive_has_is_suspected_without_a_rate(tmp_path: Path) -> None:
+    table = frame()
+    table["t"] *= 1e3
+    run = load_recording(folder_with(tmp_path, table)).runs[0]
+    assert ("rate", "warning") in kinds(run)
