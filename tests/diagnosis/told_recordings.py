@@ -17,7 +17,8 @@ RATE_HZ = 200.0
 PARTS = 20  # of a sample
 POSITION, TORQUE = ["q1", "q2", "q3"], ["tau1", "tau2", "tau3"]
 COULOMB, VISCOUS = (1.0, 1.5, 0.7), (0.8, 1.0, 0.5)
-PAYLOAD = (1.0, 0.05, 0.03, 0.1, 0.02, 0.02, 0.01, 0.0, 0.0, 0.0)  # per kg, about the frame of link 3
+PAYLOAD = (1.0, 0.05, 0.03, 0.1, 0.02, 0.02, 0.01, 0.0, 0.0, 0.0)  # per kg, about the frame of link 3; no body has it
+POSSIBLE_PAYLOAD = (1.0, 0.05, 0.03, 0.1, 0.02, 0.02, 0.01, -0.0015, -0.005, -0.003)  # the same, its products as a body
 
 
 def motion_at(time: Array, seed: int) -> Motion:
@@ -30,9 +31,14 @@ def motion_at(time: Array, seed: int) -> Motion:
 
 
 def frame(
-    seed: int, seconds: float = 10.0, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0, sampled: bool = False
+    seed: int,
+    seconds: float = 10.0,
+    viscous: tuple[float, ...] = VISCOUS,
+    mass: float = 0.0,
+    sampled: bool = False,
+    load: tuple[float, ...] = PAYLOAD,
 ) -> pd.DataFrame:
-    """One run: rigid torque, friction, 0.05 N m of noise. mass: of a load at link 3, kg.
+    """One run: rigid torque, friction, 0.05 N m of noise. mass: of a load at link 3, kg; load: per kg.
 
     sampled: whether Coulomb friction is that of the instant; else its mean over a sample, as drives report it.
     """
@@ -41,7 +47,7 @@ def frame(
     parts = 1 if sampled else PARTS
     within = ((np.arange(parts) + 0.5) / parts - 0.5) / RATE_HZ
     direction = np.mean([np.sign(motion_at(time + shift, seed).velocity) for shift in within], axis=0)
-    phi[20:30] += mass * np.array(PAYLOAD)
+    phi[20:30] += mass * np.array(load)
     torque = rigid_body_torque(ARM, motion, phi)
     torque += np.array(viscous) * motion.velocity + np.array(COULOMB) * direction
     torque += np.random.default_rng(seed + 500).normal(0, 0.05, torque.shape)
