@@ -176,7 +176,7 @@ def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | N
 @click.option("--only", multiple=True, help="Name of a recording [default: all at hand].")
 @click.option("--quick", is_flag=True, help="The short relations alone.")
 def relations(folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], quick: bool) -> None:
-    """Check relations that need no truth on the public recordings at hand and on each RECORDING.
+    """Check relations that need no truth on real recordings.
 
     A recording against itself has no change, the found model explains its recording, other units change nothing, and
     others. Writes relations.md; an interrupted command continues.
