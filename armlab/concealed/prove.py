@@ -121,31 +121,36 @@ def _remove_finished_development(proof: Proof, work: Path) -> None:
 
 def diagnose_all(folder: Path, verdicts: Path, cases: Sequence[str], jobs: int) -> Iterator[str]:
     """Diagnoses the cases of a set that have no verdict yet, each in its own process; yields the name of each."""
-    missing = [case for case in cases if not _is_diagnosed(verdicts / case)]
+    missing = [case for case in cases if not is_answered(verdicts / case)]
     work = (delayed(_diagnose_case)(folder / "observations" / case, verdicts / case) for case in missing)
     yield from Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(work)
 
 
-def _is_diagnosed(out: Path) -> bool:
+def _diagnose_case(observation: Path, out: Path) -> str:
+    with TemporaryDirectory() as desk:
+        copy = shutil.copytree(observation, Path(desk) / observation.name)
+        answer(["diagnose", str(copy)], out)
+    return observation.name
+
+
+def is_answered(out: Path) -> bool:
+    """Whether a folder holds a complete verdict, or says why there is none."""
     return (out / TIME_FILE).is_file() or (out / FAILURE_FILE).is_file()
 
 
-def _diagnose_case(observation: Path, out: Path) -> str:
-    """Diagnoses one case. The time is written last and marks the verdict as complete."""
+def answer(arguments: Sequence[str], out: Path) -> None:
+    """Runs a command of armlab that writes its verdict to `out`; the time, written last, marks it as complete."""
     out.mkdir(parents=True, exist_ok=True)
-    with TemporaryDirectory() as desk:
-        copy = shutil.copytree(observation, Path(desk) / observation.name)
-        start = time.monotonic()
-        complaint = run_command(["diagnose", str(copy), "--out", str(out.resolve())])
-        seconds = time.monotonic() - start
+    start = time.monotonic()
+    complaint = _run_command([*arguments, "--out", str(out.resolve())])
+    seconds = time.monotonic() - start
     if complaint is not None:
         (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
     else:
         (out / TIME_FILE).write_text(json.dumps({"seconds": round(seconds, 2)}) + "\n", encoding="utf-8")
-    return observation.name
 
 
-def run_command(arguments: list[str]) -> str | None:
+def _run_command(arguments: list[str]) -> str | None:
     """Runs armlab in a process of its own: the error output where it failed, None where it succeeded."""
     command = [sys.executable, "-m", "armlab.cli.main", *arguments]
     about: dict[str, Any] = {"env": _one_thread_environment(), "cwd": _source_root(), "timeout": TIMEOUT_S}

@@ -24,15 +24,17 @@ from armlab.effects.links import (
     PAYLOAD_FACTS,
     Payload,
     SolidBody,
-    body_information,
     felt_values,
     pseudo_inertia_parts,
 )
 from problem.pseudo_inertia import pseudo_inertias
 
-FIRST_MASSES = (1.0, 10.0, 100.0)  # kg, where the search for a body begins
-MAX_NEWTON_STEPS, MIN_STEP_SHARE = 200, 1e-9
-NEWTON_TOLERANCE = 1e-6  # of the log likelihood
+FIRST_MASS = 10.0  # kg, where the search for a body begins
+MAX_NEWTON_STEPS, MIN_STEP_SHARE = 100, 1e-9
+SUFFICIENT_SHARE = 0.1  # of what a step should gain, for it to be taken
+NEWTON_TOLERANCE, PATH_TOLERANCE = 1e-3, 0.1  # of the log likelihood
+PATH_FACTOR = 30.0  # by which the data weigh more at each stage of the path
+MIN_CURVATURE = 1e-9  # less is no maximum
 BODY_CHANGE = 0.01  # of a body's ten parameters: less does not change what is beside it
 EIGENVALUE_SHARE = 0.02  # of a pseudo-inertia's largest eigenvalue: a point has no spread, and a little less is noise
 
@@ -103,41 +105,89 @@ def _likeliest_body(hessian: Array, slope: Array) -> tuple[Array, float]:
 
     Also that maximum without the last two terms. P is the pseudo-inertia in kilograms: its determinant keeps a body
     possible (Lee, Wensing and Park 2020), its trace keeps it small where data do not tell. Both together are the same
-    for any mass. Newton's method from some masses.
+    for any mass. The way there is a path of convex problems without the trace, in which the data weigh more and more
+    (Boyd and Vandenberghe 2004, ch. 11): Newton's method straight from a ball stalls at bodies that hardly exist.
     """
-    parts = pseudo_inertia_parts()
-    found = [_climb(hessian, slope, parts, mass) for mass in FIRST_MASSES]
-    best = max(found, key=lambda ten: _chance(hessian, slope, parts, ten))
-    return best, float(slope @ best - best @ hessian @ best / 2)
+    body = FIRST_MASS * np.eye(4)
+    force = _uphill(_Chance(hessian, slope, 1.0, 0.0), body)[1]
+    weight = 1 / max(force, 1.0)
+    while weight < 1:
+        body = _climb(_Chance(hessian, slope, weight, 0.0), body, PATH_TOLERANCE)
+        weight *= PATH_FACTOR
+    body = _climb(_Chance(hessian, slope, 1.0, 0.0), body, PATH_TOLERANCE)
+    ten = _ten_of(_climb(_Chance(hessian, slope, 1.0, 4.0), body, NEWTON_TOLERANCE))
+    return ten, float(slope @ ten - ten @ hessian @ ten / 2)
 
 
-def _climb(hessian: Array, slope: Array, parts: Array, mass: float) -> Array:
-    """Newton's method from a ball of this mass, with steps that stay among bodies."""
-    ten = np.asarray(np.linalg.lstsq(parts.reshape(10, 16).T, mass * np.eye(4).ravel())[0], dtype=np.float64)
+@dataclass(frozen=True, eq=False)
+class _Chance:
+    """weight (slope'x - x'Hx/2) + log det P(x) - small log tr P(x) of a body with pseudo-inertia P."""
+
+    hessian: Array
+    slope: Array
+    weight: float
+    small: float
+
+    def at(self, body: Array) -> float:
+        """No chance where there is no such body. body: (4, 4)."""
+        values = np.linalg.eigvalsh(body)
+        if values[0] <= 0:
+            return -np.inf
+        ten = _ten_of(body)
+        data = self.slope @ ten - ten @ self.hessian @ ten / 2
+        return float(self.weight * data + np.sum(np.log(values)) - self.small * np.log(np.sum(values)))
+
+
+def _climb(chance: _Chance, body: Array, tolerance: float) -> Array:
+    """Newton's method from a body, with steps that stay among bodies. tolerance: of the log likelihood."""
     for _ in range(MAX_NEWTON_STEPS):
-        inverse = np.linalg.pinv(np.einsum("p,pab->ab", ten, parts), hermitian=True)
-        traces = np.einsum("paa->p", parts)
-        gradient = slope - hessian @ ten + np.einsum("ab,pba->p", inverse, parts) - 4 * traces / float(traces @ ten)
-        curvature = hessian + body_information(ten)
-        size = np.sqrt(np.diag(curvature))  # of data and of the determinant may be ten orders of magnitude apart
-        step = np.linalg.lstsq(curvature / np.outer(size, size), gradient / size)[0] / size
-        if float(gradient @ step) < NEWTON_TOLERANCE:
+        step, gain = _uphill(chance, body)
+        if gain < tolerance:
             break
-        now, share = _chance(hessian, slope, parts, ten), 1.0
-        while share > MIN_STEP_SHARE and not _chance(hessian, slope, parts, ten + share * step) > now:
+        now, share = chance.at(body), 1.0
+        while share > MIN_STEP_SHARE and not chance.at(body + share * step) > now + SUFFICIENT_SHARE * share * gain:
             share /= 2
         if share <= MIN_STEP_SHARE:
             break
-        ten = np.asarray(ten + share * step, dtype=np.float64)
-    return ten
+        body = body + share * step
+    return body
 
 
-def _chance(hessian: Array, slope: Array, parts: Array, ten: Array) -> float:
-    """What `_likeliest_body` maximises; no chance where there is no such body."""
-    values = np.linalg.eigvalsh(np.einsum("p,pab->ab", ten, parts))
-    if values[0] <= 0:
-        return -np.inf
-    return float(slope @ ten - ten @ hessian @ ten / 2 + np.sum(np.log(values / np.sum(values))))
+def _uphill(chance: _Chance, body: Array) -> tuple[Array, float]:
+    """Newton's step from a body, (4, 4), and twice what it should gain.
+
+    In coordinates in which the body is a unit ball the determinant's curvature is the identity, however thin it is.
+    """
+    root = np.linalg.cholesky(body)
+    moves = root @ SYMMETRIC_BASIS @ root.T
+    slopes = _ten_of(moves).T
+    traces = np.trace(moves, axis1=1, axis2=2) / np.trace(body)
+    data = slopes.T @ (chance.slope - chance.hessian @ _ten_of(body))
+    uphill = chance.weight * data + np.trace(SYMMETRIC_BASIS, axis1=1, axis2=2) - chance.small * traces
+    curvature = chance.weight * slopes.T @ chance.hessian @ slopes + np.eye(10)
+    whole = curvature - chance.small * np.outer(traces, traces)
+    if np.linalg.eigvalsh(whole)[0] > MIN_CURVATURE:
+        curvature = whole
+    step = np.linalg.solve(curvature, uphill)
+    return np.asarray(np.einsum("k,kab->ab", step, moves)), float(uphill @ step)
+
+
+def _symmetric_basis() -> Array:
+    """Orthonormal symmetric matrices, (10, 4, 4)."""
+    out = []
+    for row, column in zip(*np.triu_indices(4), strict=True):
+        one = np.zeros((4, 4))
+        one[row, column] = one[column, row] = 1.0 if row == column else np.sqrt(0.5)
+        out.append(one)
+    return np.array(out)
+
+
+SYMMETRIC_BASIS, TEN_OF_BODY = _symmetric_basis(), np.linalg.pinv(pseudo_inertia_parts().reshape(10, 16))
+
+
+def _ten_of(bodies: Array) -> Array:
+    """The ten parameters of pseudo-inertias in kilograms, (..., 4, 4) to (..., 10)."""
+    return np.asarray(bodies.reshape(*bodies.shape[:-2], 16) @ TEN_OF_BODY)
 
 
 def is_possible_body(ten: Array, tolerance: float = EIGENVALUE_SHARE) -> bool:
@@ -314,7 +364,11 @@ def _link(model: FittedModel, group: int) -> int:
 
 
 def neighbours_that_fit(model: FittedModel, group: int) -> tuple[Rival, ...]:
-    """Payloads at other links that fit these data as well as a payload that was found: by score and held-out rows."""
+    """Payloads at other links that these data do not exclude beside a payload that was found.
+
+    Those that fit nearly as well and predict held-out rows as well, and any that fits better: a place is told where
+    both agree on it.
+    """
     if model.design.prior is None or group not in payload_groups(model):
         return ()
     tuning = model.design.settings.tuning.claims
@@ -326,8 +380,13 @@ def neighbours_that_fit(model: FittedModel, group: int) -> tuple[Rival, ...]:
         Rival(PAYLOAD_FACTS.id, link, (), False, max(own.gain - each.gain, 0.0))
         for link, each in placed.items()
         if link != own.link
-        and own.gain - each.gain <= tuning.max_body_deficit * own.gain
-        and predicts_as_well(each.error, own.error, tuning.body_tolerance)
+        and (
+            each.gain > own.gain
+            or (
+                own.gain - each.gain <= tuning.max_body_deficit * own.gain
+                and predicts_as_well(each.error, own.error, tuning.body_tolerance)
+            )
+        )
     )
 
 

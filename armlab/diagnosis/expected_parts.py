@@ -69,7 +69,7 @@ def _is_usual(model: FittedModel, group: int, joint: int, dissipates: bool) -> b
 
 def _is_alike(model: FittedModel, group: int, joint: int, dissipates: bool) -> bool:
     """Whether a group is a friction law of a joint; its usual part that does not dissipate, if that is asked."""
-    facts, own = model.solver.groups[group].candidate.facts, model.solver.groups[group].candidate.joint
+    candidate = model.solver.groups[group].candidate
     if dissipates:
-        return facts.dissipates and facts.where == "joint" and own == joint
+        return candidate.is_friction_of(joint)
     return _is_usual(model, group, joint, dissipates)

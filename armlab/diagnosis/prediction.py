@@ -22,7 +22,7 @@ from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.fitted_model import FittedModel, fit_values, follow_model
 from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.refine import prior_precision
-from armlab.diagnosis.search import Search
+from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.tuning import PredictionTuning
 from armlab.effects.contract import Candidate
@@ -80,7 +80,8 @@ def fit_prediction(named: FittedModel) -> Prediction:
 def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
     """The model with columns that follow itself: a large gain is a share of a torque that it changes.
 
-    Fitted anew until the torque hardly changes. The model as it is where it has no such columns, or does not settle.
+    Fitted anew until the torque hardly changes. The model as it is where it has no such columns, or where it does not
+    settle, which its log says.
     """
     if not any(model.solver.groups[group].candidate.follows_model for group in model.state.groups):
         return model
@@ -93,7 +94,8 @@ def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
         residual = left
         if change < tuning.follow_tolerance**2 * np.sum(left**2):
             return present
-    return model
+    why = f"not settled after {tuning.max_follow_rounds} rounds: columns that follow the model stay as they were"
+    return replace(model, steps=(*model.steps, Step(why, 0.0)))
 
 
 def _has_rows(observed: Observed) -> bool:
@@ -372,7 +374,7 @@ def _outgrows_friction(model: FittedModel, state: State, group: int) -> bool:
     beside = [
         groups[each].columns
         for each in state.groups
-        if groups[each].candidate.joint == own.joint and groups[each].candidate.facts.dissipates
+        if own.joint is not None and groups[each].candidate.is_friction_of(own.joint)
     ]
     friction = np.concatenate([*beside, np.empty(0, dtype=np.intp)]).astype(np.intp)
     power = fit.coefficients[friction] @ model.moments.gram[np.ix_(friction, friction)] @ fit.coefficients[friction]

@@ -213,6 +213,15 @@ class Candidate(ABC):
         return 1
 
     @property
+    def is_friction(self) -> bool:
+        """Whether it is friction of one joint by that joint's own motion."""
+        return self.facts.dissipates and self.facts.where == "joint" and len(self.joints) == 1
+
+    def is_friction_of(self, joint: int) -> bool:
+        """Whether it is friction of this joint, from 1, alone."""
+        return self.is_friction and self.joint == joint
+
+    @property
     def label(self) -> str:
         """Effect, law and place, for a table."""
         details = [*([self.form] if self.form else []), *(f"{value:.4g}" for value in self.shape)]

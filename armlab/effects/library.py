@@ -53,6 +53,7 @@ BUILT_IN: tuple[Family, ...] = (
     TORQUE_SATURATION,
     FRICTION_CURVE,
 )
+_BUILT_IN_BY_NAME = {family.effect: family for family in BUILT_IN}
 EFFECT_IDS = (*(family.effect for family in BUILT_IN), UNKNOWN.id)
 ENTRY_POINT_GROUP = "armlab.effects"
 
@@ -91,7 +92,12 @@ def _load_families(entry: EntryPoint) -> tuple[Family, ...]:
 
 
 def family_named(name: str) -> Family:
-    """The family of an effect; ValueError, with the nearest id, for an unknown one."""
+    """The family of an effect; ValueError, with the nearest id, for an unknown one.
+
+    Plug-ins are looked at only for a name that is not built in, which none of them can take.
+    """
+    if name in _BUILT_IN_BY_NAME:
+        return _BUILT_IN_BY_NAME[name]
     known = {family.effect: family for family in library()}
     if name not in known:
         raise ValueError(f"unknown effect '{name}': {suggest_name(name, list(known))}")

@@ -16,7 +16,6 @@ from armlab.common.arrays import Array
 from armlab.effects._drive_train import ffi, lib
 from armlab.effects.contract import (
     ANGLE,
-    COULOMB_LEVEL,
     TORQUE,
     Candidate,
     Effect,
@@ -50,7 +49,8 @@ BACKLASH_FACTS = Effect(
     "a dead zone in the drive train",
     (
         Parameter("gap", ANGLE, positive=True, plausible=GAPS_SEEN),
-        COULOMB_LEVEL,
+        Parameter("positive", TORQUE, positive=True),
+        Parameter("negative", TORQUE, positive=True),
         Parameter("way", ANGLE, positive=True, detail=True),
     ),
     prior_scale=0.01,
@@ -279,17 +279,19 @@ class Backlash(Transmission):
 
 @dataclass(frozen=True)
 class FrictionBehindPlay(Term):
-    """level z, z = sgn(d) max(|d| - gap / 2, 0) / way: friction that a joint reaches through play.
+    """positive max(z, 0) + negative min(z, 0), z = sgn(d) max(|d| - gap / 2, 0) / way: friction behind play.
 
     d follows the way of the joint and stops at gap / 2 + way, where the friction slides: after a reversal the torque
     falls to zero within the way, stays there for the gap, and comes back within another way. The friction is grounded,
     so what is left in the gap is the joint's other friction alone. shape: the gap, rad (m), and the way as a share of
-    it: with a way that is longer than the gap it is presliding friction.
+    it: with a way that is longer than the gap it is presliding friction. coefficients: a level for each direction.
     """
 
     facts = BACKLASH_FACTS
     form = "friction behind play"
-    names = ("gap", "level", "way")
+    names = ("gap", "positive", "negative", "way")
+    size = 2
+    is_friction = True
     of_time = True
     replaces = ("presliding_hysteresis",)
 
@@ -306,19 +308,22 @@ class FrictionBehindPlay(Term):
         way = ratio * gap
         lag = way_within_limits(positions_within_samples(scene, self.own), gap / 2 + way)
         engaged = np.sign(lag) * np.maximum(np.abs(lag) - gap / 2, 0) / way
-        return self._stacked(mean_within_samples(engaged))
+        return self._stacked(*(mean_within_samples(way(engaged, 0)) for way in (np.maximum, np.minimum)))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """The whole gap, the level behind it, and the way on which the torque reaches that level."""
+        """The whole gap, the level of each direction behind it, and the way on which the torque reaches that level."""
         gap, ratio = self.shape
-        return {"gap": gap, "level": float(coefficients[0]), "way": ratio * gap}
+        positive, negative = coefficients.tolist()
+        return {"gap": gap, "positive": positive, "negative": negative, "way": ratio * gap}
 
     def equation(self, coefficients: Array) -> str:
-        own, level, gap = self.joint, format_number(coefficients[0]), format_number(self.shape[0])
-        return f"tau_{own} += {level} z, z zero for {gap} after each reversal of qd_{own}"
+        own, gap = self.joint, format_number(self.shape[0])
+        positive, negative = (format_number(each) for each in coefficients)
+        law = f"{positive} max(z, 0) + {negative} min(z, 0)"
+        return f"tau_{own} += {law}, z zero for {gap} after each reversal of qd_{own}"
 
     def prior_scale(self, inertial: Array | None) -> float:
-        """The coefficient is a level, of which nothing is known."""
+        """The coefficients are levels, of which nothing is known."""
         return float("inf")
 
     def absurdity(self, coefficients: Array) -> str | None:
@@ -327,10 +332,10 @@ class FrictionBehindPlay(Term):
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
-        gap, level = float(parameters["gap"]), float(parameters["level"])
+        gap, levels = float(parameters["gap"]), np.array([parameters["positive"], parameters["negative"]], dtype=float)
         ratio = float(parameters["way"]) / gap
         bounds = ((gap / 10, gap * 10), (ratio / 10, ratio * 10))
-        return cls.at(arm, joints[0], shape=(gap, ratio), bounds=bounds), np.array([level])
+        return cls.at(arm, joints[0], shape=(gap, ratio), bounds=bounds), levels
 
 
 def way_within_limits(position: Array, limit: float) -> Array:

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
+from public_copies import needs_copies
 from refusals import refusal
 from shipped_schemas import check_against_schema
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
@@ -25,12 +26,10 @@ from armlab.diagnosis.compare.report import comparison_lines, comparison_sentenc
 from armlab.diagnosis.found_model import model_found
 from armlab.effects.contract import Scene
 from armlab.recordings.load import load_recording
-from armlab.recordings.public import local_copies
+from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
 from problem.regressor import rigid_body_torque
 
-COPIES = local_copies()
-DAMPERS = None if COPIES is None or not (COPIES / "friction-damper").is_dir() else COPIES / "friction-damper"
 LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
 
 
@@ -136,9 +135,10 @@ def test_all_friction_of_a_joint_is_told_as_one_level() -> None:
     assert level.interval[0] < change < level.interval[1]
 
 
-@pytest.mark.skipif(not DAMPERS, reason="the recordings of the friction damper are not on this machine")
-def test_a_damper_at_another_tension_has_other_friction_and_no_other_fault() -> None:
-    opened = [load_recording(DAMPERS / f"tension-{tension}-lb") for tension in (20, 25)]
+@needs_copies("friction-damper-20-lb", "friction-damper-25-lb")
+def test_a_damper_at_another_tension_has_other_friction_and_no_other_fault(tmp_path: Path) -> None:
+    names = [f"friction-damper-{tension}-lb" for tension in (20, 25)]
+    opened = [load_recording(fetch_recording(name, tmp_path / name)) for name in names]
     found = compare(opened[0], opened[1], baseline="refit")
     laws = {"coulomb_friction", "viscous_friction", "presliding_hysteresis", "backlash", "asymmetric_friction"}
     assert {each.effect for each in found.named} <= laws

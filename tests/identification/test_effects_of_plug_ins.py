@@ -147,10 +147,14 @@ def test_an_effect_that_cannot_be_computed_is_refused_with_its_place(told: Told,
     assert message in refused
 
 
-def test_a_broken_plug_in_is_told_in_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_broken_plug_in_is_told_in_one_line_where_its_effect_may_be_meant(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     entries = [EntryPoint("own", "no_such_module:X", "armlab.effects")]
     monkeypatch.setattr(library, "entry_points", lambda group: entries)
-    assert "effect 'own' (no_such_module:X) cannot be imported" in refusal(with_effects, tmp_path, EVERY[0])
+    assert "effect 'own' (no_such_module:X) cannot be imported" in refusal(
+        with_effects, tmp_path, {**EVERY[0], "effect": "own"}
+    )
 
 
 def test_a_scene_knows_what_its_links_need() -> None:

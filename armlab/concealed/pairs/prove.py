@@ -6,7 +6,6 @@ An interrupted proof continues in its folder.
 import hashlib
 import json
 import shutil
-import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,8 +17,7 @@ from armlab.concealed.pairs.make import SIDES, make_pair, write_pair
 from armlab.concealed.pairs.plan import PairPlan, draw_pair
 from armlab.concealed.pairs.score import score_lines, score_pairs
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
-from armlab.concealed.prove import report_progress, run_command
-from armlab.concealed.score.cases import FAILURE_FILE, TIME_FILE
+from armlab.concealed.prove import answer, is_answered, report_progress
 from armlab.concealed.sets import TIERS
 
 SETTINGS_FILE = "settings.json"
@@ -54,7 +52,7 @@ def prove_pairs(settings: PairSet, work: Path, results: Path, jobs: int) -> Iter
     yield from report_progress("made", made, max(len(missing), 1))
     yield f"answers SHA-256 {_digest(work / 'truth')}"
     names = [plan.name for plan in plans]
-    waiting = [name for name in names if not _is_compared(work / "verdicts" / name)]
+    waiting = [name for name in names if not is_answered(work / "verdicts" / name)]
     tasks = (delayed(_compare)(work, name) for name in waiting)
     done = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(tasks)
     yield from report_progress("compared", done, max(len(waiting), 1))
@@ -91,20 +89,7 @@ def _digest(truth: Path) -> str:
     return out.hexdigest()
 
 
-def _is_compared(out: Path) -> bool:
-    return (out / TIME_FILE).is_file() or (out / FAILURE_FILE).is_file()
-
-
 def _compare(work: Path, name: str) -> str:
-    """Compares one pair through the command line. The time is written last and marks the verdict as complete."""
-    out = work / "verdicts" / name
-    out.mkdir(parents=True, exist_ok=True)
     old, new = (str((work / "observations" / name / side).resolve()) for side in SIDES)
-    start = time.monotonic()
-    complaint = run_command(["diagnose", "--compare", old, new, "--out", str(out.resolve())])
-    if complaint is not None:
-        (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
-    else:
-        seconds = round(time.monotonic() - start, 2)
-        (out / TIME_FILE).write_text(json.dumps({"seconds": seconds}) + "\n", encoding="utf-8")
+    answer(["diagnose", "--compare", old, new], work / "verdicts" / name)
     return name

@@ -290,7 +290,7 @@ def _scaled_frictions(pooled: Pooled) -> list[tuple[Block, tuple[tuple[Candidate
         laws = []
         for number, block in enumerate(model.design.blocks):
             candidate = block.candidate
-            if candidate.rows == (joint,) and candidate.facts.dissipates and len(candidate.joints) == 1:
+            if candidate.is_friction_of(joint + 1):
                 values = model.solver.values(model.fit, number)
                 laws.append((candidate, values, block.values[:, 0] @ values))
         laws.sort(key=lambda law: -float(law[2] @ law[2]))

@@ -17,24 +17,17 @@ from armlab.diagnosis.compare.numbers import (
     ratio_of_levels,
 )
 from armlab.diagnosis.compare.pooled import Pooled
-from armlab.effects.contract import COULOMB_LEVEL, UNITS, Candidate
+from armlab.effects.contract import UNITS
 
 ALL_FRICTION = "all friction"  # of a joint, as one level
 
 
 def friction_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> Iterator[Change]:
     """All friction of each joint where a law of it changed, as one level."""
-    joints = {table.groups[each.group].candidate.rows for each in found}
-    for joint in range(pooled.observed.joints):
-        changed = [each for each in found if is_friction(table.groups[each.group].candidate, joint)]
-        if (joint,) in joints and changed:
+    for joint in range(1, pooled.observed.joints + 1):
+        changed = [each for each in found if table.groups[each.group].candidate.is_friction_of(joint)]
+        if changed:
             yield _friction_change(pooled, table, found, changed)
-
-
-def is_friction(candidate: Candidate, joint: int) -> bool:
-    """Whether it is a law of friction of a joint (from 0) alone: friction behind play has a level, too."""
-    level = any(each.name == COULOMB_LEVEL.name for each in candidate.facts.parameters)
-    return candidate.rows == (joint,) and len(candidate.joints) == 1 and (candidate.facts.dissipates or level)
 
 
 def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], changed: Sequence[Tested]) -> Change:
@@ -47,7 +40,7 @@ def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]
     joint, rows = first.rows[0], table.mixed.joints[first.rows[0]].rows
     at_mean = common_values(table, found)
     everything = np.arange(table.mixed.size)
-    laws = [each.common for each in table.groups if each.shaped is None and is_friction(each.candidate, joint)]
+    laws = [each.common for each in table.groups if each.shaped is None and each.candidate.is_friction_of(joint + 1)]
     mean = _torque_of(rows, np.concatenate([np.intersect1d(each, table.model) for each in laws]), at_mean)
     own = _torque_of(rows, np.concatenate([table.groups[each.group].columns for each in changed]), at_mean)
     whole = table.mixed.errors(joint, everything, at_mean) + mean + own

@@ -1,7 +1,7 @@
 """Changes with their names: what changed, by how much, and what else it could be."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,7 +50,7 @@ class NamedChange:
 
 
 def name_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> tuple[NamedChange, ...]:
-    """The changes that were found and that predict held-out stretches of every recording better, surest first."""
+    """The changes that were found, with what else each could be, the surest first."""
     named = tuple(_name(pooled, table, found, each) for each in found)
     return tuple(sorted(named, key=lambda each: -each.evidence))
 
@@ -119,7 +119,7 @@ def list_table(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> t
         elif not group.laws and place_of(group.candidate) not in scaled:
             beside = table.test((*chosen, number))
             if is_told(table, beside[-1]):
-                rows += [_unchanged(each) for each in list_changes(pooled, table, beside, beside[-1])]
+                rows += [replace(each, changed=False) for each in list_changes(pooled, table, beside, beside[-1])]
     return (*rows, *friction_changes(pooled, table, found))
 
 
@@ -128,7 +128,3 @@ def is_told(table: ChangeTable, tested: Tested) -> bool:
     scales = table.groups[tested.group].scales
     spread = tested.covariance / tested.inflation
     return bool(np.any(np.diag(spread) < 0.25 * scales**2))
-
-
-def _unchanged(change: Change) -> Change:
-    return Change(**{**vars(change), "changed": False})

@@ -134,5 +134,5 @@ def held_out_gains(table: ChangeTable, errors: tuple[list[Array], list[Array]]) 
 
 
 def predicts_better(gains: Sequence[float], least: float) -> bool:
-    """Whether a change lowers the held-out error of each recording, and of all together enough."""
+    """Whether a change lowers the held-out error of each recording, and by this share in the mean."""
     return min(gains) > 0 and float(np.mean(gains)) > least

@@ -24,7 +24,7 @@ from armlab.effects.coupling import JOINT_COUPLING
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.effects.timing import CHANNEL_SKEW, TIME_DELAY
-from armlab.effects.transmission import BACKLASH, FrictionBehindPlay
+from armlab.effects.transmission import BACKLASH
 from armlab.identification.identifier import Identifier
 from armlab.identification.real.published import compare_with_published, fit_published_structure
 from armlab.recordings.recording import Recording
@@ -69,17 +69,9 @@ def check_arm(study: ArmStudy) -> Iterator[Check]:
 
 def claims_at(diagnosis: Diagnosis, joint: int) -> tuple[Claim, ...]:
     """The claims of a friction law at a joint; friction behind play is one."""
-    return tuple(each for each in diagnosis.claims if each.joint == joint and _has_friction(each))
-
-
-def _has_friction(claim: Claim) -> bool:
-    return is_friction(claim.effect) or isinstance(claim.candidate, FrictionBehindPlay)
-
-
-def is_friction(effect: str) -> bool:
-    """Whether an effect is a friction law at a joint."""
-    facts = effect_named(effect)
-    return facts.dissipates and facts.where == "joint"
+    return tuple(
+        each for each in diagnosis.claims if each.candidate is not None and each.candidate.is_friction_of(joint)
+    )
 
 
 def _friction_checks(study: ArmStudy) -> Iterator[Check]:
@@ -105,7 +97,7 @@ def _friction_checks(study: ArmStudy) -> Iterator[Check]:
 def _without_friction(chosen: Identifier, recording: Recording, joint: int) -> Identifier | None:
     """The identification without friction laws of a joint; None where it has none."""
     parts = tuple(chosen.components or ())
-    kept: tuple[Candidate, ...] = tuple(each for each in parts if each.joint != joint or not is_friction(each.effect))
+    kept: tuple[Candidate, ...] = tuple(each for each in parts if not each.is_friction_of(joint))
     if len(kept) == len(parts):
         return None
     return replace(chosen, components=kept).fit(recording.with_role("identify"))
@@ -212,21 +204,27 @@ def mass_claims(diagnosis: Diagnosis) -> tuple[Claim, ...]:
 
 @dataclass(frozen=True)
 class Mass:
-    """A mass that a run names: of which link, kg."""
+    """A mass that a run names, kg. links: the link that carries it, and others that fit as well."""
 
-    link: int
+    links: tuple[int, ...]
     mass: ParameterValue
 
 
 def named_mass(diagnosis: Diagnosis) -> Mass | None:
     """The mass with the smallest interval that a diagnosis names; None where it names none with an interval."""
     found = [
-        Mass(claim.joint, parameter)
+        Mass((claim.joint, *_other_links(claim)), parameter)
         for claim in mass_claims(diagnosis)
         for parameter in claim.parameters
         if claim.joint is not None and parameter.name == "mass" and parameter.interval is not None
     ]
     return min(found, key=lambda each: _interval_width(each.mass), default=None)
+
+
+def _other_links(claim: Claim) -> Iterator[int]:
+    for rival in claim.rivals:
+        if rival.joint not in (None, claim.joint) and effect_named(rival.effect).where == "link":
+            yield rival.joint
 
 
 def _payload_check(study: ArmStudy) -> Check:
@@ -237,10 +235,11 @@ def _payload_check(study: ArmStudy) -> Check:
             texts.append(f"{run} tells of none")
         else:
             (row,) = parameter_rows(found.mass)
-            texts.append(f"{run} link {found.link}, {row.value} {format_unit(row.unit)} ({row.interval})")
+            links = " or ".join(str(each) for each in found.links)
+            texts.append(f"{run} link {links}, {row.value} {format_unit(row.unit)} ({row.interval})")
     sized = [each for each in masses.values() if each is not None]
     sentence, p_value = mass_agreement([each.mass for each in sized])
-    one_link = len({each.link for each in sized}) == 1
+    one_link = bool(sized) and bool(set.intersection(*(set(each.links) for each in sized)))
     holds = None if p_value is None else one_link and p_value > MIN_AGREEMENT_P_VALUE
     asked = "runs that alone tell of a load agree on it and its link"
     return Check(study.name, "nominal", asked, holds, f"{'; '.join(texts)}. {sentence}")
