@@ -29,7 +29,7 @@ from armlab.effects.links import (
 )
 from problem.pseudo_inertia import pseudo_inertias
 
-FIRST_MASS = 10.0  # kg, where the search for a body begins
+BALL_MASS = 10.0  # kg, where the search for a body begins
 MAX_NEWTON_STEPS, MIN_STEP_SHARE = 100, 1e-9
 SUFFICIENT_SHARE = 0.1  # of what a step should gain, for it to be taken
 NEWTON_TOLERANCE, PATH_TOLERANCE = 1e-3, 0.1  # of the log likelihood
@@ -105,28 +105,30 @@ def _likeliest_body(hessian: Array, slope: Array) -> tuple[Array, float]:
 
     Also that maximum without the last two terms. P is the pseudo-inertia in kilograms: its determinant keeps a body
     possible (Lee, Wensing and Park 2020), its trace keeps it small where data do not tell. Both together are the same
-    for any mass. The way there is a path of convex problems without the trace, in which the data weigh more and more
+    for any mass. The way there is a path of convex problems, in which the data weigh more and more beside a ball
     (Boyd and Vandenberghe 2004, ch. 11): Newton's method straight from a ball stalls at bodies that hardly exist.
     """
-    body = FIRST_MASS * np.eye(4)
-    force = _uphill(_Chance(hessian, slope, 1.0, 0.0), body)[1]
-    weight = 1 / max(force, 1.0)
+    body = BALL_MASS * np.eye(4)
+    weight = 1 / max(_uphill(_NearBall(hessian, slope, 1.0), body)[1], 1.0)
     while weight < 1:
-        body = _climb(_Chance(hessian, slope, weight, 0.0), body, PATH_TOLERANCE)
+        body = _climb(_NearBall(hessian, slope, weight), body, PATH_TOLERANCE)
         weight *= PATH_FACTOR
-    body = _climb(_Chance(hessian, slope, 1.0, 0.0), body, PATH_TOLERANCE)
-    ten = _ten_of(_climb(_Chance(hessian, slope, 1.0, 4.0), body, NEWTON_TOLERANCE))
+    body = _climb(_NearBall(hessian, slope, 1.0), body, PATH_TOLERANCE)
+    ten = _ten_of(_climb(_Chance(hessian, slope, 1.0), body, NEWTON_TOLERANCE))
     return ten, float(slope @ ten - ten @ hessian @ ten / 2)
 
 
 @dataclass(frozen=True, eq=False)
 class _Chance:
-    """weight (slope'x - x'Hx/2) + log det P(x) - small log tr P(x) of a body with pseudo-inertia P."""
+    """weight (slope'x - x'Hx/2) + log det P(x) - 4 log tr P(x) of a body with pseudo-inertia P."""
 
     hessian: Array
     slope: Array
     weight: float
-    small: float
+
+    def size(self, trace: float) -> tuple[float, float, float]:
+        """What a trace costs, and its first and second derivative."""
+        return 4 * float(np.log(trace)), 4 / trace, -4 / trace**2
 
     def at(self, body: Array) -> float:
         """No chance where there is no such body. body: (4, 4)."""
@@ -135,7 +137,14 @@ class _Chance:
             return -np.inf
         ten = _ten_of(body)
         data = self.slope @ ten - ten @ self.hessian @ ten / 2
-        return float(self.weight * data + np.sum(np.log(values)) - self.small * np.log(np.sum(values)))
+        return float(self.weight * data + np.sum(np.log(values)) - self.size(float(np.sum(values)))[0])
+
+
+class _NearBall(_Chance):
+    """The same with tr P / `BALL_MASS` in the place of its logarithm: convex, and a ball where data weigh nothing."""
+
+    def size(self, trace: float) -> tuple[float, float, float]:
+        return trace / BALL_MASS, 1 / BALL_MASS, 0.0
 
 
 def _climb(chance: _Chance, body: Array, tolerance: float) -> Array:
@@ -161,11 +170,12 @@ def _uphill(chance: _Chance, body: Array) -> tuple[Array, float]:
     root = np.linalg.cholesky(body)
     moves = root @ SYMMETRIC_BASIS @ root.T
     slopes = _ten_of(moves).T
-    traces = np.trace(moves, axis1=1, axis2=2) / np.trace(body)
+    traces = np.trace(moves, axis1=1, axis2=2)
+    _, cost, bend = chance.size(float(np.trace(body)))
     data = slopes.T @ (chance.slope - chance.hessian @ _ten_of(body))
-    uphill = chance.weight * data + np.trace(SYMMETRIC_BASIS, axis1=1, axis2=2) - chance.small * traces
+    uphill = chance.weight * data + np.trace(SYMMETRIC_BASIS, axis1=1, axis2=2) - cost * traces
     curvature = chance.weight * slopes.T @ chance.hessian @ slopes + np.eye(10)
-    whole = curvature - chance.small * np.outer(traces, traces)
+    whole = curvature + bend * np.outer(traces, traces)
     if np.linalg.eigvalsh(whole)[0] > MIN_CURVATURE:
         curvature = whole
     step = np.linalg.solve(curvature, uphill)
