@@ -20,6 +20,7 @@ from armlab.diagnosis.columns import Block, Columns, base_columns, filtered_colu
 from armlab.diagnosis.data import Observed, observe, rows_in
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.fitted_model import FittedModel, fit_values, follow_model
+from armlab.diagnosis.links import Widths
 from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.refine import prior_precision
 from armlab.diagnosis.search import Search, Step
@@ -71,6 +72,11 @@ def fit_prediction(named: FittedModel) -> Prediction:
         changed = trial.held_out(trial.begin)
         if changed < (1 - tuning.min_cutoff_gain) * error:
             best, error = trial, changed
+    for widths in _widths_of_known_links(named):
+        trial = _Trial.of(best.model.design, start, State(named.state.groups, widths), best.model.noise, judge)
+        changed = trial.held_out(trial.begin)
+        if changed < (1 - tuning.min_cutoff_gain) * error:
+            best, error = trial, changed
     state = best.improve(tuning)
     model = _settled(replace(best.model, state=state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in state.groups}
@@ -102,6 +108,14 @@ def _has_rows(observed: Observed) -> bool:
     """Whether every joint has stretches in motion that identify, and some that validate."""
     roles: tuple[Role, ...] = ("identify", "validate")
     return all(observed.of_role(role, joint) for role in roles for joint in range(observed.joints))
+
+
+def _widths_of_known_links(model: FittedModel) -> list[Widths]:
+    """How far all links may be from a robot file that holds them, where the names stand beside free links."""
+    if model.state.widths is not None or model.design.prior is None:
+        return []
+    tuning = model.design.settings.tuning.prediction
+    return [(width,) * model.design.prior.links for width in tuning.link_widths]
 
 
 def _lower_cutoffs(observed: Observed, suggested: float, tuning: PredictionTuning) -> list[float]:

@@ -108,7 +108,7 @@ def _unit_cube_maps(
 
     def to_shape(unit: Array) -> tuple[float, ...]:
         value = a + unit * (b - a)
-        return tuple(np.where(logarithmic, np.exp(value), value).tolist())
+        return tuple(np.where(logarithmic, np.exp(np.where(logarithmic, value, 0.0)), value).tolist())
 
     def to_unit(shape: tuple[float, ...]) -> Array:
         value = np.array(shape, dtype=float)

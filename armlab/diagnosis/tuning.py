@@ -264,6 +264,12 @@ class PredictionTuning:
         meaning="a lower cut-off has to lower the error by more",
         most=1.0,
     )
+    link_widths: tuple[float, ...] = tuned(
+        (0.1, 0.3, 1.0, 3.0),
+        unit="of the links' inertia",
+        meaning="how far links may be from a robot file that holds them, beside free links, where they are refitted",
+        least=1e-6,
+    )
     min_gain: float = tuned(
         0.01,
         unit="logarithm of the joints' errors",

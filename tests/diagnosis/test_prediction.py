@@ -1,10 +1,12 @@
 """The model that predicts: parts without a claim, whitening that must not cost predictions, and smoothing."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import engine_cases as cases
 import numpy as np
 import pytest
+from told_recordings import frame, recording_in
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import diagnose, prepare
@@ -12,11 +14,18 @@ from armlab.diagnosis.fitted_model import FittedModel, fit_background, fit_colou
 from armlab.diagnosis.formats import VerdictFile
 from armlab.diagnosis.found_model import model_found, named_model
 from armlab.diagnosis.noise import Noise, choose_noise
-from armlab.diagnosis.prediction import choose_smoothing, filtered_residual, identification_runs, recorded_residual
+from armlab.diagnosis.prediction import (
+    choose_smoothing,
+    filtered_residual,
+    fit_prediction,
+    identification_runs,
+    recorded_residual,
+)
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.settings import Guards, Settings
+from armlab.diagnosis.settings import Baseline, Guards, Settings
 from armlab.diagnosis.verdict_files import make_verdict
 from armlab.effects.library import library
+from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.motion import Motion
 
@@ -103,9 +112,21 @@ def test_positions_are_smoothed_as_predicts_best(found: Diagnosis) -> None:
     assert error(chosen.position_factor) <= min(error(factor * chosen.position_factor) for factor in (0.1, 10.0))
 
 
-def first_model(recording: Recording, guards: Guards | None = None) -> FittedModel:
+def test_refitted_links_stay_near_a_robot_file_that_holds_where_that_predicts_better(tmp_path: Path) -> None:
+    model = first_model(load_recording(recording_in(tmp_path, frame(0, 2.5), frame(1, 2.5))), baseline="refit")
+    assert model.state.widths is None
+    usual = model.design.settings.tuning
+    near = fit_prediction(model)
+    free = replace(model.design.settings, tuning=replace(usual, prediction=replace(usual.prediction, link_widths=())))
+    alone = fit_prediction(replace(model, design=replace(model.design, settings=free)))
+    assert near.model.state.widths == 3 * (near.model.state.widths or (0.0,))[:1]
+    assert (near.model.state.widths or (0.0,))[0] in usual.prediction.link_widths
+    assert near.held_out < alone.held_out
+
+
+def first_model(recording: Recording, guards: Guards | None = None, baseline: Baseline | None = None) -> FittedModel:
     """Links and usual friction fitted to a recording."""
-    design = prepare(recording, None, Settings(guards or Guards()), lambda message: None)
+    design = prepare(recording, baseline, Settings(guards or Guards()), lambda message: None)
     assert not isinstance(design, Diagnosis)
     usual = [family for family in library() if family.facts.usual]
     return fit_background(design, usual, 0, lambda message: None)

@@ -284,7 +284,7 @@ def _slow_waves(pooled: Pooled) -> Array:
 
 
 def _scaled_frictions(pooled: Pooled) -> list[tuple[Block, tuple[tuple[Candidate, Array], ...]]]:
-    """The torque of all friction of a joint as one column, where it has several laws."""
+    """The torque of all friction of a joint as one column, where it has several coefficients."""
     model, out = pooled.model, []
     for joint in range(pooled.observed.joints):
         laws = []
@@ -294,7 +294,7 @@ def _scaled_frictions(pooled: Pooled) -> list[tuple[Block, tuple[tuple[Candidate
                 values = model.solver.values(model.fit, number)
                 laws.append((candidate, values, block.values[:, 0] @ values))
         laws.sort(key=lambda law: -float(law[2] @ law[2]))
-        if len(laws) > 1:
+        if sum(len(values) for _, values, _ in laws) > 1:
             total = np.sum([law[2] for law in laws], axis=0)
             out.append((Block(laws[0][0], 0, total[:, None, None]), tuple((law[0], law[1]) for law in laws)))
     return out
