@@ -149,6 +149,7 @@ def list_names() -> None:
 
     click.echo("algorithms: " + ", ".join(algorithms.names()))
     click.echo("peers (extra `peers`): " + ", ".join(algorithms.peer_names()))
+    click.echo("with derivatives: " + ", ".join(algorithms.names_with_derivatives()))
     click.echo("problems: " + ", ".join(problems.names()))
     for suite in suites():
         click.echo(f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first")

@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 from refusals import refusal
 
-from bench.studies.best_known.descent import (
-    LIMIT_MARGIN,
-    LimitRows,
-    descend,
-    evaluate_point,
-    motion_of,
-    smooth_log_condition,
-)
+from bench.studies.best_known.descent import descend, evaluate_point
 from bench.studies.best_known.records import (
     RECORDS_FILE,
     Record,
@@ -141,21 +134,6 @@ def test_a_random_step_from_the_end_of_a_descent_is_no_better() -> None:
     steps = np.random.default_rng(0).normal(scale=1e-4, size=(300, len(end.point)))
     near = problem.evaluate(np.clip(end.point + steps, problem.lower, problem.upper))
     assert np.all(near.value[near.violation == 0] > end.value * (1 - 1e-6))
-
-
-def test_distances_are_negative_exactly_where_a_limit_is_broken() -> None:
-    problem = tiny()
-    points = np.random.default_rng(2).uniform(problem.lower, problem.upper, (60, len(problem.lower)))
-    nearest = [LimitRows(problem, LIMIT_MARGIN).distances(motion_of(problem, point)).min() for point in points]
-    assert np.array_equal(np.array(nearest) < 0, problem.evaluate(points).violation > 0)
-
-
-def test_the_smoothed_condition_number_of_4_2_1_by_hand_and_its_limit() -> None:
-    values = np.array([4.0, 2.0, 1.0])
-    value, slope = smooth_log_condition(1.0)(values)
-    assert value == pytest.approx(np.log(4 + 2 + 1) + np.log(1 / 4 + 1 / 2 + 1))
-    assert slope == pytest.approx([1 / 7 - 1 / 7 / 4, 1 / 7 - 1 / 7, 1 / 7 - 4 / 7])
-    assert smooth_log_condition(1e6)(values)[0] == pytest.approx(np.log(4.0))
 
 
 def test_the_gap_does_not_depend_on_what_leaves_a_trajectory_as_good_as_it_is(tmp_path: Path) -> None:
