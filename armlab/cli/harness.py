@@ -243,6 +243,29 @@ def share(results: Path, store: Path, form: str, out: Path) -> None:
 
 
 @click.command()
+@click.argument("results", type=_PATH)
+@_STORE_OPTION
+@click.option("--out", type=_PATH, required=True, help="Folder to write into.")
+@click.option(
+    "--records",
+    type=_PATH,
+    default=Path("results/best_known.json"),
+    show_default=True,
+    help="File of the best known trajectories.",
+)
+def draw(results: Path, store: Path, out: Path, records: Path) -> None:
+    """Draw RESULTS: ends, ranking, budgets.
+
+    Writes PNG and SVG: every end with median and best known, the ranks over problems, and the medians against the
+    budget, as they fit. RESULTS: a configuration file whose trials were run, or a folder that `share` wrote.
+    """
+    from bench.result_sets.draw import draw_results
+
+    for path in draw_results(results, store, records, out):
+        click.echo(path)
+
+
+@click.command()
 @click.argument("damaged", type=_PATH)
 @click.option("--out", type=_PATH, required=True, help="File of the new store.")
 def salvage(damaged: Path, out: Path) -> None:

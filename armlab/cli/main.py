@@ -26,6 +26,7 @@ _COMMANDS = {
     "report": "armlab.cli.harness:report",
     "compare": "armlab.cli.harness:compare",
     "share": "armlab.cli.harness:share",
+    "draw": "armlab.cli.harness:draw",
     "salvage": "armlab.cli.harness:salvage",
     "properties": "armlab.cli.harness:properties",
     "best-known": "armlab.cli.harness:best_known",

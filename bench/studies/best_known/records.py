@@ -155,7 +155,12 @@ def _record_settings(record: Record) -> dict[str, Any]:
 
 
 def best_known_values(entries: Sequence[Entry], records: Path) -> dict[str, float]:
-    """By the problem's label; problems without a record are left out."""
+    """By the label of the entry's problem; problems without a record are left out."""
+    return known_values({entry.problem: entry.trial.problem for entry in entries}, records)
+
+
+def known_values(problems: Mapping[str, ProblemSettings], records: Path) -> dict[str, float]:
+    """Best known condition numbers by label; problems without a record are left out."""
     known = records_by_problem(records)
-    keys = {entry.problem: record_key(entry.trial.problem) for entry in entries}
+    keys = {label: record_key(settings) for label, settings in problems.items()}
     return {label: known[key].value for label, key in keys.items() if key in known}
