@@ -160,6 +160,15 @@ def test_the_gap_does_not_depend_on_what_leaves_a_trajectory_as_good_as_it_is(tm
     assert gap_to_best_known(settings_of(preset="sphere"), 10.0, known) is None
 
 
+def test_a_problem_of_a_suite_has_the_record_of_its_definition() -> None:
+    known = records_by_problem(ROOT / "results" / RECORDS_FILE)
+    gaps = [
+        gap_to_best_known(settings_of(**settings), 100.0, known)
+        for settings in ({"preset": "suite-2/irb120-all-si"}, {"preset": "joint-fourier", "arm": "irb120"})
+    ]
+    assert gaps[0] == gaps[1] is not None
+
+
 def test_each_mistake_is_told_in_one_line(tmp_path: Path, plan: Callable[[str], Path]) -> None:
     def told(text: str, name: str | None = None) -> str:
         path = plan(text)

@@ -16,6 +16,7 @@ from bench.execute import canonical
 from bench.plan import Entry
 from problem.excitation import ExcitationProblem
 from problem.registry import ProblemSettings, parse_problem
+from problem.suite import InstanceSettings, definition_of
 
 
 class SearchPlan(Settings):
@@ -126,6 +127,8 @@ _IGNORED_SETTINGS = ("criterion", "penalty", "frame_seed")  # they change neithe
 
 def record_key(settings: ProblemSettings) -> str:
     """Canonical text of the settings that decide the values and limits of a problem: equal text, equal best."""
+    if isinstance(settings, InstanceSettings):
+        settings = definition_of(settings.preset)
     kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _IGNORED_SETTINGS}
     if kept["preset"] == "random-frame":
         kept["preset"] = "joint-fourier"  # the same trajectories in other coordinates
