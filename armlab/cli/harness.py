@@ -311,6 +311,31 @@ def best_known(minutes: float, problem: str | None, results: Path) -> None:
         click.echo(line)
 
 
+@click.command()
+@click.argument("algorithms", nargs=-1)
+@click.option("--config", type=_PATH, default=Path("configs/tune.yaml"), show_default=True)
+@click.option("--budget", type=click.IntRange(min=2), help="Configurations an algorithm [default: the file's].")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
+@_STORE_OPTION
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/tune"), show_default=True)
+def tune(
+    algorithms: tuple[str, ...], config: Path, budget: int | None, workers: int | None, store: Path, results: Path
+) -> None:
+    """Tune ALGORITHMS, the same budget for each [default: all].
+
+    Tries hyper-parameters on training problems and judges the best ones on problems that took no part, beside the
+    published ones. You can stop it at any time; the next call continues from there. Needs the extra `tune`.
+    """
+    from joblib import cpu_count
+
+    from bench.studies.tuning.study import TuningOptions, tune_algorithms
+
+    records = Path("results/best_known.json")
+    options = TuningOptions(algorithms, budget, store, results, records, workers or cpu_count())
+    for path in tune_algorithms(config, options, trial_bar):
+        click.echo(path)
+
+
 @click.command("does-it-help")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_RESULTS_OPTION

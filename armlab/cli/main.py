@@ -31,6 +31,7 @@ _COMMANDS = {
     "properties": "armlab.cli.harness:properties",
     "best-known": "armlab.cli.harness:best_known",
     "export": "armlab.cli.harness:export",
+    "tune": "armlab.cli.harness:tune",
     "does-it-help": "armlab.cli.harness:does_it_help",
     "recording": "armlab.cli.recordings:recording",
     "identify": "armlab.cli.identification:identify",

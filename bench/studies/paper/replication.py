@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from armlab.common.files import write_whole
-from armlab.common.settings import Settings
+from armlab.common.settings import Settings, settings_to_yaml
 from bench.printed import read_printed
 from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
@@ -24,7 +24,6 @@ from bench.studies.paper.settings import (
     Table4Settings,
     TrajectorySettings,
     read_settings,
-    settings_to_yaml,
 )
 from bench.studies.paper.tables import make_table1, make_table2, make_table4, table1_deviations, table2_differences
 from bench.tables import as_csv, tidy_frame
