@@ -16,9 +16,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from algorithms.contract import AnyAlgorithm, Box, uniform_points
+from algorithms.contract import AnyAlgorithm, AsksDerivatives, Box, question_of, uniform_points
 from algorithms.driver import clip
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Derivatives, Question
 
 BetweenCalls = Callable[[Any, list[Array]], Any]
 
@@ -63,8 +64,11 @@ def play_steps(
     state = between(state, [population])
     for _ in range(game.steps):
         asked, state = algorithm.ask(state)
+        question = question_of(algorithm, state)
         seen, X = asked.copy(), clip(asked, box)
         state = between(state, [asked])
+        if question is not None and issubclass(algorithm, AsksDerivatives):
+            state = algorithm.tell_derivatives(state, derivatives_by_differences(game.objective, X[0], question))
         fitness = game.objective(X)
         told = X.copy(), fitness.copy()
         state = algorithm.tell(state, X, fitness)
@@ -102,6 +106,18 @@ def holed_bowl(X: Array) -> Array:
 def constant_objective(value: float) -> Callable[[Array], Array]:
     """An objective that has one value everywhere."""
     return lambda X: np.full(len(X), value)
+
+
+_DIFFERENCE_STEP = 1e-5
+
+
+def derivatives_by_differences(objective: Callable[[Array], Array], point: Array, question: Question) -> Derivatives:
+    """Central differences of an objective without limits at a point (d,)."""
+    steps = _DIFFERENCE_STEP * np.eye(len(point))
+    with np.errstate(invalid="ignore"):  # inf - inf
+        slope = (objective(point + steps) - objective(point - steps)) / (2 * _DIFFERENCE_STEP)
+    nothing = np.zeros(0, dtype=np.intp)
+    return Derivatives(float(objective(point[None])[0]), slope, np.zeros(0), nothing, np.zeros((0, len(point))))
 
 
 CRASH_ERRORS = (

@@ -6,13 +6,22 @@
         state = algorithm.tell(state, X, objective(X))
 
 An algorithm knows no budget, bound policy, log, file or seed. `algorithms.check` tests the promises.
+
+An algorithm that also wants derivatives has two functions more, `question` and `tell_derivatives`:
+
+        X, state = algorithm.ask(state)
+        question = algorithm.question(state)     # None: nothing is asked this time; else X is one point
+        if question is not None:
+            state = algorithm.tell_derivatives(state, derivatives(X[0], question))
+        state = algorithm.tell(state, X, objective(X))
 """
 
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Derivatives, Question
 
 ParamsT = TypeVar("ParamsT", contravariant=True)
 StateT = TypeVar("StateT")
@@ -72,6 +81,26 @@ class Algorithm(Protocol[ParamsT, StateT]):
 
 
 AnyAlgorithm: TypeAlias = type[Algorithm[Any, Any]]
+
+
+@runtime_checkable
+class AsksDerivatives(Protocol):
+    """What an algorithm has beside the contract if it asks for derivatives."""
+
+    @staticmethod
+    def question(state: Any) -> Question | None:
+        """What is asked of the one point of the last `ask` beside its fitness; None: nothing."""
+        ...
+
+    @staticmethod
+    def tell_derivatives(state: Any, derivatives: Derivatives) -> Any:
+        """Learn the answer, before `tell` gives the fitness of the same point."""
+        ...
+
+
+def question_of(algorithm: AnyAlgorithm, state: Any) -> Question | None:
+    """What an algorithm asks beside the fitness, after it was asked for points; None where it never asks."""
+    return algorithm.question(state) if issubclass(algorithm, AsksDerivatives) else None
 
 
 def as_loss(fitness: Array) -> Array:

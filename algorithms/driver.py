@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from algorithms.contract import AnyAlgorithm, Box, as_loss
+from algorithms.contract import AnyAlgorithm, AsksDerivatives, Box, as_loss, question_of
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Derivatives, Question
 
 BoundPolicy = Callable[[Array, Box], Array]
 
@@ -51,14 +52,22 @@ def bound_policy(name: str) -> BoundPolicy:
 Objective = Callable[[Array], Array]
 
 
+class DerivativeSource(NamedTuple):
+    """Where derivatives come from, and how many evaluations a point with derivatives counts for, at least one."""
+
+    differentiate: Callable[[Array, Question], Derivatives]
+    price: int
+
+
 class Batch(NamedTuple):
     """One evaluated population: points (n, d), their fitness (n,), and the algorithm after it was told them.
 
-    present_best: fitness of the algorithm's incumbent.
+    cost: evaluations that it counts for. present_best: fitness of the algorithm's incumbent.
     """
 
     X: Array
     fitness: Array
+    cost: int
     present_best: float
     state: Any
 
@@ -105,17 +114,19 @@ def minimise(
     evaluations: int,
     rng: np.random.Generator,
     bounds: str = "clip",
+    source: DerivativeSource | None = None,
 ) -> Result:
     """Run an algorithm from the first population (n, d) until the budget is used up or it is finished.
 
     objective: (n, d) -> (n,), smaller is better. evaluations: the budget, never exceeded.
     bounds: name of the policy in `algorithms.driver`. Points are never rescaled.
+    source: of derivatives, for an algorithm that asks for them.
     Raises ValueError for a budget below 1, an impossible box, or an objective that returns another shape.
     """
     _check_problem(box, population, evaluations)
     horizon = planned_iterations(evaluations, len(population))
     state = algorithm.init(params, population, box, horizon, rng)
-    batches = list(iterate(algorithm, state, objective, box, evaluations, bounds))
+    batches = list(iterate(algorithm, state, objective, box, evaluations, bounds, source))
     if not batches:
         raise ValueError(f"algorithm {algorithm.name!r} was finished before its first population")
     return summarise_batches(batches)
@@ -128,25 +139,43 @@ def iterate(
     box: Box,
     evaluations: int,
     bounds: str = "clip",
+    source: DerivativeSource | None = None,
 ) -> Iterator[Batch]:
     """Go on from a State for at most so many evaluations, one batch at a time.
 
     A last batch that the budget cuts is evaluated as far as it goes and counts for the best, but is not told:
     an algorithm is only told whole populations. So a run is resumed from the state after a whole batch. The
-    state of a batch is used up when the next batch is taken: pickle it before, to keep it.
+    state of a batch is used up when the next batch is taken: pickle it before, to keep it. A point with derivatives
+    that costs more than what is left of the budget ends the run. Raises ValueError if an algorithm asks for
+    derivatives and there is no source.
     """
     into_box = bound_policy(bounds)
     walls = box
     while evaluations > 0 and not algorithm.finished(state):
         asked, state = algorithm.ask(state)
+        question = question_of(algorithm, state)
+        if question is not None and _price(algorithm, asked, source) > evaluations:
+            return
         if walls.lower.shape != asked.shape:
             walls = Box(*(np.tile(wall, (len(asked), 1)) for wall in box))  # numpy is faster on equal shapes
         X = into_box(asked, walls)[:evaluations]
         fitness = _evaluate(objective, X)
+        cost = len(X)
+        if question is not None and source is not None and issubclass(algorithm, AsksDerivatives):
+            state = algorithm.tell_derivatives(state, source.differentiate(X[0], question))
+            cost = source.price
         if len(X) == len(asked):
             state = algorithm.tell(state, X, fitness)
-        evaluations -= len(X)
-        yield Batch(X, fitness, algorithm.incumbent(state)[1], state)
+        evaluations -= cost
+        yield Batch(X, fitness, cost, algorithm.incumbent(state)[1], state)
+
+
+def _price(algorithm: AnyAlgorithm, asked: Array, source: DerivativeSource | None) -> int:
+    if source is None:
+        raise ValueError(f"algorithm {algorithm.name!r} asks for derivatives, and the problem offers none")
+    if len(asked) != 1:
+        raise ValueError(f"algorithm {algorithm.name!r} asks for derivatives at {len(asked)} points at once, not at 1")
+    return source.price
 
 
 def summarise_batches(batches: Sequence[Batch]) -> Result:
@@ -156,14 +185,15 @@ def summarise_batches(batches: Sequence[Batch]) -> Result:
     best = np.minimum.accumulate(losses)
     improves = np.append(True, losses[1:] < best[:-1])
     holder = np.maximum.accumulate(np.where(improves, np.arange(len(losses)), 0))  # row of the best so far
-    used = np.cumsum([len(batch.X) for batch in batches])
+    last = np.cumsum([len(batch.X) for batch in batches]) - 1  # row of the last point of each batch
+    used = np.cumsum([batch.cost for batch in batches])
     return Result(
         best_x=X[holder[-1]],
         best_fitness=float(best[-1]),
         evaluations=int(used[-1]),
         history_evaluations=used,
-        best_so_far=best[used - 1],
-        best_x_history=X[holder[used - 1]],
+        best_so_far=best[last],
+        best_x_history=X[holder[last]],
         present_best=np.array([batch.present_best for batch in batches]),
         final_state=batches[-1].state,
     )

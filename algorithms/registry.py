@@ -1,6 +1,7 @@
 """Algorithms by name: built-in ones, and third parties' of the entry-point group `armlab.algorithms`.
 
-There are also peers for comparison: algorithms of other packages, which need the extra `peers`.
+There are also peers for comparison: algorithms of other packages, which need the extra `peers`. And there are
+algorithms that ask for derivatives, which not every problem offers.
 
 Names are found without importing anything, so a broken plug-in raises an error only where its name is used.
 """
@@ -42,6 +43,14 @@ _PEERS = {
     "pycma": "algorithms.peers.cma_adapter:Pycma",
 }
 
+_WITH_DERIVATIVES = {
+    "sqp": "algorithms.sqp:SQP",
+    "spso-sqp": "algorithms.sqp:SPSOThenSQP",
+    "ipopt": "algorithms.peers.ipopt_adapter:Ipopt",
+}
+
+_EXTRAS = dict.fromkeys(_PEERS, "peers") | {"ipopt": "derivatives"}
+
 
 class UnknownAlgorithmError(ValueError):
     """No algorithm is registered under that name."""
@@ -52,7 +61,7 @@ class BrokenAlgorithmError(ValueError):
 
 
 def names() -> list[str]:
-    """Registered names, without peers: the built-in ones in the paper's order, then the plug-ins'."""
+    """Names of all that need no derivatives, without peers: the built-in ones in the paper's order, the plug-ins'."""
     plug_ins = sorted(entry.name for entry in entry_points(group=ENTRY_POINT_GROUP))
     return list(dict.fromkeys([*_BUILT_IN, *plug_ins]))
 
@@ -60,6 +69,11 @@ def names() -> list[str]:
 def peer_names() -> list[str]:
     """Names of other packages' algorithms; their packages may be missing."""
     return list(_PEERS)
+
+
+def names_with_derivatives() -> list[str]:
+    """Names of algorithms that ask for derivatives; `ipopt` needs the extra `derivatives`."""
+    return list(_WITH_DERIVATIVES)
 
 
 def load(name: str) -> AnyAlgorithm:
@@ -78,12 +92,14 @@ def load(name: str) -> AnyAlgorithm:
 
 
 def _entries() -> list[EntryPoint]:
-    built_in = [EntryPoint(name, value, ENTRY_POINT_GROUP) for name, value in (_BUILT_IN | _PEERS).items()]
+    built_in = [
+        EntryPoint(name, value, ENTRY_POINT_GROUP) for name, value in (_BUILT_IN | _PEERS | _WITH_DERIVATIVES).items()
+    ]
     return [*built_in, *entry_points(group=ENTRY_POINT_GROUP)]
 
 
 def _name_hint(name: str) -> str:
-    near = get_close_matches(name, [*names(), *peer_names()], n=1)
+    near = get_close_matches(name, [*names(), *peer_names(), *names_with_derivatives()], n=1)
     return f"did you mean {near[0]!r}?" if near else f"choose one of {', '.join(names())}"
 
 
@@ -91,10 +107,10 @@ def _load_entry(entry: EntryPoint) -> AnyAlgorithm:
     try:
         algorithm: AnyAlgorithm = entry.load()
     except ModuleNotFoundError as error:
-        if entry.name not in _PEERS:
+        if entry.name not in _EXTRAS:
             raise _import_failure(entry, error) from error
         missing = f"algorithm {entry.name!r} needs the package {error.name!r}"
-        raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[peers]'") from error
+        raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[{_EXTRAS[entry.name]}]'") from error
     except (ImportError, AttributeError, SyntaxError) as error:
         raise _import_failure(entry, error) from error
     return algorithm

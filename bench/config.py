@@ -79,8 +79,10 @@ class Experiment(Settings):
     """A comparison: every problem x algorithm x swarm size x budget x repetition.
 
     iterations: budget of swarm_size * (iterations + 1) evaluations, the first population included; or evaluations: the
-    budget itself. output: the result files beside the table. printed: show the paper's Table 3 beside ours. executor:
-    where the trials run. trial_timeout_s: a trial that takes longer is ended. The last two change no outcome.
+    budget itself. derivative_price: evaluations that a point with its derivatives counts for; the dimension plus one,
+    as by forward differences, if left out. output: the result files beside the table. printed: show the paper's Table 3
+    beside ours. executor: where the trials run. trial_timeout_s: a trial that takes longer is ended. The last two
+    change no outcome.
     """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
@@ -96,6 +98,7 @@ class Experiment(Settings):
     repetitions: PositiveInt
     seed: Annotated[int, Field(ge=0)]
     bounds: Literal["clip", "reflect", "wrap"] = "clip"
+    derivative_price: PositiveInt | None = None
     output: Literal["table", "convergence", "swarm_sizes", "rivals"] = "table"
     printed: bool = False
     executor: ExecutorSettings | None = None

@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from algorithms.contract import AnyAlgorithm, Box, as_loss
-from algorithms.driver import Result, minimise
+from algorithms.driver import DerivativeSource, Result, minimise
 from algorithms.registry import load
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Derivatives, Question
 from bench.seeds import first_population, own_stream
-from problem.contract import Evaluation, Problem
+from problem.contract import DifferentiableProblem, Evaluation, Problem
 from problem.registry import ProblemSettings
 
 
@@ -29,7 +30,8 @@ from problem.registry import ProblemSettings
 class Trial:
     """One run of one algorithm on one problem; its fields decide the outcome to the bit.
 
-    params: the algorithm's own `Params`. evaluations: the budget. repetition: counts from 0.
+    params: the algorithm's own `Params`. evaluations: the budget. repetition: counts from 0. derivative_price: in
+    evaluations, of a point with its derivatives; None: the dimension plus one, what forward differences take.
     """
 
     problem: ProblemSettings
@@ -40,6 +42,7 @@ class Trial:
     bounds: str
     seed: int
     repetition: int
+    derivative_price: int | None = None
 
     @property
     def problem_text(self) -> str:
@@ -54,6 +57,8 @@ class Trial:
     def key(self, code: str) -> str:
         """SHA-256 of the trial's content and of the code (see `fingerprint`) that would run it."""
         content = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        if self.derivative_price is None:
+            del content["derivative_price"]  # keys of trials without a price of their own stay as they were
         content |= {"problem": self.problem_text, "params": self.params_text, "code": code}
         return hashlib.sha256(canonical(content).encode()).hexdigest()
 
@@ -134,6 +139,12 @@ class _RecordedObjective:
         self.said.append(evaluation)
         return np.asarray(evaluation.fitness, dtype=float)
 
+    def differentiate(self, point: Array, question: Question) -> Derivatives:
+        """Derivatives at a point (d,), for an algorithm that asks for them."""
+        if not isinstance(self.problem, DifferentiableProblem):
+            raise TypeError(f"problem {self.problem.name!r} offers no derivatives")
+        return self.problem.differentiate(point, question)
+
     def column(self, name: str) -> Array:
         """One quantity of all evaluated points in their order (evaluations,)."""
         return np.concatenate([np.asarray(getattr(evaluation, name), float) for evaluation in self.said])
@@ -169,9 +180,9 @@ def _run_search(trial: Trial, tape: _RecordedObjective) -> Result:
     box = Box(tape.problem.lower, tape.problem.upper)
     start = first_population(trial.seed, name, trial.repetition, trial.swarm_size, box)
     rng = own_stream(trial.seed, name, trial.algorithm, trial.params_text, trial.repetition)
-    return minimise(
-        load_algorithm(trial.algorithm), trial.params, tape, box, start, trial.evaluations, rng, trial.bounds
-    )
+    source = DerivativeSource(tape.differentiate, trial.derivative_price or len(box.lower) + 1)
+    algorithm = load_algorithm(trial.algorithm)
+    return minimise(algorithm, trial.params, tape, box, start, trial.evaluations, rng, trial.bounds, source)
 
 
 @lru_cache(maxsize=8)

@@ -14,10 +14,22 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from bench.printed import display_name
 
-# Okabe and Ito 2008: told apart by readers with any colour vision; yellow is left out, too pale for a line.
-_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-_DASHES = ("solid", "dashed", "dashdot", "dotted", (0, (5, 1)), (0, (3, 1, 1, 1, 1, 1)), (0, (1, 1)))
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+# Okabe and Ito 2008: told apart by readers with any colour vision; yellow is left out, too pale for a line. Then grey
+# and four of Tol's muted colours; with as many lines, the markers help.
+_STYLES: tuple[tuple[str, str | tuple[int, tuple[int, ...]], str], ...] = (
+    ("#0072B2", "solid", "o"),
+    ("#D55E00", "dashed", "s"),
+    ("#009E73", "dashdot", "^"),
+    ("#CC79A7", "dotted", "D"),
+    ("#E69F00", (0, (5, 1)), "v"),
+    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1)), "P"),
+    ("#000000", (0, (1, 1)), "X"),
+    ("#999999", "solid", "*"),
+    ("#882255", "dashed", "<"),
+    ("#999933", "dashdot", ">"),
+    ("#332288", "dotted", "p"),
+    ("#AA4499", (0, (5, 1)), "h"),
+)
 DrawPanels = Callable[[Sequence[Axes]], None]
 
 
@@ -31,8 +43,7 @@ class LineStyle(NamedTuple):
 
 def line_style(index: int) -> LineStyle:
     """The style of the index-th algorithm."""
-    place = index % len(_COLORS)
-    return LineStyle(_COLORS[place], _DASHES[place], _MARKERS[place])
+    return LineStyle(*_STYLES[index % len(_STYLES)])
 
 
 def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:

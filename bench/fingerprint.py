@@ -19,7 +19,7 @@ from importlib.util import find_spec, resolve_name
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from algorithms.contract import AnyAlgorithm
+from algorithms.contract import AnyAlgorithm, AsksDerivatives
 from bench.execute import canonical
 from problem.registry import ProblemSettings
 from problem.robot_file import BUILT_IN_FOLDER
@@ -32,6 +32,8 @@ _OUR_PACKAGES = frozenset({"problem", "algorithms", "bench", "armlab"})
 _LOOK_UPS = frozenset({"algorithms.registry", "problem.registry", "armlab"})
 # these check settings, and what they make of them is part of the key already
 _SETTINGS_PACKAGES = frozenset({"annotated_types", "pydantic", "pydantic_core", "yaml"})
+# this computes derivatives, and runs only where an algorithm asks for them
+_DERIVATIVES = "problem.smooth"
 _CODE_SUFFIXES = (".py", ".pyc", *EXTENSION_SUFFIXES)
 
 
@@ -39,18 +41,19 @@ def fingerprint(algorithm: AnyAlgorithm, problem: ProblemSettings) -> str:
     """SHA-256 of the code and data that decide the trials of an algorithm on a problem, wherever the files stand."""
     classes = (algorithm, type(problem))
     parts = [f"root {code.__module__}:{code.__qualname__}" for code in classes]
-    parts += _code_parts([_ROOT, *(code.__module__ for code in classes)])
+    unused = () if issubclass(algorithm, AsksDerivatives) else (_DERIVATIVES,)
+    parts += _code_parts([_ROOT, *(code.__module__ for code in classes)], unused)
     parts += _data_parts(problem)
     return hashlib.sha256("\n".join(sorted(parts)).encode()).hexdigest()
 
 
-def _code_parts(roots: Iterable[str]) -> Iterator[str]:
-    """A line for each module and each package that the roots import, directly or through others."""
+def _code_parts(roots: Iterable[str], unused: Iterable[str]) -> Iterator[str]:
+    """A line for each module and each package that the roots import, directly or through others but the unused ones."""
     queue = deque(roots)
     followed = _OUR_PACKAGES | {_top_package(name) for name in queue}
     for top in followed - _OUR_PACKAGES:
         yield from _package_data(top)
-    found = {*_LOOK_UPS, *_SETTINGS_PACKAGES, *sys.stdlib_module_names}
+    found = {*unused, *_LOOK_UPS, *_SETTINGS_PACKAGES, *sys.stdlib_module_names}
     while queue:
         name = queue.popleft()
         top = _top_package(name)

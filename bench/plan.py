@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, cast, overload
 
-from algorithms.contract import AnyAlgorithm
+from algorithms.contract import AnyAlgorithm, AsksDerivatives
 from algorithms.registry import load, peer_names
 from armlab.common.errors import InputError
 from bench.config import AlgorithmChoice, Experiment, ProblemChoice, find_algorithm, parse_params
 from bench.execute import Trial, build_problem
 from bench.fingerprint import fingerprint
+from problem.contract import why_not_differentiable
 from problem.registry import ProblemSettings, parse_problem
 
 
@@ -95,6 +96,8 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
     """
     problems = [(choice.label, _parse_problem(choice, where)) for choice in experiment.problem]
     contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
+    for (label, problem), contestant in product(problems, contestants):
+        _check_derivatives(label, problem, contestant, where)
     codes = {
         (label, contestant.label): fingerprint(contestant.algorithm, problem)
         for (label, problem), contestant in product(problems, contestants)
@@ -136,6 +139,16 @@ def _make_contestant(choice: AlgorithmChoice, where: str) -> _Contestant:
     return _Contestant(choice.label or choice.name, algorithm, choice.name, params)
 
 
+def _check_derivatives(label: str, problem: ProblemSettings, contestant: _Contestant, where: str) -> None:
+    if not issubclass(contestant.algorithm, AsksDerivatives):
+        return
+    reason = why_not_differentiable(build_problem(problem))
+    if reason:
+        raise InputError(
+            f"'{contestant.label}' in {where} asks for derivatives, and problem '{label}' offers none: {reason}"
+        )
+
+
 def _first_trial(
     experiment: Experiment, problem: ProblemSettings, contestant: _Contestant, swarm_size: int, evaluations: int
 ) -> Trial:
@@ -148,6 +161,7 @@ def _first_trial(
         bounds=experiment.bounds,
         seed=experiment.seed,
         repetition=0,
+        derivative_price=experiment.derivative_price if issubclass(contestant.algorithm, AsksDerivatives) else None,
     )
 
 

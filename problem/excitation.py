@@ -10,12 +10,14 @@ from functools import cached_property
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Derivatives, Question
 from problem.arm import Arm
 from problem.base_parameters import BaseParameters
-from problem.contract import Evaluation, Problem
+from problem.contract import DifferentiableProblem, Evaluation, Problem, why_not_differentiable
 from problem.fitness import Criterion, condition_number, singular_values
 from problem.limits import Constraints
 from problem.motion import Motion
+from problem.smooth import LimitRows, differentiate
 from problem.trajectories import Trajectory, sample_instants
 
 
@@ -80,6 +82,23 @@ class ExcitationProblem:
         """Instants (samples,) at which a trajectory is judged, s."""
         return sample_instants(self.duration, self.samples)
 
+    @property
+    def no_derivatives_because(self) -> str:
+        """Why there are no derivatives; empty where there are."""
+        if not self.spectral:
+            return "its value is no function of the singular values"
+        if any(np.isfinite(limit.torque) for limit in self.constraints.limits):
+            return "derivatives of a torque limit are not known"
+        return "derivatives of a workspace limit are not known" if self.constraints.workspace.limited else ""
+
+    def differentiate(self, point: Array, question: Question) -> Derivatives:
+        """Derivatives at a point (dimension,): of a smooth criterion, and of distances to limits at the samples."""
+        return differentiate(self, self._limit_rows, point, question)
+
+    @cached_property
+    def _limit_rows(self) -> LimitRows:
+        return LimitRows(self)
+
     def evaluate(self, points: Array) -> Evaluation:
         """Fitness, condition number and violation of points (points, dimension).
 
@@ -126,6 +145,17 @@ class ShiftedProblem:
     def evaluate(self, points: Array) -> Evaluation:
         """Results of the points (points, dimension) in the problem's own coordinates."""
         return self.problem.evaluate(points - self.shift)
+
+    @property
+    def no_derivatives_because(self) -> str:
+        """Why there are no derivatives; empty where there are."""
+        return why_not_differentiable(self.problem)
+
+    def differentiate(self, point: Array, question: Question) -> Derivatives:
+        """Derivatives at a point (dimension,); a shift changes none. Raises TypeError if there are none."""
+        if not isinstance(self.problem, DifferentiableProblem):
+            raise TypeError(f"{self.name} {why_not_differentiable(self.problem)}")
+        return self.problem.differentiate(point - self.shift, question)
 
 
 def shift_randomly(problem: Problem, seed: int) -> ShiftedProblem:

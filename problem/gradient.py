@@ -14,16 +14,19 @@ of truncation: d sigma_i = u_i' dW v_i gives the rest. There is no second implem
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from problem.arm import Arm
-from problem.excitation import ExcitationProblem
 from problem.motion import Motion
 from problem.regressor import observation_matrix
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
+
+if TYPE_CHECKING:
+    from problem.excitation import ExcitationProblem  # which stands on this module
 
 Complex = NDArray[np.complex128]
 
@@ -141,7 +144,7 @@ _TRIGONOMETRIC_STENCIL = (
 _QUADRATIC_STENCIL = ((1.0, 0.5), (-1.0, -0.5))  # exact for a polynomial of degree 2, whatever the step
 
 
-def condition_gradient(problem: ExcitationProblem, point: Array) -> tuple[float, Array]:
+def condition_gradient(problem: "ExcitationProblem", point: Array) -> tuple[float, Array]:
     """Condition number of a point (dimension,) and its gradient (dimension,), without weights and penalty.
 
     Where the largest or the smallest singular value is a multiple one, this is one of several
@@ -158,12 +161,24 @@ def condition_with_derivatives(values: Array) -> tuple[float, Array]:
     return float(values[0] / values[-1]), slope
 
 
-def spectral_gradient(problem: ExcitationProblem, point: Array, function: SpectralFunction) -> tuple[float, Array]:
+def motion_of(problem: "ExcitationProblem", point: Array) -> Motion:
+    """The motion (samples, joints) of a point (dimension,)."""
+    return problem.trajectory.motions(point[None], problem.times).motion.select(np.intp(0))
+
+
+def spectral_gradient(problem: "ExcitationProblem", point: Array, function: SpectralFunction) -> tuple[float, Array]:
     """A function of the singular values of a point's observation matrix, and its gradient (dimension,)."""
-    motion = problem.trajectory.motions(point[None], problem.times).motion.select(np.intp(0))
+    motion = motion_of(problem, point)
+    basis = tangents(problem.trajectory, motion, point, problem.times)
+    return spectral_gradient_along(problem, motion, basis, function)
+
+
+def spectral_gradient_along(
+    problem: "ExcitationProblem", motion: Motion, basis: Array, function: SpectralFunction
+) -> tuple[float, Array]:
+    """The same for a motion (samples, joints) with its tangents (3, dimension, samples, joints)."""
     value, weights = _matrix_weights(problem, motion, function)
     slopes = motion_gradient(problem.arm, motion, weights)
-    basis = tangents(problem.trajectory, motion, point, problem.times)
     return value, np.tensordot(basis, slopes, axes=([0, 2, 3], [0, 1, 2]))
 
 
@@ -192,7 +207,7 @@ def motion_gradient(arm: Arm, motion: Motion, weights: Array) -> Array:
     return slopes
 
 
-def _matrix_weights(problem: ExcitationProblem, motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
+def _matrix_weights(problem: "ExcitationProblem", motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
     """The function's value and its derivative with respect to each entry of the whole observation matrix."""
     columns = problem.base.columns
     whole = observation_matrix(problem.arm, motion)

@@ -149,6 +149,7 @@ def list_names() -> None:
 
     click.echo("algorithms: " + ", ".join(algorithms.names()))
     click.echo("peers (extra `peers`): " + ", ".join(algorithms.peer_names()))
+    click.echo("with derivatives: " + ", ".join(algorithms.names_with_derivatives()))
     click.echo("problems: " + ", ".join(problems.names()))
     for suite in suites():
         click.echo(f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first")
@@ -242,6 +243,29 @@ def share(results: Path, store: Path, form: str, out: Path) -> None:
 
 
 @click.command()
+@click.argument("results", type=_PATH)
+@_STORE_OPTION
+@click.option("--out", type=_PATH, required=True, help="Folder to write into.")
+@click.option(
+    "--records",
+    type=_PATH,
+    default=Path("results/best_known.json"),
+    show_default=True,
+    help="File of the best known trajectories.",
+)
+def draw(results: Path, store: Path, out: Path, records: Path) -> None:
+    """Draw RESULTS: ends, ranking, budgets.
+
+    Writes PNG and SVG: every end with median and best known, the ranks over problems, and the medians against the
+    budget, as they fit. RESULTS: a configuration file whose trials were run, or a folder that `share` wrote.
+    """
+    from bench.result_sets.draw import draw_results
+
+    for path in draw_results(results, store, records, out):
+        click.echo(path)
+
+
+@click.command()
 @click.argument("damaged", type=_PATH)
 @click.option("--out", type=_PATH, required=True, help="File of the new store.")
 def salvage(damaged: Path, out: Path) -> None:
@@ -285,6 +309,31 @@ def best_known(minutes: float, problem: str | None, results: Path) -> None:
 
     for line in improve_best_known(results, minutes, problem):
         click.echo(line)
+
+
+@click.command()
+@click.argument("algorithms", nargs=-1)
+@click.option("--config", type=_PATH, default=Path("configs/tune.yaml"), show_default=True)
+@click.option("--budget", type=click.IntRange(min=2), help="Configurations an algorithm [default: the file's].")
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
+@_STORE_OPTION
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/tune"), show_default=True)
+def tune(
+    algorithms: tuple[str, ...], config: Path, budget: int | None, workers: int | None, store: Path, results: Path
+) -> None:
+    """Tune ALGORITHMS, the same budget for each [default: all].
+
+    Tries hyper-parameters on training problems and judges the best ones on problems that took no part, beside the
+    published ones. You can stop it at any time; the next call continues from there. Needs the extra `tune`.
+    """
+    from joblib import cpu_count
+
+    from bench.studies.tuning.study import TuningOptions, tune_algorithms
+
+    records = Path("results/best_known.json")
+    options = TuningOptions(algorithms, budget, store, results, records, workers or cpu_count())
+    for path in tune_algorithms(config, options, trial_bar):
+        click.echo(path)
 
 
 @click.command("does-it-help")

@@ -186,3 +186,9 @@ def _check_node(node: yaml.Node, where: str) -> None:
         if (key.tag, key.value) in seen:
             raise InputError(f"{where}, line {key.start_mark.line + 1}: key {key.value!r} stands there twice")
         seen.add((key.tag, key.value))
+
+
+def settings_to_yaml(settings: Settings) -> str:
+    """The full settings as YAML text."""
+    text: str = yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+    return text

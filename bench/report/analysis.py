@@ -139,13 +139,6 @@ def _summarise_progress(runs: Sequence[Run], moments: Array, targets: Array, bud
     )
 
 
-def block_losses(cells: list[Cell]) -> pd.DataFrame:
-    """Losses to rank: one row a problem, medians of log10; with one problem only, one row a repetition."""
-    if len(cells) == 1:
-        return pd.DataFrame(cells[0].losses)
-    return pd.DataFrame([{name: float(np.median(ends)) for name, ends in cell.losses.items()} for cell in cells])
-
-
 def _best_at(run: Run, moments: Array) -> Array:
     """The best so far at moments (moments,)."""
     place = np.searchsorted(run.evaluations, moments, side="right") - 1

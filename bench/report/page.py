@@ -17,11 +17,11 @@ from algorithms.registry import names as registered
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
 from bench.report import sections
-from bench.report.analysis import Cell, analyse_cells, block_losses, share_of_targets_reached
+from bench.report.analysis import Cell, analyse_cells, share_of_targets_reached
 from bench.report.ranking_chart import chart_style
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
-from bench.statistics.critical_difference import critical_difference
+from bench.statistics.critical_difference import block_losses, critical_difference
 from bench.statistics.performance import performance_profile
 from bench.studies.properties import AlgorithmProperties, properties_of_algorithms
 
@@ -81,7 +81,7 @@ _SCRIPTS = ("scales.js", "lines.js", "boxes.js", "page.js")
 def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[AlgorithmProperties]) -> str:
     """The page as HTML; facts: properties of the algorithms that took part and are registered here."""
     looks = {name: chart_style(index) for index, name in enumerate(results.algorithms)}
-    found = critical_difference(block_losses(list(cells)))
+    found = critical_difference(block_losses([cell.losses for cell in cells]))
     parts = [
         sections.header_section(results, cells, found),
         sections.algorithm_buttons(looks),

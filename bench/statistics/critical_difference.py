@@ -1,5 +1,6 @@
 """Average ranks over many problems, and groups of algorithms without a significant difference."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -44,6 +45,16 @@ def critical_difference(losses: pd.DataFrame, rate: float = ERROR_RATE) -> Criti
     return CriticalDifference(
         ranks, p, indistinguishable_groups(list(ranks), p, rate), _friedman_p(losses), len(losses)
     )
+
+
+def block_losses(losses: Sequence[Mapping[str, Array]]) -> pd.DataFrame:
+    """Losses to rank, from those of each problem by algorithm (repetitions,), as `log_losses` gives them.
+
+    One row a problem, medians; with one problem only, one row a repetition.
+    """
+    if len(losses) == 1:
+        return pd.DataFrame(losses[0])
+    return pd.DataFrame([{name: float(np.median(ends)) for name, ends in one.items()} for one in losses])
 
 
 def average_ranks(losses: pd.DataFrame) -> dict[str, float]:

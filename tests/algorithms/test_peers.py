@@ -10,7 +10,7 @@ from algorithms import registry
 from algorithms.check import check_algorithm
 from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
-from algorithms.peers.peer import Conversation
+from algorithms.peers.peer import Answer, Conversation
 from algorithms.registry import BrokenAlgorithmError, load, names, peer_names
 
 BOX = Box(np.full(4, -4.0), np.full(4, 6.0))
@@ -123,10 +123,10 @@ def test_a_loop_asks_is_answered_and_ends():
         evaluate(np.array([[3.0]]))
 
     conversation = Conversation(loop)
-    assert conversation.asked.tolist() == [[1.0], [2.0]]
-    conversation.answer(np.array([10.0, 20.0]))
-    assert conversation.asked.tolist() == [[3.0]]
-    conversation.answer(np.array([30.0]))
+    assert conversation.asked.points.tolist() == [[1.0], [2.0]]
+    conversation.answer(Answer(np.array([10.0, 20.0]), None))
+    assert conversation.asked.points.tolist() == [[3.0]]
+    conversation.answer(Answer(np.array([30.0]), None))
     assert conversation.asked is None
 
 
@@ -137,7 +137,7 @@ def test_an_error_in_the_loop_reaches_the_one_who_answers():
 
     conversation = Conversation(loop)
     with pytest.raises(ZeroDivisionError, match="in the loop"):
-        conversation.answer(np.zeros(1))
+        conversation.answer(Answer(np.zeros(1), None))
 
 
 def test_a_loop_that_asks_on_after_it_was_given_up_ends_too():

@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 from refusals import refusal
 
-from bench.studies.best_known.descent import (
-    LIMIT_MARGIN,
-    LimitRows,
-    descend,
-    evaluate_point,
-    motion_of,
-    smooth_log_condition,
-)
+from bench.studies.best_known.descent import descend, evaluate_point
 from bench.studies.best_known.records import (
     RECORDS_FILE,
     Record,
@@ -143,21 +136,6 @@ def test_a_random_step_from_the_end_of_a_descent_is_no_better() -> None:
     assert np.all(near.value[near.violation == 0] > end.value * (1 - 1e-6))
 
 
-def test_distances_are_negative_exactly_where_a_limit_is_broken() -> None:
-    problem = tiny()
-    points = np.random.default_rng(2).uniform(problem.lower, problem.upper, (60, len(problem.lower)))
-    nearest = [LimitRows(problem, LIMIT_MARGIN).distances(motion_of(problem, point)).min() for point in points]
-    assert np.array_equal(np.array(nearest) < 0, problem.evaluate(points).violation > 0)
-
-
-def test_the_smoothed_condition_number_of_4_2_1_by_hand_and_its_limit() -> None:
-    values = np.array([4.0, 2.0, 1.0])
-    value, slope = smooth_log_condition(1.0)(values)
-    assert value == pytest.approx(np.log(4 + 2 + 1) + np.log(1 / 4 + 1 / 2 + 1))
-    assert slope == pytest.approx([1 / 7 - 1 / 7 / 4, 1 / 7 - 1 / 7, 1 / 7 - 4 / 7])
-    assert smooth_log_condition(1e6)(values)[0] == pytest.approx(np.log(4.0))
-
-
 def test_the_gap_does_not_depend_on_what_leaves_a_trajectory_as_good_as_it_is(tmp_path: Path) -> None:
     record = Record(
         settings=settings_of(preset="joint-fourier").model_dump(mode="json"),
@@ -180,6 +158,15 @@ def test_the_gap_does_not_depend_on_what_leaves_a_trajectory_as_good_as_it_is(tm
     assert [gap_to_best_known(settings, 10.0, known) for settings in same] == [0.25] * 3
     assert gap_to_best_known(settings_of(preset="joint-fourier", rest=True), 10.0, known) is None
     assert gap_to_best_known(settings_of(preset="sphere"), 10.0, known) is None
+
+
+def test_a_problem_of_a_suite_has_the_record_of_its_definition() -> None:
+    known = records_by_problem(ROOT / "results" / RECORDS_FILE)
+    gaps = [
+        gap_to_best_known(settings_of(**settings), 100.0, known)
+        for settings in ({"preset": "suite-2/irb120-all-si"}, {"preset": "joint-fourier", "arm": "irb120"})
+    ]
+    assert gaps[0] == gaps[1] is not None
 
 
 def test_each_mistake_is_told_in_one_line(tmp_path: Path, plan: Callable[[str], Path]) -> None:

@@ -223,3 +223,11 @@ def test_a_problem_of_a_third_party_is_the_code_that_it_imports_and_its_data(
     assert _print("de", {"preset": "theirs"}) == before
     (package / file).write_text(text)
     assert (_print("de", {"preset": "theirs"}) != before) == matters
+
+
+@pytest.mark.parametrize("file", ["problem/smooth.py", "problem/gradient.py"])
+def test_derivatives_decide_only_the_trials_that_ask_for_them(tree: Path, file: str) -> None:
+    before = [_print(name, ARM) for name in ("spso", "sqp")]
+    _edit(tree / file, "import numpy as np", "import numpy as np\nFACTOR = 2")
+    after = [_print(name, ARM) for name in ("spso", "sqp")]
+    assert (after[0] == before[0], after[1] == before[1]) == (True, False)

@@ -25,6 +25,7 @@ SMALLER = {
 EXPECTED = {
     *(f"table{n}.{suffix}" for n in (1, 2, 3, 4) for suffix in ("csv", "md", "settings.yaml")),
     *(f"figure{n}.{suffix}" for n in (2, 3, 4, 5) for suffix in ("png", "svg", "settings.yaml")),
+    *(f"{name}.{suffix}" for name in ("table3", "ranking") for suffix in ("png", "svg")),
     "ranking_duels.csv",
     "replication.md",
     "replication.html",

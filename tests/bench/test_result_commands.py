@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 from small_results import Ran, ran
 
-from armlab.cli.harness import compare, report, share
+from armlab.cli.harness import compare, draw, report, share
 from bench.config import read_experiment
 from bench.plan import plan_trials
 from bench.store import open_store
@@ -35,6 +35,8 @@ def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run
     assert (tmp_path / "results" / "small_report.html").exists()
     done = shell.invoke(compare, ["tables", "tables"], catch_exceptions=False)
     assert "6 not told apart" in done.output
+    done = shell.invoke(draw, ["tables", "--out", "pictures", "--records", "none.json"], catch_exceptions=False)
+    assert "pictures/small_ranking.png" in done.output
     assert not (tmp_path / ".armlab").exists()
 
 

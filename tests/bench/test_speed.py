@@ -52,6 +52,7 @@ def test_the_page_shows_the_ratio_and_every_rival() -> None:
             "largest_relative_difference": 1e-14,
         },
         "evaluations_per_second": {"paper": 1e5},
+        "derivative_price": {"paper": {"stated": 8, "in_population": 61.4, "single": 9.2, "us": 812.0}},
         "overhead_us": {"spso": {"armlab, one": 1.2, "pygmo, one": 1.6}},
         "growth_us": {"samples": {"50": 5.0}},
         "provenance": {"processor": "a processor"},

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bench.comparison_figures import draw_budgets, draw_ends, draw_ranking
 from bench.config import Experiment, read_experiment
 from bench.execute import Curves, Outcome
 from bench.figures import draw_convergence, draw_cost, draw_times
@@ -118,3 +119,38 @@ def test_convergence_can_be_drawn_where_nothing_is_feasible_at_first() -> None:
         }
     )
     assert set(draw_convergence(table)) == {"png", "svg"}
+
+
+def _comparison(problems: int, algorithms: tuple[str, ...] = ("mupso", "de", "sqp")) -> pd.DataFrame:
+    """Ends of seven repetitions: the later the algorithm, the better; the first end of the last is infeasible."""
+    rng = np.random.default_rng(1)
+    frames = []
+    for problem in range(problems):
+        for place, algorithm in enumerate(algorithms):
+            values = (20.0 - 4 * place + rng.random(7)).tolist()
+            broken = [1.0 if algorithm == "sqp" else 0.0, *[0.0] * 6]
+            frames.append(_frame(values, broken, algorithm=algorithm, problem=f"problem-{problem}"))
+    return pd.concat(frames, ignore_index=True)
+
+
+def test_the_figure_of_ends_says_what_is_infeasible_and_names_every_algorithm() -> None:
+    images = draw_ends(_comparison(2), {"problem-0": 9.0})
+    text = images["svg"].decode()
+    assert text.count("<!-- 1 of 7 infeasible -->") == 2
+    assert [f"<!-- {name} -->" in text for name in ("MuPSO", "DE", "sqp", "best known")] == [True] * 4
+    assert images == draw_ends(_comparison(2), {"problem-0": 9.0})
+
+
+def test_the_figure_of_ranks_orders_by_average_rank_and_says_when_nothing_can_be_told() -> None:
+    text = draw_ranking(_comparison(3))["svg"].decode()
+    assert text.index("<!-- sqp -->") < text.index("<!-- DE -->") < text.index("<!-- MuPSO -->")
+    assert "in 3 problems, too few to tell any two apart" in text
+    many = draw_ranking(_comparison(12))["svg"].decode()
+    assert "<!-- rank (1: best) in 12 problems -->" in many
+    assert "repetitions" in draw_ranking(_comparison(1))["svg"].decode()
+
+
+def test_the_figure_of_budgets_has_a_tick_for_each_budget() -> None:
+    frame = pd.concat([_comparison(1).assign(budget=budget) for budget in (1550, 5000)], ignore_index=True)
+    text = draw_budgets(frame, {"problem-0": 9.0})["svg"].decode()
+    assert ["<!-- 1,550 -->" in text, "<!-- 5,000 -->" in text, "<!-- best known -->" in text] == [True] * 3

@@ -45,6 +45,7 @@ def test_the_key_of_a_trial_is_this_one_for_ever() -> None:
         replace(TRIAL, bounds="wrap"),
         replace(TRIAL, seed=2025),
         replace(TRIAL, repetition=1),
+        replace(TRIAL, derivative_price=5),
     ],
 )
 def test_whatever_changes_the_outcome_changes_the_key(other: Trial) -> None:

@@ -16,6 +16,7 @@ from bench.execute import canonical
 from bench.plan import Entry
 from problem.excitation import ExcitationProblem
 from problem.registry import ProblemSettings, parse_problem
+from problem.suite import InstanceSettings, definition_of
 
 
 class SearchPlan(Settings):
@@ -126,6 +127,8 @@ _IGNORED_SETTINGS = ("criterion", "penalty", "frame_seed")  # they change neithe
 
 def record_key(settings: ProblemSettings) -> str:
     """Canonical text of the settings that decide the values and limits of a problem: equal text, equal best."""
+    if isinstance(settings, InstanceSettings):
+        settings = definition_of(settings.preset)
     kept = {name: value for name, value in settings.model_dump(mode="json").items() if name not in _IGNORED_SETTINGS}
     if kept["preset"] == "random-frame":
         kept["preset"] = "joint-fourier"  # the same trajectories in other coordinates
@@ -155,7 +158,12 @@ def _record_settings(record: Record) -> dict[str, Any]:
 
 
 def best_known_values(entries: Sequence[Entry], records: Path) -> dict[str, float]:
-    """By the problem's label; problems without a record are left out."""
+    """By the label of the entry's problem; problems without a record are left out."""
+    return known_values({entry.problem: entry.trial.problem for entry in entries}, records)
+
+
+def known_values(problems: Mapping[str, ProblemSettings], records: Path) -> dict[str, float]:
+    """Best known condition numbers by label; problems without a record are left out."""
     known = records_by_problem(records)
-    keys = {entry.problem: record_key(entry.trial.problem) for entry in entries}
+    keys = {label: record_key(settings) for label, settings in problems.items()}
     return {label: known[key].value for label, key in keys.items() if key in known}

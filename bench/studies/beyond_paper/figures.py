@@ -6,63 +6,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
 from bench.figures import line_style, render_figure, render_panels
 from bench.printed import display_name
-from bench.tables import GROUP_COLUMNS, summary_table
-
-_TICK_MULTIPLES = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 7)
-
-
-def draw_budgets(frame: pd.DataFrame) -> dict[str, bytes]:
-    """Median and quartiles against the budget, a panel a problem, each with its own scale; PNG and SVG bytes."""
-    problems = list(frame["problem"].unique())
-
-    def fill(figure: Figure) -> None:
-        panels = figure.subplots(1, len(problems), squeeze=False)[0]
-        for axes, problem in zip(panels, problems, strict=True):
-            _draw_budget_panel(axes, frame[frame["problem"] == problem])
-            axes.set(title=problem, xlabel="budget of a run (evaluations)", xscale="log", yscale="log")
-            axes.yaxis.set_major_locator(LogLocator(subs=_TICK_MULTIPLES))  # powers of ten alone may be out of range
-            axes.yaxis.set_major_formatter("{x:g}")
-            axes.yaxis.set_minor_locator(NullLocator())
-            axes.xaxis.set_minor_formatter(NullFormatter())
-        panels[0].set_ylabel("condition number, median and quartiles (-)")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4 * len(problems))
-
-    return render_figure((2 + 4.2 * len(problems), 4.6), fill)
-
-
-def _draw_budget_panel(axes: Axes, frame: pd.DataFrame) -> None:
-    """Medians that are infinite, where most ends are infeasible, are left out."""
-    budgets = frame.drop_duplicates(GROUP_COLUMNS)["budget"].to_numpy()  # in the order of the summary
-    table = summary_table(frame).assign(budget=budgets)
-    for index, (label, group) in enumerate(table.groupby("algorithm", sort=False)):
-        color, linestyle, marker = _line_style(index)
-        rows = group[np.isfinite(group["median"])]
-        middle = rows["median"].to_numpy()
-        ends = np.abs(rows[["lower_quartile", "upper_quartile"]].to_numpy().T - middle)
-        shift = 1 + 0.03 * (index - 3.5)  # keeps the bars of neighbours apart
-        axes.errorbar(
-            rows["budget"] * shift,
-            middle,
-            yerr=np.where(np.isfinite(ends), ends, 0.0),
-            label=display_name(str(label)),
-            color=color,
-            linestyle=linestyle,
-            marker=marker,
-            markersize=4,
-            linewidth=1.2,
-            elinewidth=0.8,
-        )
-
-
-def _line_style(index: int) -> tuple[str, str | tuple[int, tuple[int, ...]], str]:
-    """As in every figure; the eighth line is grey, since the palette has seven colours."""
-    color, linestyle, marker = line_style(index)
-    return ("#999999", "solid", "*") if index == 7 else (color, linestyle, marker)
+from bench.tables import summary_table
 
 
 def draw_ingredients(table: pd.DataFrame) -> dict[str, bytes]:

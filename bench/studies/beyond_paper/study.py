@@ -68,17 +68,18 @@ def _read_outcomes(loaded: Mapping[str, LoadedExperiment], options: RunOptions) 
 
 
 def _make_files(outcomes: _Outcomes, records: Path, workers: int) -> Files:
-    from bench.studies.beyond_paper.figures import draw_budgets, draw_ingredients, draw_swarm_sizes
+    from bench.comparison_figures import draw_budgets
+    from bench.studies.beyond_paper.figures import draw_ingredients, draw_swarm_sizes
 
     frames = outcomes.frames
     duels = {name: _duels_table(name, frame) for name, frame in frames.items()}
     mutations = mutation_table(outcomes.entries[VARIANTS_EXPERIMENT], workers)
+    known = {name: best_known_values(entries, records) for name, entries in outcomes.entries.items()}
     figures = {
-        "study_budgets": draw_budgets(frames["study_budgets"]),
+        "study_budgets": draw_budgets(frames["study_budgets"], known["study_budgets"]),
         "study_equal_evaluations": draw_swarm_sizes(frames["study_equal_evaluations"]),
         VARIANTS_EXPERIMENT: draw_ingredients(duels[VARIANTS_EXPERIMENT]),
     }
-    known = {name: best_known_values(entries, records) for name, entries in outcomes.entries.items()}
     shown = {name: median_table(frame, known[name]) for name, frame in frames.items()} | {
         VARIANTS_EXPERIMENT: effect_table(duels[VARIANTS_EXPERIMENT])
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 import pandas as pd
 
 from armlab.common.files import write_whole
-from armlab.common.settings import Settings
+from armlab.common.settings import Settings, settings_to_yaml
 from bench.printed import read_printed
 from bench.run import LoadedExperiment, ProgressBar, RunOptions, describe_run, load_experiment, run_experiment
 from bench.store import open_store
@@ -24,7 +24,6 @@ from bench.studies.paper.settings import (
     Table4Settings,
     TrajectorySettings,
     read_settings,
-    settings_to_yaml,
 )
 from bench.studies.paper.tables import make_table1, make_table2, make_table4, table1_deviations, table2_differences
 from bench.tables import as_csv, tidy_frame
@@ -56,7 +55,7 @@ def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressB
     for name in EXPERIMENTS:
         yield from run_experiment(configs / f"{name}.yaml", options, bar)
     evidence = _gather_evidence(items, loaded, options, records)
-    files = _make_files(items, loaded, evidence) | _settings_files(items)
+    files = _make_files(items, loaded, evidence, records) | _settings_files(items)
     yield from _write_files(options.results, files)
     yield from _write_files(options.results, _report_files(evidence, options.results))
 
@@ -109,10 +108,16 @@ def _replay_subject(loaded: LoadedExperiment, workers: int) -> dict[str, list[Mu
     return {reading: replay_mutations(runs, workers, stagnation=reading) for reading in STAGNATION_READINGS}
 
 
-def _make_files(items: _ItemSettings, loaded: Mapping[str, LoadedExperiment], evidence: Evidence) -> Files:
+def _make_files(
+    items: _ItemSettings, loaded: Mapping[str, LoadedExperiment], evidence: Evidence, records: Path
+) -> Files:
+    from bench.comparison_figures import draw_ends, draw_ranking
     from bench.studies.paper.figures import draw_figure4, draw_figure5
 
+    known = best_known_values(loaded["table3"].entries, records)
     figures = {
+        "table3": draw_ends(evidence.frames["table3"], known),
+        "ranking": draw_ranking(evidence.frames["ranking"]),
         items.figure4.name: draw_figure4(items.figure4, evidence.best),
         items.figure5.name: draw_figure5(items.figure5, evidence.best),
     }

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Annotated, Self, TypeVar
 
-import yaml
 from annotated_types import Ge, Gt, Len
 from pydantic import model_validator
 
@@ -71,9 +70,3 @@ class Table4Settings(Settings):
 def read_settings(model: type[AnySettings], path: Path) -> AnySettings:
     """The settings in a YAML file; raises InputError, in one line, for any mistake in it."""
     return validate(model, read_yaml(path), str(path))
-
-
-def settings_to_yaml(settings: Settings) -> str:
-    """The full settings as YAML text."""
-    text: str = yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
-    return text

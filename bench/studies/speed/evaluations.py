@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.derivatives import Question
 from bench.studies.speed.clock import median_seconds
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
-from problem.contract import Problem
+from problem.contract import DifferentiableProblem, Problem
 from problem.fitness import condition_number, singular_values
 from problem.motion import Motion
 from problem.registry import parse_problem
@@ -110,6 +111,49 @@ def evaluations_per_second(swarm_size: int = 50) -> dict[str, float]:
     """Whole evaluations a second of each preset on one core, in populations of `swarm_size`."""
     tasks = {name: _evaluation_task(_build_problem(preset=name), swarm_size) for name in PRESETS}
     return {name: swarm_size / seconds for name, seconds in median_seconds(tasks, EVALUATION_ROUNDS).items()}
+
+
+DERIVATIVE_PROBLEMS: Mapping[str, Mapping[str, object]] = {
+    "paper": {"preset": "paper"},
+    "joint-fourier": {"preset": "joint-fourier"},
+    "joint-fourier, six joints": {"preset": "joint-fourier", "arm": "irb120"},
+    "joint-fourier, seven joints": {
+        "preset": "joint-fourier",
+        "arm": "unisa-panda",
+        "limits": {"torque": "none", "acceleration": None},
+    },
+}
+_WATCH = 0.3  # as `sqp` asks
+
+
+def price_of_derivatives() -> dict[str, dict[str, float]]:
+    """What a point with derivatives costs in evaluations: as stated in experiments, and as measured now.
+
+    Measured against an evaluation in a population of 50, and against one of a single point.
+    """
+    return {name: _measure_price(_build_problem(**settings)) for name, settings in DERIVATIVE_PROBLEMS.items()}
+
+
+def _measure_price(problem: Problem) -> dict[str, float]:
+    if not isinstance(problem, DifferentiableProblem):
+        raise TypeError(f"problem {problem.name!r} offers no derivatives")
+    rng = np.random.default_rng(0)
+    population = rng.uniform(problem.lower, problem.upper, (POPULATION_SIZE, len(problem.lower)))
+    best = population[np.argmin(problem.evaluate(population).fitness)]
+    question = Question(10.0, np.zeros(0, dtype=np.intp), _WATCH)
+    tasks: dict[str, Callable[[], object]] = {
+        "population": lambda: problem.evaluate(population),
+        "single": lambda: problem.evaluate(best[None]),
+        "derivatives": lambda: problem.differentiate(best, question),
+    }
+    seconds = median_seconds(tasks, EVALUATION_ROUNDS)
+    whole = seconds["single"] + seconds["derivatives"]
+    return {
+        "stated": len(problem.lower) + 1,
+        "in_population": whole / (seconds["population"] / POPULATION_SIZE),
+        "single": whole / seconds["single"],
+        "us": 1e6 * whole,
+    }
 
 
 def growth_with_samples() -> dict[str, float]:

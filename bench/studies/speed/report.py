@@ -14,6 +14,7 @@ from bench.studies.speed.evaluations import (
     growth_with_joints,
     growth_with_samples,
     growth_with_swarm_size,
+    price_of_derivatives,
 )
 from bench.studies.speed.overhead import measure_overheads
 
@@ -23,6 +24,7 @@ def measure_speed() -> dict[str, Any]:
     return {
         "condition_number": compare_with_pinocchio(),
         "evaluations_per_second": evaluations_per_second(),
+        "derivative_price": price_of_derivatives(),
         "overhead_us": measure_overheads(),
         "growth_us": {
             "samples": growth_with_samples(),
@@ -57,6 +59,14 @@ def speed_page(figures: Mapping[str, Any]) -> str:
             f"difference of the results: {condition['largest_relative_difference']:.1e}.\n",
             "## Whole evaluations a second\n",
             markdown_table(["preset", "evaluations a second"], [(name, f"{rate:.0f}") for name, rate in rates.items()]),
+            "\n## Price of derivatives\n",
+            "A point with its derivatives, in evaluations: as experiments count it (the dimension plus one, what "
+            "forward differences take), and as measured against an evaluation in a population of 50, and against one "
+            "alone.\n",
+            markdown_table(
+                ["problem", "stated", "measured, population of 50", "measured, one alone", "us"],
+                _price_rows(figures["derivative_price"]),
+            ),
             "\n## Overhead of the algorithms\n",
             "Microseconds an evaluation on the sphere, 15 dimensions, 50 points, 30 iterations, the objective's time "
             "included; one: one point at a time, all: the population at once.\n",
@@ -75,6 +85,13 @@ def _condition_rows(condition: Mapping[str, float]) -> list[tuple[str, ...]]:
         ("armlab, population of 50", f"{condition['armlab_us']:.1f}"),
         ("armlab, one at a time", f"{condition['armlab_one_at_a_time_us']:.1f}"),
         ("Pinocchio regressor, numpy.linalg.cond", f"{condition['pinocchio_us']:.1f}"),
+    ]
+
+
+def _price_rows(prices: Mapping[str, Mapping[str, float]]) -> list[tuple[str, ...]]:
+    return [
+        (name, *(f"{price[key]:.0f}" for key in ("stated", "in_population", "single", "us")))
+        for name, price in prices.items()
     ]
 
 

@@ -1,0 +1,190 @@
+"""Figures of a comparison: every end of one problem, the ranking over many, and the medians against the budget."""
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+
+from armlab.common.arrays import Array
+from armlab.common.streams import named_generator
+from bench.figures import line_style, render_figure
+from bench.printed import display_name
+from bench.statistics import is_feasible, quantile
+from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
+from bench.statistics.pairwise import log_losses
+from bench.tables import GROUP_COLUMNS, summary_table
+
+_TICK_MULTIPLES = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.5, 3, 4, 5, 7)
+
+
+_ROW_HEIGHT = 0.34  # inches
+_SPREAD = 0.28  # of the dots of one row about its middle, in rows
+
+
+def draw_ends(frame: pd.DataFrame, known: Mapping[str, float]) -> dict[str, bytes]:
+    """Every end of each algorithm, with median, quartiles and the best known as a line; a panel a problem.
+
+    frame: tidy, one swarm size and budget. known: best condition numbers by problem. PNG and SVG bytes.
+    """
+    problems = [str(problem) for problem in frame["problem"].unique()]
+    labels = [str(label) for label in frame["algorithm"].unique()]
+
+    def fill(figure: Figure) -> None:
+        panels = figure.subplots(1, len(problems), squeeze=False, sharey=True)[0]
+        for axes, problem in zip(panels, problems, strict=True):
+            _draw_ends_panel(axes, frame[frame["problem"] == problem], labels, known.get(problem))
+            axes.set(title=problem, xlabel="condition number (-)")
+        panels[0].set(yticks=range(len(labels)), yticklabels=[display_name(label) for label in labels])
+        panels[0].invert_yaxis()
+        handles, texts = panels[0].get_legend_handles_labels()
+        figure.legend(handles, texts, loc="outside lower center", ncols=4)
+
+    return render_figure((1.6 + 4.6 * len(problems), 1.5 + _ROW_HEIGHT * len(labels)), fill)
+
+
+def _draw_ends_panel(axes: Axes, frame: pd.DataFrame, labels: list[str], known: float | None) -> None:
+    axes.set_xscale("log")
+    losses = np.where(is_feasible(frame["value"].to_numpy(), frame["violation"].to_numpy()), frame["value"], np.inf)
+    _set_plain_ticks(axes, losses[np.isfinite(losses)])
+    _draw_best_known(axes.axvline, known)
+    if not np.isfinite(losses).all():
+        axes.set_xmargin(0.22)  # room for the notes on infeasible ends
+    for row, label in enumerate(labels):
+        _draw_row_of_ends(axes, row, label, losses[(frame["algorithm"] == label).to_numpy()])
+
+
+def _draw_best_known(draw_line: Callable[..., object], value: float | None) -> None:
+    if value is not None:
+        draw_line(value, color="black", linewidth=1.0, linestyle=(0, (4, 2)), label="best known")
+
+
+def _draw_row_of_ends(axes: Axes, row: int, label: str, ends: Array) -> None:
+    color = line_style(row).color
+    finite = ends[np.isfinite(ends)]
+    places = row + named_generator("figure of ends", label, len(finite)).uniform(-_SPREAD, _SPREAD, len(finite))
+    first = row == 0
+    axes.plot(finite, places, "o", color=color, markersize=3, alpha=0.55, label="an end" if first else None)
+    lower, middle, upper = (quantile(ends, share) for share in (0.25, 0.5, 0.75))
+    if np.isfinite(upper):
+        text = "quartiles" if first else None
+        axes.plot([lower, upper], [row, row], color="black", linewidth=1.4, solid_capstyle="butt", label=text)
+    if np.isfinite(middle):
+        text = "median" if first else None
+        axes.plot(middle, row, "|", color="black", markersize=15, markeredgewidth=2.2, label=text)
+    if len(finite) < len(ends):
+        note = f"{len(ends) - len(finite)} of {len(ends)} infeasible"
+        place = ("axes fraction", "data")
+        axes.annotate(note, (1.0, row - _SPREAD), xycoords=place, ha="right", va="center", fontsize=7)
+
+
+def _set_plain_ticks(axes: Axes, values: Array) -> None:
+    """Plain numbers on a logarithmic axis that spans little or much."""
+    if len(values) and values.max() / values.min() < 30:
+        axes.xaxis.set_major_locator(
+            LogLocator(subs=_TICK_MULTIPLES if values.max() / values.min() < 3 else (1, 2, 3, 5))
+        )
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def draw_ranking(frame: pd.DataFrame) -> dict[str, bytes]:
+    """Rank of each algorithm in every problem, its average, and the groups that no test tells apart.
+
+    frame: tidy. The ranks are those of medians over problems, or of ends over the repetitions of a single problem. PNG
+    and SVG bytes.
+    """
+    cells = ["problem", "swarm_size", "budget"]
+    losses = block_losses([log_losses(rows) for _, rows in frame.groupby(cells, sort=False)])
+    found = critical_difference(losses)
+    count = len(found.ranks)
+
+    def fill(figure: Figure) -> None:
+        axes = figure.subplots()
+        _draw_ranks(axes, losses, found)
+        _draw_groups(axes, found)
+        axes.set(yticks=range(count), yticklabels=[display_name(name) for name in found.ranks])
+        blocks = f"{found.blocks} {_block_name(frame)}"
+        too_few = ", too few to tell any two apart" if found.has_too_few_blocks else ""
+        axes.set(xlabel=f"rank (1: best) in {blocks}{too_few}", xticks=range(1, count + 1))
+        axes.invert_yaxis()
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+
+    return render_figure((6.4, 1.5 + _ROW_HEIGHT * count), fill)
+
+
+def _block_name(frame: pd.DataFrame) -> str:
+    return "problems" if frame["problem"].nunique() > 1 else "repetitions"
+
+
+def _draw_ranks(axes: Axes, losses: pd.DataFrame, found: CriticalDifference) -> None:
+    ranks = losses.rank(axis=1)
+    order = {str(label): line_style(index).color for index, label in enumerate(losses.columns)}
+    for row, (name, average) in enumerate(found.ranks.items()):
+        numbers, counts = np.unique(ranks[name], return_counts=True)
+        text = "ranks: a larger dot for more of them" if row == 0 else None
+        axes.scatter(numbers, np.full(len(numbers), row), s=7.0 * counts, color=order[name], alpha=0.45, label=text)
+        text = "average rank" if row == 0 else None
+        axes.plot(average, row, "|", color="black", markersize=15, markeredgewidth=2.2, label=text)
+        axes.annotate(f"{average:.2f}", (average, row), (0, 8), textcoords="offset points", ha="center", fontsize=7)
+
+
+def _draw_groups(axes: Axes, found: CriticalDifference) -> None:
+    """A bar on the right beside each group without a significant difference (Wilcoxon, Holm, 5 %)."""
+    rows = {name: row for row, name in enumerate(found.ranks)}
+    for place, group in enumerate(() if found.has_too_few_blocks else found.groups):
+        x = len(rows) + 0.8 + 0.25 * place
+        text = "not told apart" if place == 0 else None
+        axes.plot([x, x], [rows[group[0]] - 0.3, rows[group[-1]] + 0.3], color="black", linewidth=2.5, label=text)
+
+
+def draw_budgets(frame: pd.DataFrame, known: Mapping[str, float]) -> dict[str, bytes]:
+    """Median and quartiles against the budget, a panel a problem, each with its own scale; PNG and SVG bytes.
+
+    known: best condition numbers by problem, drawn as a line.
+    """
+    problems = list(frame["problem"].unique())
+
+    def fill(figure: Figure) -> None:
+        panels = figure.subplots(1, len(problems), squeeze=False)[0]
+        for axes, problem in zip(panels, problems, strict=True):
+            _draw_budget_panel(axes, frame[frame["problem"] == problem])
+            _draw_best_known(axes.axhline, known.get(str(problem)))
+            axes.set(title=problem, xlabel="budget of a run (evaluations)", xscale="log", yscale="log")
+            axes.yaxis.set_major_locator(LogLocator(subs=_TICK_MULTIPLES))  # powers of ten alone may be out of range
+            axes.yaxis.set_major_formatter("{x:g}")
+            axes.yaxis.set_minor_locator(NullLocator())
+            budgets = sorted(frame["budget"].unique())
+            axes.set_xticks(budgets, [f"{budget:,}" for budget in budgets])
+            axes.xaxis.set_minor_locator(NullLocator())
+        panels[0].set_ylabel("condition number, median and quartiles (-)")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=4 * len(problems))
+
+    return render_figure((2 + 4.2 * len(problems), 4.6), fill)
+
+
+def _draw_budget_panel(axes: Axes, frame: pd.DataFrame) -> None:
+    """Medians that are infinite, where most ends are infeasible, are left out."""
+    budgets = frame.drop_duplicates(GROUP_COLUMNS)["budget"].to_numpy()  # in the order of the summary
+    table = summary_table(frame).assign(budget=budgets)
+    for index, (label, group) in enumerate(table.groupby("algorithm", sort=False)):
+        color, linestyle, marker = line_style(index)
+        rows = group[np.isfinite(group["median"])]
+        middle = rows["median"].to_numpy()
+        ends = np.abs(rows[["lower_quartile", "upper_quartile"]].to_numpy().T - middle)
+        shift = 1 + 0.03 * (index - 3.5)  # keeps the bars of neighbours apart
+        axes.errorbar(
+            rows["budget"] * shift,
+            middle,
+            yerr=np.where(np.isfinite(ends), ends, 0.0),
+            label=display_name(str(label)),
+            color=color,
+            linestyle=linestyle,
+            marker=marker,
+            markersize=4,
+            linewidth=1.2,
+            elinewidth=0.8,
+        )

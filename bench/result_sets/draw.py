@@ -1,0 +1,44 @@
+"""`armlab draw`: the figures that fit a result set, as PNG and SVG."""
+
+from pathlib import Path
+
+from armlab.common.files import write_whole
+from bench.comparison_figures import draw_budgets, draw_ends, draw_ranking
+from bench.result_sets.formats import make_folder, read_results
+from bench.result_sets.result_set import ResultSet
+from bench.studies.best_known.records import known_values
+from problem.registry import parse_problem
+
+MAX_PANELS = 3  # problems whose ends are drawn side by side
+
+
+def draw_results(where: Path, store: Path, records: Path, folder: Path) -> list[Path]:
+    """Draw a result set into a folder; returns the files.
+
+    NAME_ends: every end, for up to three problems of one swarm size and budget. NAME_ranking: ranks over the problems,
+    or over the repetitions of a single one. NAME_budgets: medians against the budget, where there are several. records:
+    the best known trajectories. Raises InputError, in one line, if there are no results.
+    """
+    results = read_results(where, store)
+    make_folder(folder)
+    frame = results.trials
+    several = frame["budget"].nunique() > 1
+    figures = {"ranking": draw_ranking(frame)}
+    if frame["problem"].nunique() <= MAX_PANELS and frame["swarm_size"].nunique() == 1:
+        known = _known_values(results, records)
+        figures["budgets" if several else "ends"] = draw_budgets(frame, known) if several else draw_ends(frame, known)
+    paths = []
+    for name, images in figures.items():
+        for suffix, image in images.items():
+            path = folder / f"{results.name}_{name}.{suffix}"
+            write_whole(path, image)
+            paths.append(path)
+    return paths
+
+
+def _known_values(results: ResultSet, records: Path) -> dict[str, float]:
+    problems = {
+        label: parse_problem(settings, f"problem '{label}' of {results.name}")
+        for label, settings in results.problems.items()
+    }
+    return known_values(problems, records)

@@ -1,0 +1,97 @@
+"""`armlab tune`: tunes every algorithm, judges all on problems that took no part, and writes tables and a page."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.common.files import write_whole
+from armlab.common.settings import settings_to_yaml, suggest_name
+from bench.comparison_figures import draw_ranking
+from bench.plan import plan_trials
+from bench.result_sets.formats import make_folder
+from bench.run import ProgressBar
+from bench.store import open_store
+from bench.studies.best_known.records import best_known_values
+from bench.studies.tuning.report import TUNED, Judgement, configurations_table, sweep_label, tuning_page
+from bench.studies.tuning.search import Tuned, run_frame, tune_algorithm
+from bench.studies.tuning.settings import TuningSettings, read_tuning
+from bench.tables import as_csv
+
+
+@dataclass(frozen=True)
+class TuningOptions:
+    """algorithms: only these of the configuration, all if empty. configurations: in place of the configuration's.
+
+    store: file of the run store. results: folder. workers: processes. records: the best known trajectories.
+    """
+
+    algorithms: tuple[str, ...]
+    configurations: int | None
+    store: Path
+    results: Path
+    records: Path
+    workers: int
+
+
+def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Iterator[Path]:
+    """Tune, judge and write; yields the written files.
+
+    It can be stopped at any time: what was run is in the store, and the same command goes on from there. Raises
+    InputError, in one line, for any mistake in the configuration; StoppedError, TrialsFailedError.
+    """
+    settings = _chosen(read_tuning(path), options)
+    make_folder(options.results)
+    with open_store(options.store) as store:
+        with bar(settings.configurations * len(settings.algorithms), 0) as progress:
+            tuned = [tune_algorithm(settings, name, store, progress.update) for name in settings.algorithms]
+        plan = plan_trials(settings.experiment(_contestants(settings, tuned), judging=True), "tuning")
+        frame = run_frame(plan, store, options.workers)
+    known = best_known_values(plan.first_entries(), options.records)
+    judgement = Judgement(settings, tuple(tuned), frame, known)
+    files: dict[str, str | bytes] = {
+        f"{settings.name}_configurations.csv": as_csv(configurations_table(tuned)),
+        f"{settings.name}_judged.csv": as_csv(judgement.table()),
+        **{f"{settings.name}_ranking.{suffix}": image for suffix, image in draw_ranking(judgement.contest()).items()},
+        f"{settings.name}.md": tuning_page(judgement),
+        f"{settings.name}.settings.yaml": settings_to_yaml(settings),
+    }
+    for name, content in files.items():
+        write_whole(options.results / name, content)
+        yield options.results / name
+
+
+def _chosen(settings: TuningSettings, options: TuningOptions) -> TuningSettings:
+    for name in options.algorithms:
+        if name not in settings.algorithms:
+            raise InputError(
+                f"'{settings.name}' does not tune '{name}': {suggest_name(name, list(settings.algorithms))}"
+            )
+    changes: dict[str, object] = {}
+    if options.algorithms:
+        changes["algorithms"] = {name: settings.algorithms[name] for name in options.algorithms}
+        if settings.sweep is not None and settings.sweep.algorithm not in options.algorithms:
+            changes["sweep"] = None
+    if options.configurations is not None:
+        changes["configurations"] = options.configurations
+    return settings.model_copy(update=changes)
+
+
+def _contestants(settings: TuningSettings, tuned: Sequence[Tuned]) -> list[dict[str, object]]:
+    """Each algorithm as published and as tuned, and the sweep of one hyper-parameter."""
+    published: list[dict[str, object]] = [{"name": one.algorithm} for one in tuned]
+    chosen: list[dict[str, object]] = [
+        {"name": one.algorithm, "label": f"{one.algorithm}{TUNED}", "params": dict(one.best.params)} for one in tuned
+    ]
+    sweep = settings.sweep
+    if sweep is None:
+        return published + chosen
+    swept: list[dict[str, object]] = [
+        {
+            "name": sweep.algorithm,
+            "label": sweep_label(sweep.algorithm, sweep.parameter, value),
+            "params": {sweep.parameter: value},
+        }
+        for value in sweep.values
+    ]
+    return published + chosen + swept
