@@ -186,3 +186,10 @@ def _check_node(node: yaml.Node, where: str) -> None:
         if (key.tag, key.value) in seen:
             raise InputError(f"{where}, line {key.start_mark.line + 1}: key {key.value!r} stands there twice")
         seen.add((key.tag, key.value))
+
+
+def to_plain_data(data: Any) -> Any:
+    """The data with lists for tuples, as YAML writes them."""
+    if isinstance(data, dict):
+        return {key: to_plain_data(value) for key, value in data.items()}
+    return [to_plain_data(item) for item in data] if isinstance(data, list | tuple) else data

@@ -5,7 +5,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from armlab.common.errors import InputError
-from armlab.recordings.channels import channel_units, check_rate, make_raw_run, make_transmission, to_joint_side
+from armlab.recordings.channels import (
+    channel_units,
+    check_rate,
+    make_raw_run,
+    make_transmission,
+    take_timing_back,
+    to_joint_side,
+)
 from armlab.recordings.recording import Finding, Recording, Run
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, read_recording_file
 from armlab.recordings.repair import (
@@ -43,6 +50,8 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
             "motion-only recordings cannot be diagnosed yet"
         )
     arm = load_arm(file.robot, folder)
+    if file.gravity is not None:
+        arm = replace(arm, gravity=file.gravity)
     transmission = make_transmission(file, arm, folder)
     simulation = folder / file.simulation if file.simulation else None
     if simulation and not simulation.is_file():
@@ -61,8 +70,8 @@ def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tup
     run = fill_optional_signals(drop_duplicate_rows(sort_rows(run)))
     angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in units.items()}
     sound = (unwrap_encoders(repair_stamps(part), angles) for part in split_at_gaps(run))
-    joints = (to_joint_side(part, recording.transmission) for part in sound)
-    return tuple(check_rate(part, file.sample_rate_hz) for part in joints)
+    joints = (check_rate(to_joint_side(part, recording.transmission), file.sample_rate_hz) for part in sound)
+    return tuple(take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in joints)
 
 
 def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
