@@ -55,6 +55,7 @@ from armlab.diagnosis.unknown import (
     predict_residual_structure,
 )
 from armlab.effects.library import library
+from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
@@ -75,6 +76,7 @@ def diagnose(
     where the wanted baseline is not there.
     """
     started, settings = time.perf_counter(), settings or Settings()
+    signs = signs_of_wrong_reading(recording)
     setup = None if as_read else find_setup(recording, baseline, settings, progress)
     read_after = time.perf_counter() - started
     if setup is not None:
@@ -82,12 +84,13 @@ def diagnose(
         reason = setup.reason_inconclusive(settings.tuning.reading)
         if reason is not None:
             simulation = read_simulation(recording, baseline)
-            return Diagnosis(recording, simulation, "inconclusive", reason, setup=setup, setup_seconds=read_after)
+            found = Diagnosis(recording, simulation, "inconclusive", reason, signs=signs, setup=setup)
+            return replace(found, setup_seconds=read_after)
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
-        return with_setup(design, setup, read_after)
+        return with_setup(replace(design, signs=signs), setup, read_after)
     searched = search_effects(fit_background(design, library(), seed, progress), progress)
-    found = replace(conclude(recording, searched, progress), seconds=time.perf_counter() - started)
+    found = replace(conclude(recording, searched, progress), signs=signs, seconds=time.perf_counter() - started)
     return with_setup(found, setup, read_after)
 
 

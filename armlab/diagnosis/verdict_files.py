@@ -35,10 +35,10 @@ from armlab.effects.parameters import ParameterValue
 from armlab.identification.model_file import model_text
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.reading.answer import SetupFinding
-from armlab.recordings.reading.corrected import corrected_texts
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
 from armlab.recordings.recording import Recording
 
-MODEL, CORRECTED_FOLDER = "model.yaml", "corrected"
+MODEL = "model.yaml"
 
 
 def verdict_texts(diagnosis: Diagnosis, folder: Path) -> dict[str, str]:

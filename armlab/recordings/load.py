@@ -13,6 +13,7 @@ from armlab.recordings.channels import (
     take_timing_back,
     to_joint_side,
 )
+from armlab.recordings.reading.signs import compare_joint_names
 from armlab.recordings.recording import Finding, Recording, Run
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, read_recording_file
 from armlab.recordings.repair import (
@@ -25,6 +26,7 @@ from armlab.recordings.repair import (
 )
 from armlab.recordings.stamps import repair_stamps
 from armlab.recordings.table import read_table
+from problem.arm import Arm
 from problem.robot_file import load_arm
 
 
@@ -56,8 +58,19 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     simulation = folder / file.simulation if file.simulation else None
     if simulation and not simulation.is_file():
         raise InputError(f"no file {simulation}, which `simulation` in {folder / FILE_NAME} names")
-    empty = Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz)
+    names = _compare_names(file, arm)
+    empty = Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz, names)
     return replace(empty, recorded=file.recorded), file
+
+
+def _compare_names(file: RecordingFile, arm: Arm) -> tuple[Finding, ...]:
+    """Warnings where columns bear the names of other joints; a transmission may mix them."""
+    out: tuple[Finding, ...] = ()
+    if file.transmission.position is None:
+        out += compare_joint_names(file.columns.position, arm, "position")
+    if file.transmission.torque is None:
+        out += compare_joint_names(file.columns.torque or file.columns.current or (), arm, "torque")
+    return out
 
 
 def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tuple[Run, ...]:
@@ -76,7 +89,7 @@ def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tup
 
 def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
     """The recording with its runs; notes where they differ in rate, or where none validates."""
-    findings = []
+    findings = list(recording.findings)
     rates = {run.name: run.rate_hz for run in runs}
     if rates and max(rates.values()) > 1.02 * min(rates.values()):
         listed = ", ".join(f"{name} {rate:.5g} Hz" for name, rate in rates.items())

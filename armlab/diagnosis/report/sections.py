@@ -21,9 +21,9 @@ from armlab.diagnosis.report.words import (
 )
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.story import story_sentence, tell_story
-from armlab.diagnosis.verdict_files import CORRECTED_FOLDER
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.recordings.reading.words import describe
 
 
@@ -342,6 +342,7 @@ def origin_section(diagnosis: Diagnosis, command: str) -> str:
         ["compared with", compared[simulation.kind] + (f" ({name})" if simulation.kind == "nominal" else "")],
         *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
         *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),
+        *(["warning", each.text] for each in diagnosis.signs),
         ["armlab", version("armlab")],
     ]
     settings = [[key.replace("_", " "), str(value)] for key, value in diagnosis.settings.items()]

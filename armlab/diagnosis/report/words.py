@@ -182,6 +182,8 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     """The verdict, each finding with its equation, errors before and after, and what to do next."""
     first, second = verdict_sentences(diagnosis)
     yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
+    for sign in diagnosis.signs:
+        yield from (f"  {line}" for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2))
     setup = diagnosis.setup.findings if diagnosis.setup else ()
     for number, mistake in enumerate(setup, 1):
         yield from _setup_lines(number, mistake, joint_unit(diagnosis.simulation.arm, mistake.worst_joint - 1))

@@ -20,13 +20,13 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
 from armlab.diagnosis.tuning import parse_change
 from armlab.diagnosis.verdict_files import (
-    CORRECTED_FOLDER,
     PREDICTED_FOLDER,
     check_output_folder,
     predicted_texts,
     verdict_texts,
 )
 from armlab.recordings.load import load_recording
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 
 
 def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:

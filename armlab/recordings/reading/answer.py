@@ -96,7 +96,7 @@ class Answer:
             )
             told = f"The recording is read wrongly, and these data do not tell how: {names}."
             return f"{told} To decide, {_decide(self.open)}."
-        if self.share > tuning.max_unexplained:
+        if not self.findings and self.share > tuning.max_unexplained:
             nearest = (
                 f", however it is read (tried {self.looks} readings, nearest: {'; '.join(self.tried)})"
                 if self.tried

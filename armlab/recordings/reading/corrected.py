@@ -19,6 +19,7 @@ from armlab.recordings.recording_file import RecordingFile, TimingEntry
 from problem.pseudo_inertia import links_of
 from problem.robot_file import LinkEntry, RobotFile
 
+CORRECTED_FOLDER = "corrected"
 POSITION_SIGNALS = ("position", "link_position", "reference_position")
 VELOCITY_SIGNALS = ("velocity", "reference_velocity")
 

@@ -119,6 +119,7 @@ class Fitter:
     channels: Channels
     tuning: ReadingTuning
     _columns: dict[tuple[object, ...], Columns] = field(default_factory=dict)
+    _priors: dict[bytes, Prior] = field(default_factory=dict)
 
     @property
     def fold(self) -> NDArray[np.intp]:
@@ -146,7 +147,10 @@ class Fitter:
         """About the links of the simulation, or about bodies of the size that the torque suggests."""
         arm = reading.arm
         if reading.inertial is not None:
-            return _prior(replace(arm, links=links_of(reading.inertial)))
+            key = reading.inertial.tobytes()
+            if key not in self._priors:
+                self._priors[key] = _prior(replace(arm, links=links_of(reading.inertial)))
+            return self._priors[key]
         reach = sum(float(np.linalg.norm(j.before[:3, 3]) + np.linalg.norm(j.after[:3, 3])) for j in arm.joints) or 1.0
         turning = arm.joints[0].kind == "revolute"
         mass = float(np.std(torque, axis=0).max()) / (9.81 * (reach if turning else 1.0))

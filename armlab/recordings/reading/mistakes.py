@@ -205,6 +205,14 @@ def joint_names(arm: Arm) -> tuple[str, ...]:
     return tuple(joint.name for joint in arm.joints)
 
 
+RARE = ("link_data_error", "inertia_reference", "channel_order", "clock_error", "channel_skew")
+
+
+def is_rare(mistake: Mistake) -> bool:
+    """Whether a mistake comes after the others where they fit alike: it is rarer, or has more to choose."""
+    return mistake.effect in RARE
+
+
 def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Reading:
     """The reading without a mistake of this table.
 

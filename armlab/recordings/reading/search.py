@@ -89,7 +89,8 @@ class Judge:
         Else the links may vanish, or grow, until friction alone explains the torque.
         """
         mistake = reading.mistakes[-1]
-        scales = mistake.form == table.TORQUE or (mistake.effect == "link_data_error" and mistake.form != "centre_sign")
+        links = mistake.effect == "link_data_error" and mistake.form != "centre_sign"
+        scales = links or (mistake.effect == "unit_error" and mistake.form == table.TORQUE)
         if not scales:
             return True
         if reading.inertial is not None:
@@ -137,7 +138,7 @@ def search_singles(judge: Judge, start: Trial) -> list[Trial]:
     found += _delays(judge, start)
     found += _clocks(judge, start)
     found += _gears(judge, start)
-    return sorted(found, key=lambda each: each.loss)
+    return sorted(found, key=lambda each: each.loss + judge.tuning.rare_loss * table.is_rare(each.reading.mistakes[-1]))
 
 
 def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
@@ -431,10 +432,11 @@ def _extend(judge: Judge, start: Trial, trial: Trial, singles: list[Trial]) -> t
 
 
 def _distinct(singles: list[Trial], count: int) -> list[Trial]:
-    """The best ones, each place and effect once."""
-    out: dict[str, Trial] = {}
+    """The best ones, each effect once at a place and in a form."""
+    out: dict[tuple[str, str], Trial] = {}
     for each in singles:
-        out.setdefault(each.reading.mistakes[-1].label, each)
+        own = each.reading.mistakes[-1]
+        out.setdefault((own.label, own.form), each)
     return list(out.values())[:count]
 
 

@@ -127,7 +127,7 @@ class ReadingTuning:
     min_slope_likeness: float = tuned(
         0.9, meaning="correlation and slope from which on a recorded velocity confirms the clock", most=0.999
     )
-    near_best: float = tuned(0.5, unit="nats", meaning="single mistakes so near to the best one are pursued as well")
+    near_best: float = tuned(2.0, unit="nats", meaning="single mistakes so near to the best one are pursued as well")
     quarter_reach_deg: float = tuned(
         30.0,
         unit="deg",
@@ -146,3 +146,14 @@ class ReadingTuning:
     max_unexplained: float = tuned(
         0.6, unit="of the torque's scatter", meaning="what an arm of the right geometry and reading leaves at most"
     )
+    standstill_s: float = tuned(0.3, unit="s", meaning="length of a stretch in which an arm stands still", least=0.01)
+    still_travel: float = tuned(
+        2e-3, unit="of a joint's travel", meaning="a joint that moves less in such a stretch stands still"
+    )
+    min_standstill_load: float = tuned(
+        1.0, unit="of the torque's scatter", meaning="gravity torque from which on standstill tells something"
+    )
+    least_standstill_share: float = tuned(
+        0.2, meaning="a joint that holds less of its gravity torque at standstill is read wrongly"
+    )
+    rare_loss: float = tuned(0.03, unit="nats", meaning="what a rare mistake has to fit better than a common one")
