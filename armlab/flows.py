@@ -15,7 +15,7 @@ from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import Candidate
 from armlab.identification.identifier import METHODS, Identifier
-from armlab.identification.identify import robot_path
+from armlab.identification.identify import robot_path, wrong_reading
 from armlab.identification.model import Model
 from armlab.identification.validation import RunError, run_error
 from armlab.recordings.recording import Recording
@@ -108,12 +108,14 @@ def identify(
     *,
     components: tuple[Candidate, ...] | None = None,
     cutoff_hz: float | None = None,
+    as_read: bool = False,
 ) -> Model:
     """The model of the arm that fits the runs with the role `identify`, with 95 % intervals.
 
     method: an estimator of `armlab identify --method`. components: viscous and Coulomb friction, rotor inertia and
     offset at each joint if left out. cutoff_hz: of the low-pass, chosen from the positions if left out.
-    Raises InputError where no run identifies or the runs do not fit the arm.
+    as_read: the recording and the robot file are not doubted. Raises InputError where no run identifies, where the runs
+    do not fit the arm, or where the recording is read wrongly.
 
         model = armlab.identify(armlab.read_recording("my-recording"))
         model.save("model.yaml")
@@ -123,6 +125,9 @@ def identify(
     runs = recording.with_role("identify")
     if not runs:
         raise InputError(f"{recording.name} has no run to identify from: give one of its runs the role identify")
+    wrong = None if as_read else wrong_reading(recording)
+    if wrong is not None:
+        raise InputError(f"{recording.name}: {wrong[0]} `as_read=True` identifies it all the same")
     identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot_path(recording))
     try:
         model = identifier.fit(runs).model_

@@ -70,6 +70,7 @@ def next_experiment(
 @click.option(
     "--set", "changes", multiple=True, metavar="NUMBER=VALUE", help="Another tuning number, like noise.max_order=8."
 )
+@click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
 def diagnose(
     recordings: tuple[Path, ...],
     out: Path,
@@ -79,10 +80,12 @@ def diagnose(
     dates: str | None,
     without: tuple[str, ...],
     changes: tuple[str, ...],
+    as_read: bool,
 ) -> None:
     """Find the physics that the simulation of RECORDING lacks.
 
-    Says where the simulation is wrong, which effects are missing, and how much better it predicts with them. With
+    Says whether the recording is read wrongly, where the simulation is wrong, which effects are missing, and how much
+    better it predicts with them. With
     --compare OLD: what changed from OLD to RECORDING, and to each further one.
     """
     from armlab.common.errors import InputError
@@ -95,7 +98,7 @@ def diagnose(
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     with ProgressLine() as progress:
         lines = (
-            diagnose_recording(recordings[0], out, baseline, seed, without, changes, progress.tell)
+            diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, progress.tell)
             if old is None
             else compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
         )

@@ -23,16 +23,25 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
     help="Relative width of a prior about the robot's links.",
 )
 @click.option("--select", "choose", is_flag=True, help="Choose cut-off, components and prior by cross-validation.")
+@click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
 def identify(
-    recording: Path, out: Path | None, method: str, cutoff_hz: float | None, tolerance: float | None, choose: bool
+    recording: Path,
+    out: Path | None,
+    method: str,
+    cutoff_hz: float | None,
+    tolerance: float | None,
+    choose: bool,
+    as_read: bool,
 ) -> None:
     """Identify the parameters of an arm from RECORDING.
 
-    RECORDING: a recording folder.
+    RECORDING: a recording folder. A recording that is read wrongly is refused, with the correction.
     """
     from armlab.identification.identify import IdentifyOptions, identify_recording
 
-    for line in identify_recording(recording, out or recording, IdentifyOptions(method, cutoff_hz, tolerance, choose)):
+    for line in identify_recording(
+        recording, out or recording, IdentifyOptions(method, cutoff_hz, tolerance, choose, as_read)
+    ):
         click.echo(line)
 
 

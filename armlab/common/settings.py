@@ -192,3 +192,10 @@ def settings_to_yaml(settings: Settings) -> str:
     """The full settings as YAML text."""
     text: str = yaml.safe_dump(settings.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
     return text
+
+
+def to_plain_data(data: Any) -> Any:
+    """The data with lists for tuples, as YAML writes them."""
+    if isinstance(data, dict):
+        return {key: to_plain_data(value) for key, value in data.items()}
+    return [to_plain_data(item) for item in data] if isinstance(data, list | tuple) else data

@@ -55,6 +55,8 @@ from armlab.diagnosis.unknown import (
     predict_residual_structure,
 )
 from armlab.effects.library import library
+from armlab.recordings.check import signs_of_wrong_reading
+from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
 
@@ -65,18 +67,50 @@ def diagnose(
     seed: int = 0,
     settings: Settings | None = None,
     progress: Progress = lambda message: None,
+    as_read: bool = False,
 ) -> Diagnosis:
     """Where the simulation and the recording differ, what physics is missing, and how much better it then predicts.
 
     baseline: what is compared; the simulation where there is one if left out. seed: of the surrogates' random waves.
-    progress: is told what is being done. Raises InputError where the wanted baseline is not there.
+    progress: is told what is being done. as_read: the recording and the robot file are not doubted. Raises InputError
+    where the wanted baseline is not there.
     """
-    started = time.perf_counter()
-    design = prepare(recording, baseline, settings or Settings(), progress)
+    started, settings = time.perf_counter(), settings or Settings()
+    signs = signs_of_wrong_reading(recording)
+    setup = None if as_read else find_setup(recording, baseline, settings, progress)
+    read_after = time.perf_counter() - started
+    if setup is not None:
+        recording = setup.recording
+        reason = setup.reason_inconclusive(settings.tuning.reading)
+        if reason is not None:
+            simulation = read_simulation(recording, baseline)
+            found = Diagnosis(recording, simulation, "inconclusive", reason, signs=signs, setup=setup)
+            return replace(found, setup_seconds=read_after)
+    design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
-        return design
+        return with_setup(replace(design, signs=signs), setup, read_after)
     searched = search_effects(fit_background(design, library(), seed, progress), progress)
-    return replace(conclude(recording, searched, progress), seconds=time.perf_counter() - started)
+    found = replace(conclude(recording, searched, progress), signs=signs, seconds=time.perf_counter() - started)
+    return with_setup(found, setup, read_after)
+
+
+def find_setup(
+    recording: Recording, baseline: Baseline | None, settings: Settings, progress: Progress
+) -> Answer | None:
+    """How the recording and the robot file are to be read; None for a recording that cannot be used anyhow."""
+    simulation = read_simulation(recording, baseline)
+    if reason_unusable(recording, settings.tuning.soundness) is not None:
+        return None
+    progress("reading the recording rightly")
+    return read_rightly(recording, simulation.inertial, settings.tuning.reading)
+
+
+def with_setup(diagnosis: Diagnosis, setup: Answer | None, seconds: float) -> Diagnosis:
+    """The diagnosis of a recording read rightly, with the mistakes of its reading."""
+    if setup is None or not setup.findings:
+        return replace(diagnosis, setup=setup, setup_seconds=seconds)
+    summary = f"{setup.sentence} {diagnosis.summary}"
+    return replace(diagnosis, status="mismatch", summary=summary, setup=setup, setup_seconds=seconds)
 
 
 def prepare(

@@ -11,7 +11,8 @@ from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import Candidate
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.torque_model import TorqueModel
-from armlab.recordings.recording import Recording
+from armlab.recordings.reading.answer import Answer
+from armlab.recordings.recording import Finding, Recording
 
 
 @dataclass(frozen=True)
@@ -118,7 +119,9 @@ class Diagnosis:
     nominal, refit, final: residuals (rows, joints), N m, of the simulation as it is, of its links refitted, and of
     the model found, without surrogates of what is unknown. inertial: (10 * joints,) of the model found. model: the
     same to predict with; named_model: fitted with the named effects alone.
-    steps: the log of the search. looks: how many candidates and shapes were compared.
+    steps: the log of the search. looks: how many candidates and shapes were compared. signs: warnings about
+    limits, names, clock and standstill of the recording as it is. setup: how it is to be read, None where that was not
+    asked; `recording` is then as it should be read.
     """
 
     recording: Recording
@@ -141,11 +144,15 @@ class Diagnosis:
     steps: tuple[Step, ...] = ()
     looks: int = 0
     seconds: float = 0.0
+    signs: tuple[Finding, ...] = ()
+    setup: Answer | None = None
+    setup_seconds: float = 0.0
     settings: dict[str, float | str | bool] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """The status, the first claims as effect@place with their equations, and how many there are."""
         lines = [f"Diagnosis of {self.recording.name!r}: {self.status}; claims: {len(self.claims)}"]
+        lines += [f"  setup: {each.text}" for each in (self.setup.findings if self.setup else ())]
         for claim in self.claims[:4]:
             place = "" if claim.joint is None else f"@{claim.joint}"
             lines.append(f"  {claim.effect}{place}: {claim.equation}")

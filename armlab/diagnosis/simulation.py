@@ -13,7 +13,6 @@ from armlab.effects.scene import Scene, scene_of
 from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.geometry_check import check_torque_fit
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
 from problem.regressor import rigid_body_torque
@@ -94,8 +93,7 @@ def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None
     silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
     if silent:
         return f"The torque of joint {', '.join(map(str, silent))} never changes: is the right column named?"
-    swapped = next((each for each in check_torque_fit(runs, recording.arm) if each.kind == "swapped_channels"), None)
-    return None if swapped is None else f"The {swapped.text}. Put the columns right before looking for physics."
+    return None
 
 
 def reason_misread(observed: Observed, simulation: Simulation, tuning: SoundnessTuning) -> str | None:

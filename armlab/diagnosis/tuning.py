@@ -7,35 +7,15 @@ One frozen dataclass holds the numbers of one stage, `Tuning` holds the stages. 
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
-from typing import TypeVar
 
 from armlab.common.errors import InputError
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import suggest_name
+from armlab.common.tuning import TuningValue, tuned
+from armlab.recordings.reading.tuning import ReadingTuning
 
-BY_EYE = "chosen by eye"
 EVIDENCE_SOURCE = "fourth judged set: a quarter of the names below it were wrong in the clean tier"
 REFUTE_SOURCE = "development sets: wrong names left 0.2 to 9 times what they explained, right ones 0.53 at most"
-TuningValue = int | float | tuple[float, ...]
-V = TypeVar("V", int, float, tuple[float, ...])
-
-
-def tuned(
-    value: V,
-    *,
-    unit: str = "",
-    meaning: str,
-    source: str = BY_EYE,
-    least: float = 0.0,
-    most: float = math.inf,
-    count: int = 1,
-) -> V:
-    """The field of a tuning number. unit: empty for a pure number.
-
-    least, most: bounds of what can be computed, of each value of a list. count: least length of a list.
-    """
-    note = {"unit": unit, "meaning": meaning, "source": source, "least": least, "most": most, "count": count}
-    return field(default=value, metadata=note)
 
 
 @dataclass(frozen=True)
@@ -676,6 +656,7 @@ class Tuning:
 
     data: DataTuning = DataTuning()
     soundness: SoundnessTuning = SoundnessTuning()
+    reading: ReadingTuning = field(default_factory=ReadingTuning)
     noise: NoiseTuning = NoiseTuning()
     links: LinkTuning = LinkTuning()
     solver: SolverTuning = SolverTuning()

@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import (
     VERDICT_SCHEMA,
+    ClassMember,
     FindingEntry,
     FitEntry,
     LocatedEntry,
@@ -32,16 +34,27 @@ from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.model_file import model_text
 from armlab.recordings.differentiate import Signals
+from armlab.recordings.reading.answer import SetupFinding
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
 from armlab.recordings.recording import Recording
 
 MODEL = "model.yaml"
 
 
 def verdict_texts(diagnosis: Diagnosis, folder: Path) -> dict[str, str]:
-    """verdict.json and, where something was fitted, model.yaml, as they are to stand in a folder."""
+    """verdict.json and, where something was fitted, model.yaml, as they are to stand in a folder.
+
+    Beside them `corrected/`, the recording as it should be read, where it is read wrongly.
+    """
     texts = {"verdict.json": make_verdict(diagnosis).to_json()}
+    setup = diagnosis.setup
+    if setup is not None and setup.findings and setup.reading is not None:
+        own = corrected_texts(diagnosis.recording.folder, setup.reading, folder / CORRECTED_FOLDER)
+        texts |= {f"{CORRECTED_FOLDER}/{name}": text for name, text in own.items()}
     if diagnosis.inertial is not None:
-        texts[MODEL] = model_text(model_found(diagnosis), folder)
+        model = model_found(diagnosis)
+        robot = f"{CORRECTED_FOLDER}/robot.yaml"
+        texts[MODEL] = model_text(replace(model, robot=str(folder / robot)) if robot in texts else model, folder)
     return texts
 
 
@@ -64,13 +77,14 @@ def check_output_folder(folder: Path, recording: Recording) -> None:
 def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
     """The content of `verdict.json`."""
     story, shares = tell_story(diagnosis), finding_shares(diagnosis)
+    setup = tuple(_setup_entry(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     return VerdictFile(
         schema=VERDICT_SCHEMA,
         status=diagnosis.status,
         summary=diagnosis.summary,
-        story=tuple(_story_entry(each) for each in story),
+        story=tuple(_story_entry(each, len(setup)) for each in story),
         located=tuple(_located_entry(each) for each in diagnosis.located),
-        findings=tuple(_finding_entry(*each) for each in zip(diagnosis.claims, shares, strict=True)),
+        findings=(*setup, *(_finding_entry(*each) for each in zip(diagnosis.claims, shares, strict=True))),
         unexplained=tuple(_unexplained_entry(each) for each in diagnosis.unexplained),
         fit=tuple(_fit_entry(each) for each in diagnosis.fit),
     )
@@ -81,8 +95,32 @@ def _located_entry(each: Located) -> LocatedEntry:
     return LocatedEntry(joint=each.joint, share=each.share, where=where)
 
 
-def _story_entry(each: Chapter) -> StoryEntry:
-    return StoryEntry(cause=each.cause, joints=each.joints, share_of_gap=each.share, findings=each.findings)
+def _story_entry(each: Chapter, setup: int) -> StoryEntry:
+    places = tuple(setup + place for place in each.findings)
+    return StoryEntry(cause=each.cause, joints=each.joints, share_of_gap=each.share, findings=places)
+
+
+def _setup_entry(each: SetupFinding) -> FindingEntry:
+    own = each.mistake
+    members = [
+        ClassMember(effect=own.effect, joint=own.joint, probability=each.probability),
+        *(ClassMember(effect=rival.effect, joint=rival.joint, probability=rival.probability) for rival in each.rivals),
+    ]
+    entry = FindingEntry(
+        effect=own.effect,
+        kind="setup",
+        joint=own.joint,
+        joints=own.joints or (() if own.joint is None else (own.joint,)),
+        form=own.form or None,
+        parameters={name: ParameterEntry(value=value, ci95=None, unit=unit) for name, value, unit in own.parameters},
+        equation=each.text,
+        heldout_rms_before=each.rms_before,
+        heldout_rms_after=each.rms_after,
+        probability=each.probability,
+        rivals=tuple(RivalEntry(effect=rival.effect, joint=rival.joint) for rival in each.rivals),
+        next_experiment=each.next_experiment,
+    )
+    return entry.model_copy(update={"class_": tuple(members)}) if each.rivals else entry
 
 
 def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:

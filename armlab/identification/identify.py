@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 from armlab.identification.pictures import png_data_url
@@ -22,6 +23,9 @@ from armlab.identification.selection import (
 )
 from armlab.identification.validation import RunError, error_table, run_error
 from armlab.recordings.load import load_recording
+from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
+from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
 
 PAGE_STYLE = "body{font:15px/1.45 system-ui,sans-serif;max-width:1060px;margin:2em auto;color:#222}img{max-width:100%}"
@@ -56,18 +60,23 @@ NO_VALIDATION_WARNING = (
 
 @dataclass(frozen=True)
 class IdentifyOptions:
-    """method: one of METHODS. tolerance: of a prior about the robot's own links. choose: by cross-validation."""
+    """method: one of METHODS. tolerance: of a prior about the robot's own links. choose: by cross-validation.
+
+    as_read: the recording and the robot file are not doubted.
+    """
 
     method: str = "weighted"
     cutoff_hz: float | None = None
     tolerance: float | None = None
     choose: bool = False
+    as_read: bool = False
 
 
 def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Iterator[str]:
     """Identifies, writes model.yaml and report.html into `out`, and yields lines with parameters and errors.
 
-    Raises InputError, in one line, for a recording that cannot be used and options that do not fit it.
+    Raises InputError, in one line, for a recording that cannot be used or is read wrongly, and options that do not fit
+    it. `corrected/` in `out` then holds the recording as it should be read.
     """
     recording = load_recording(folder)
     runs = recording.with_role("identify")
@@ -75,6 +84,8 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
         raise InputError(f"{folder} has no run to identify from: give one of its runs the role identify")
     if options.tolerance and recording.arm.links is None:
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
+    if not options.as_read:
+        _refuse_wrong_reading(recording, out)
     identifier, how = _build_identifier(recording, options)
     try:
         identifier.fit(runs)
@@ -93,6 +104,29 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
     out.mkdir(parents=True, exist_ok=True)
     yield f"model: {model.save(out / 'model.yaml')}"
     yield f"page: {write_identification_page(recording, identifier, errors, out / 'report.html')}"
+
+
+def wrong_reading(recording: Recording) -> tuple[str, Answer] | None:
+    """What is wrong with the reading of a recording, and the answer; None where nothing is."""
+    tuning, inertial = ReadingTuning(), recording.arm.parameters if recording.arm.links is not None else None
+    answer = read_rightly(recording, inertial, tuning)
+    if answer.findings:
+        return answer.sentence, answer
+    return (str(answer.reason_inconclusive(tuning)), answer) if answer.open else None
+
+
+def _refuse_wrong_reading(recording: Recording, out: Path) -> None:
+    """Raises InputError for a recording that is read wrongly, once the corrected one is written."""
+    found = wrong_reading(recording)
+    if found is None:
+        return
+    sentence, answer = found
+    hint = "give --as-read to identify it all the same"
+    if answer.reading is not None:
+        corrected = out / CORRECTED_FOLDER
+        write_texts(corrected_texts(recording.folder, answer.reading, corrected), corrected)
+        hint = f"{corrected} holds it as it should be, {hint}"
+    raise InputError(f"{recording.folder}: {sentence} {hint[0].upper()}{hint[1:]}")
 
 
 def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[Identifier, list[str]]:

@@ -1,5 +1,6 @@
 """From the columns of a table to joint signals: SI units, gains, gear ratios, couplings between motors, and offsets."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.recording import Finding, Run, Transmission
-from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry
+from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, TimingEntry
 from armlab.recordings.table import Table
 from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, TIME_UNITS, Unit, resolve_units
 from problem.arm import Arm
@@ -147,6 +148,32 @@ def to_joint_side(run: Run, transmission: Transmission) -> Run:
     if run.reference_velocity is not None:
         signals["reference_velocity"] = run.reference_velocity @ to_joints
     return run.with_signals(run.time, signals)
+
+
+def take_timing_back(run: Run, timing: TimingEntry | None, where: str) -> Run:
+    """The run in true time, its torque as early as its motion; InputError for a wrong number of delays."""
+    if timing is None:
+        return run
+    try:
+        delays = timing.delays(run.joints)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from None
+    return read_late(run.with_signals(run.time / timing.clock_factor, {}), np.array(delays))
+
+
+def read_late(run: Run, delay: Array) -> Run:
+    """The run with torques that are read so much later, (joints,), s, by linear interpolation; its ends are left out.
+
+    Raises InputError where nothing is left.
+    """
+    if not np.any(delay):
+        return run
+    first, last = run.time[0] - min(float(delay.min()), 0.0), run.time[-1] - max(float(delay.max()), 0.0)
+    kept = (run.time >= first) & (run.time <= last)
+    if kept.sum() < 2:
+        raise InputError(f"{run.file}: torque that is {np.abs(delay).max():.3g} s late leaves nothing of the run")
+    shifted = [np.interp(run.time + late, run.time, own) for late, own in zip(delay, run.torque.T, strict=True)]
+    return replace(run, torque=np.column_stack(shifted)).rows(kept)
 
 
 SLOWEST_HZ = 5.0  # no drive is recorded more slowly

@@ -8,8 +8,11 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.geometry_check import check_torque_fit, find_turned_zero, thin_runs
 from armlab.recordings.load import load_runs, open_recording, with_runs
+from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.signs import compare_standstill
+from armlab.recordings.reading.tuning import ReadingTuning
+from armlab.recordings.reading.words import describe
 from armlab.recordings.recording import Finding, Recording, Run
 from problem.arm import Arm
 
@@ -27,6 +30,18 @@ def check_channels(run: Run, arm: Arm) -> tuple[Finding, ...]:
         )
         findings += _check_velocity(run, joint)
     return tuple(findings)
+
+
+def signs_of_wrong_reading(recording: Recording) -> tuple[Finding, ...]:
+    """Warnings about names, clock, limits and standstill, each once: cheap signs of a mistake in the reading."""
+    found = [*recording.findings]
+    for run in recording.runs:
+        found += [*run.findings, *check_channels(run, recording.arm)]
+    links = recording.arm.parameters if recording.arm.links is not None else None
+    found += compare_standstill(recording, links, ReadingTuning())
+    kinds = ("joint_names", "rate", "beyond_limits", "velocity_mismatch", "standstill")
+    first = {(each.kind, each.joint): each for each in reversed(found) if each.kind in kinds}
+    return tuple(reversed(first.values()))
 
 
 def _joint_warning(kind: str, joint: int, text: str) -> list[Finding]:
@@ -178,9 +193,19 @@ def _collect_findings(recording: Recording) -> Iterator[tuple[str, Finding]]:
 
 
 def _check_geometry(recording: Recording) -> tuple[Finding, ...]:
-    """Warnings about channels, robot and zeros that the torques give."""
-    found = check_torque_fit(recording.runs, recording.arm)
-    if any(finding.kind == "swapped_channels" for finding in found):
-        return found
-    zero = find_turned_zero(recording.arm, thin_runs(recording.runs))
-    return (*found, zero) if zero else found
+    """Warnings about standstill, and about how the recording is to be read."""
+    tuning, inertial = ReadingTuning(), recording.arm.parameters if recording.arm.links is not None else None
+    return (*compare_standstill(recording, inertial, tuning), *_check_reading(recording, inertial, tuning))
+
+
+def _check_reading(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> tuple[Finding, ...]:
+    answer: Answer = read_rightly(recording, inertial, tuning)
+    reason = answer.reason_inconclusive(tuning)
+    if reason is not None:
+        return (Finding("setup", "warning", reason),)
+    findings = []
+    for each in answer.findings:
+        rivals = "".join(f"; or {rival.text}" for rival in each.rivals)
+        text = f"{describe(each.mistake)}{rivals} (error {each.share_before:.0%}, read so {each.share_after:.0%})"
+        findings.append(Finding("setup", "warning", text, each.mistake.joint))
+    return tuple(findings)

@@ -5,7 +5,15 @@ from dataclasses import replace
 from pathlib import Path
 
 from armlab.common.errors import InputError
-from armlab.recordings.channels import channel_units, check_rate, make_raw_run, make_transmission, to_joint_side
+from armlab.recordings.channels import (
+    channel_units,
+    check_rate,
+    make_raw_run,
+    make_transmission,
+    take_timing_back,
+    to_joint_side,
+)
+from armlab.recordings.reading.signs import compare_joint_names
 from armlab.recordings.recording import Finding, Recording, Run
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, read_recording_file
 from armlab.recordings.repair import (
@@ -18,6 +26,7 @@ from armlab.recordings.repair import (
 )
 from armlab.recordings.stamps import repair_stamps
 from armlab.recordings.table import read_table
+from problem.arm import Arm
 from problem.robot_file import load_arm
 
 
@@ -43,12 +52,25 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
             "motion-only recordings cannot be diagnosed yet"
         )
     arm = load_arm(file.robot, folder)
+    if file.gravity is not None:
+        arm = replace(arm, gravity=file.gravity)
     transmission = make_transmission(file, arm, folder)
     simulation = folder / file.simulation if file.simulation else None
     if simulation and not simulation.is_file():
         raise InputError(f"no file {simulation}, which `simulation` in {folder / FILE_NAME} names")
-    empty = Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz)
+    names = _compare_names(file, arm)
+    empty = Recording(folder, file.robot, arm, (), transmission, simulation, file.sample_rate_hz, names)
     return replace(empty, recorded=file.recorded), file
+
+
+def _compare_names(file: RecordingFile, arm: Arm) -> tuple[Finding, ...]:
+    """Warnings where columns bear the names of other joints; a transmission may mix them."""
+    out: tuple[Finding, ...] = ()
+    if file.transmission.position is None:
+        out += compare_joint_names(file.columns.position, arm, "position")
+    if file.transmission.torque is None:
+        out += compare_joint_names(file.columns.torque or file.columns.current or (), arm, "torque")
+    return out
 
 
 def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tuple[Run, ...]:
@@ -61,13 +83,13 @@ def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tup
     run = fill_optional_signals(drop_duplicate_rows(sort_rows(run)))
     angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in units.items()}
     sound = (unwrap_encoders(repair_stamps(part), angles) for part in split_at_gaps(run))
-    joints = (to_joint_side(part, recording.transmission) for part in sound)
-    return tuple(check_rate(part, file.sample_rate_hz) for part in joints)
+    joints = (check_rate(to_joint_side(part, recording.transmission), file.sample_rate_hz) for part in sound)
+    return tuple(take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in joints)
 
 
 def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:
     """The recording with its runs; notes where they differ in rate, or where none validates."""
-    findings = []
+    findings = list(recording.findings)
     rates = {run.name: run.rate_hz for run in runs}
     if rates and max(rates.values()) > 1.02 * min(rates.values()):
         listed = ", ".join(f"{name} {rate:.5g} Hz" for name, rate in rates.items())

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.common.settings import Settings, read_yaml, validate
+from armlab.common.settings import Settings, read_yaml, to_plain_data, validate
 from armlab.recordings.recording import Role
 
 FILE_NAME = "recording.yaml"
@@ -104,6 +104,23 @@ class ControllerEntry(Settings):
     resistance: PerJoint | None = None
 
 
+class TimingEntry(Settings):
+    """What is wrong with the time of a recording: its stamps are clock_factor x true time, its torques are late.
+
+    torque_delay: s of true time, of all torques or one a joint.
+    """
+
+    clock_factor: Positive = 1.0
+    torque_delay: float | tuple[float, ...] = 0.0
+
+    def delays(self, joints: int) -> tuple[float, ...]:
+        """Seconds by which the torque of each joint is late; ValueError for another number of them than of joints."""
+        own = self.torque_delay if isinstance(self.torque_delay, tuple) else (self.torque_delay,) * joints
+        if len(own) != joints:
+            raise ValueError(f"timing.torque_delay should hold one number or {joints}, not {len(own)}")
+        return own
+
+
 class RunEntry(Settings):
     """One run file and what it is for."""
 
@@ -116,7 +133,9 @@ class RecordingFile(Settings):
 
     robot: a path beside the file or the name of a built-in robot. simulation: the model to compare with, a path.
     units: of each signal, one for all its columns or one a column. gains: N m (N) per A or V, one a channel.
-    controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31.
+    controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31. timing: errors of the
+    clock that are taken back. gravity: m/s2 in the base frame, where the arm is mounted otherwise than its robot file
+    says.
     """
 
     schema_: Literal["recording/1"] = Field(alias="schema")
@@ -129,6 +148,8 @@ class RecordingFile(Settings):
     gains: tuple[float, ...] | None = None
     controller: ControllerEntry | None = None
     recorded: date | None = None
+    timing: TimingEntry | None = None
+    gravity: tuple[float, float, float] | None = None
     runs: Annotated[tuple[RunEntry, ...], Len(min_length=1)]
 
     @property
@@ -213,11 +234,4 @@ def write_recording(draft: Draft, folder: Path) -> Path:
 
 def _to_yaml(settings: dict[str, Any], source: tuple[str, ...]) -> str:
     comment = "".join(f"# {line}\n" for line in source)
-    return comment + yaml.safe_dump(_to_plain_data(settings), sort_keys=False, default_flow_style=None, width=110)
-
-
-def _to_plain_data(data: Any) -> Any:
-    """The data with lists for tuples, as YAML writes them."""
-    if isinstance(data, dict):
-        return {key: _to_plain_data(value) for key, value in data.items()}
-    return [_to_plain_data(item) for item in data] if isinstance(data, list | tuple) else data
+    return comment + yaml.safe_dump(to_plain_data(settings), sort_keys=False, default_flow_style=None, width=110)

@@ -1,7 +1,5 @@
 """Suspicions that are reported and not repaired, and silence about sound recordings."""
 
-from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +8,8 @@ import pytest
 from recording_folders import ARM, POSITION, SETTINGS, TORQUE, folder_with, frame
 
 from armlab.recordings.check import check_channels, check_recording
-from armlab.recordings.geometry_check import check_torque_fit, find_turned_zero, thin_runs
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Run
-from problem.robot_file import load_arm
 
 
 def run_of(table: pd.DataFrame) -> Run:
@@ -35,7 +31,6 @@ def with_velocity() -> pd.DataFrame:
 def test_a_sound_run_gives_no_suspicion() -> None:
     run = run_of(with_velocity())
     assert said(run) == []
-    assert check_torque_fit([run, run_of(frame(1))], ARM) == ()
 
 
 def test_a_dead_torque_channel_is_named() -> None:
@@ -82,41 +77,6 @@ def test_a_velocity_channel_at_odds_with_its_position_is_named(change: dict, wor
         original = with_velocity()
         table[name] = original[source] if isinstance(source, str) else source * original[name]
     assert words in check_channels(run_of(table), ARM)[0].text
-
-
-@pytest.mark.parametrize("signal", ["torque", "position"])
-@pytest.mark.parametrize("pair", list(combinations(range(3), 2)))
-def test_swapped_channels_are_named(signal: str, pair: tuple[int, int]) -> None:
-    order = np.arange(3)
-    order[list(pair)] = pair[::-1]
-    runs = [run_of(frame(seed)) for seed in range(2)]
-    swapped = [replace(run, **{signal: getattr(run, signal)[:, order]}) for run in runs]
-    (finding,) = check_torque_fit(swapped, ARM)
-    assert finding.kind == "swapped_channels"
-    assert f"channels {pair[0] + 1} and {pair[1] + 1}" in finding.text
-    assert signal in finding.text
-
-
-@pytest.mark.parametrize("turn", [90, 180, -90])
-def test_a_zero_that_is_turned_by_quarters_is_named(tmp_path: Path, turn: int) -> None:
-    folder = folder_with(tmp_path, frame())
-    for file in ("run.csv", "check.csv"):
-        table = pd.read_csv(folder / file)
-        table["q2"] -= np.deg2rad(turn)
-        table.to_csv(folder / file, index=False)
-    (finding,) = (each for _, each in check_recording(folder).findings if each.kind == "turned_zero")
-    assert finding.joint == 2
-    assert f"turned by {turn:+d} deg" in finding.text
-
-
-def test_zeros_that_stand_right_are_not_suspected() -> None:
-    assert find_turned_zero(ARM, thin_runs([run_of(frame(seed)) for seed in range(2)])) is None
-
-
-def test_links_of_another_robot_are_reported() -> None:
-    other = load_arm("kuka-kr300").first(3)
-    findings = check_torque_fit([run_of(frame(seed)) for seed in range(2)], other)
-    assert [finding.kind for finding in findings] == ["another_arm"]
 
 
 def test_a_refused_run_is_reported_beside_the_others(tmp_path: Path) -> None:

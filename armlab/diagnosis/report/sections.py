@@ -23,6 +23,8 @@ from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.story import story_sentence, tell_story
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER
+from armlab.recordings.reading.words import describe
 
 
 def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> str:
@@ -78,6 +80,31 @@ def findings_table(diagnosis: Diagnosis) -> str:
         rows.append([effect_in_words(claim.effect), where, claim.equation, error, rivals or "–"])
     headings = ["effect", "where", "equation", "held-out error without → with it", "fits as well"]
     return html_table(headings, rows, (1, 2, 3, 4)) if rows else ""
+
+
+def setup_section(diagnosis: Diagnosis) -> str:
+    """How the recording is to be read, where it is read wrongly; empty where it is not."""
+    setup = diagnosis.setup
+    if setup is None or not setup.findings:
+        return ""
+    rows = []
+    for each in setup.findings:
+        size = joint_unit(diagnosis.simulation.arm, each.worst_joint - 1)
+        error = (
+            f"{format_number(each.rms_before)} → {format_number(each.rms_after)} {size} (joint {each.worst_joint}); "
+            f"{each.share_before:.0%} → {each.share_after:.0%} of all"
+        )
+        rivals = "; ".join(rival.text for rival in each.rivals)
+        rows.append([describe(each.mistake), error, rivals or "–", each.next_experiment or "–"])
+    headings = ["read wrongly", "held-out error as it is → read rightly", "fits as well", "to tell"]
+    text = (
+        f"{setup.looks} readings of the recording and of the robot file were compared on blocks of time that were held "
+        f"out of the runs that identify. {CORRECTED_FOLDER}/ beside this page holds both as they should be; everything "
+        "below is of the recording read rightly."
+    )
+    return section(
+        "setup", "How the recording is to be read", paragraph(text), html_table(headings, rows, (0, 1, 2, 3))
+    )
 
 
 def findings_section(diagnosis: Diagnosis, gallery: Gallery) -> str:
@@ -315,6 +342,7 @@ def origin_section(diagnosis: Diagnosis, command: str) -> str:
         ["compared with", compared[simulation.kind] + (f" ({name})" if simulation.kind == "nominal" else "")],
         *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
         *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),
+        *(["warning", each.text] for each in diagnosis.signs),
         ["armlab", version("armlab")],
     ]
     settings = [[key.replace("_", " "), str(value)] for key, value in diagnosis.settings.items()]

@@ -14,6 +14,7 @@ from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Rival
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
+from armlab.recordings.reading.answer import SetupFinding
 from problem.arm import Arm
 
 MAX_NAME_LENGTH = 24  # letters
@@ -110,6 +111,9 @@ def format_probability(value: float) -> str:
 
 def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
     """What is missing, and how much better the model is with it."""
+    setup = diagnosis.setup.sentence if diagnosis.setup else ""
+    if setup:
+        return setup, diagnosis.summary.removeprefix(setup).strip()
     if diagnosis.status == "inconclusive":
         return "These recordings allow no verdict.", diagnosis.summary
     worst = max(diagnosis.fit, key=lambda each: each.after, default=None)
@@ -178,7 +182,12 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     """The verdict, each finding with its equation, errors before and after, and what to do next."""
     first, second = verdict_sentences(diagnosis)
     yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
-    for number, claim in enumerate(diagnosis.claims, 1):
+    for sign in diagnosis.signs:
+        yield from (f"  {line}" for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2))
+    setup = diagnosis.setup.findings if diagnosis.setup else ()
+    for number, mistake in enumerate(setup, 1):
+        yield from _setup_lines(number, mistake, joint_unit(diagnosis.simulation.arm, mistake.worst_joint - 1))
+    for number, claim in enumerate(diagnosis.claims, len(setup) + 1):
         yield from _claim_lines(number, claim, joint_unit(diagnosis.simulation.arm, claim.evidence.joint))
     for each in diagnosis.unexplained:
         yield f"  unexplained: {100 * each.share:.0f} % of joint {each.joint}, by {', '.join(each.depends_on)}"
@@ -188,6 +197,18 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
         closed = "-" if fit.gap_closed is None else f"{100 * fit.gap_closed:.1f} %"
         errors = "".join(f"{format_number(value):>11}" for value in (fit.before, fit.after, fit.noise_floor))
         yield f"  {fit.joint:>5}{errors}{closed:>13}   {joint_unit(diagnosis.simulation.arm, fit.joint - 1)}"
+
+
+def _setup_lines(number: int, finding: SetupFinding, unit: str) -> Iterator[str]:
+    lines = wrap(f"setup: {finding.text}", LINE_WIDTH - 5)
+    yield f"{number:>3}. {lines[0]}"
+    yield from (f"     {line}" for line in lines[1:])
+    error = f"{format_number(finding.rms_before)} to {format_number(finding.rms_after)} {unit}"
+    yield f"     held-out error of joint {finding.worst_joint}: {error}"
+    for rival in finding.rivals:
+        yield from (f"     {line}" for line in wrap(f"fits as well: {rival.text}", LINE_WIDTH - 5))
+    if finding.next_experiment:
+        yield from (f"     {line}" for line in wrap(f"to tell: {finding.next_experiment}", LINE_WIDTH - 5))
 
 
 def _claim_lines(number: int, claim: Claim, unit: str) -> Iterator[str]:

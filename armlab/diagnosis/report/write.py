@@ -26,11 +26,12 @@ from armlab.diagnosis.verdict_files import (
     verdict_texts,
 )
 from armlab.recordings.load import load_recording
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 
 
 def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:
     """HTML text. gallery: None where nothing was fitted."""
-    parts = [sections.verdict_section(diagnosis)]
+    parts = [each for each in (sections.verdict_section(diagnosis), sections.setup_section(diagnosis)) if each]
     if gallery is not None:
         parts += [
             sections.before_after_section(diagnosis, gallery),
@@ -70,13 +71,15 @@ def diagnose_recording(
     seed: int,
     without: tuple[str, ...] = (),
     changes: tuple[str, ...] = (),
+    as_read: bool = False,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
     out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
-    numbers with other values, like `noise.max_order=8`. progress: called with the name of each step. Raises
-    InputError, in one line, for a recording that cannot be used, an unknown guard or an unknown tuning number.
+    numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted. progress:
+    called with the name of each step. Raises InputError, in one line, for a recording that cannot be used, an unknown
+    guard or an unknown tuning number.
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     settings = Settings(guards=guards_without(without))
@@ -85,13 +88,14 @@ def diagnose_recording(
     recording = load_recording(folder)
     check_output_folder(out, recording)
     try:
-        diagnosis = diagnose(recording, chosen, seed, settings, progress)
+        diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read)
     except ValueError as error:
         raise InputError(f"{folder}: {error}") from None
     progress("writing the report")
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += [word for guard in without for word in ("--without", guard)]
     options += [word for change in changes for word in ("--set", change)]
+    options += ["--as-read"] if as_read else []
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     texts = verdict_texts(diagnosis, out) | report_texts(diagnosis, command) | predicted_texts(diagnosis)
     write_texts(texts, out)
@@ -103,6 +107,8 @@ def diagnose_recording(
         f", predicted torque in {PREDICTED_FOLDER}" if any(name.startswith(PREDICTED_FOLDER) for name in texts) else ""
     )
     yield f"wrote {out}: {files}{more}"
+    if diagnosis.setup is not None and diagnosis.setup.findings:
+        yield f"corrected: {out / CORRECTED_FOLDER} holds the recording and the robot as they should be"
     if diagnosis.seconds:
         yield f"diagnosed in {diagnosis.seconds:.1f} s once read; {_peak_memory_gb():.2f} GB of memory at most"
 

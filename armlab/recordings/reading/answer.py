@@ -1,0 +1,192 @@
+"""How a recording is to be read: the mistakes with their evidence, their rivals, and the recording as it should be."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.recordings.reading.corrected import correct_recording
+from armlab.recordings.reading.fit import Fitter
+from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
+from armlab.recordings.reading.search import Found, Gain, Judge, find_mistakes
+from armlab.recordings.reading.signals import thin_channels
+from armlab.recordings.reading.tuning import ReadingTuning
+from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement
+from armlab.recordings.recording import Recording
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another mistake in the place of one, or links that are off: it fits these data alike."""
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    text: str
+    probability: float
+
+
+@dataclass(frozen=True)
+class SetupFinding:
+    """One mistake. worst_joint: from 1, where the errors fall most; rms_before, rms_after: there, N m (N).
+
+    share_before, share_after: of all joints, of the torque's scatter, without and with this one taken back. sigmas: of
+    the fall between blocks of time. probability: of the name against its rivals.
+    """
+
+    mistake: Mistake
+    worst_joint: int
+    rms_before: float
+    rms_after: float
+    share_before: float
+    share_after: float
+    sigmas: float
+    probability: float
+    rivals: tuple[Rival, ...]
+    next_experiment: str | None
+
+    @property
+    def text(self) -> str:
+        """What is wrong, and the evidence."""
+        return (
+            f"{describe(self.mistake)} (read so, the held-out error falls from {self.share_before:.0%} to "
+            f"{self.share_after:.0%})"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """How a recording is to be read.
+
+    findings: in the order in which they were found, none where it is read rightly. recording: as it should be read.
+    share: held-out error of all joints as it is read, of the torque's scatter; near the simulation's links where there
+    are findings. undecided: joints whose zero the data do
+    not tell by quarters of a turn, where a zero is a finding. open: mistakes of which too many fit alike to correct
+    one. tried: what was tried where the recording fits badly. looks: how many readings were compared.
+    """
+
+    findings: tuple[SetupFinding, ...]
+    recording: Recording
+    reading: Reading | None
+    share: float = 0.0
+    undecided: tuple[int, ...] = ()
+    open: tuple[SetupFinding, ...] = ()
+    tried: tuple[str, ...] = ()
+    looks: int = 0
+
+    @property
+    def sentence(self) -> str:
+        """The findings in a sentence, empty where there are none."""
+        if not self.findings:
+            return ""
+        mistakes = "; ".join(describe(each.mistake) for each in self.findings)
+        before, after = self.share, self.findings[-1].share_after
+        zeros = ", ".join(map(str, self.undecided))
+        told = f" These data do not tell the zero of joint {zeros} by quarters of a turn." if zeros else ""
+        return (
+            f"The recording is read wrongly: {mistakes}. Read rightly, the held-out error falls from {before:.0%} to "
+            f"{after:.0%} of the torque.{told}"
+        )
+
+    def reason_inconclusive(self, tuning: ReadingTuning) -> str | None:
+        """Why nothing can be said of the physics: readings that fit alike, or none that fits."""
+        if self.open:
+            names = "; or ".join(
+                [describe(self.open[0].mistake), *(rival.text for each in self.open for rival in each.rivals)]
+            )
+            told = f"The recording is read wrongly, and these data do not tell how: {names}."
+            return f"{told} To decide, {_decide(self.open)}."
+        if not self.findings and self.share > tuning.max_unexplained:
+            nearest = (
+                f", however it is read (tried {self.looks} readings, nearest: {'; '.join(self.tried)})"
+                if self.tried
+                else ""
+            )
+            left = f"Rigid links with friction leave {self.share:.0%} of the recorded torque{nearest}"
+            return f"{left}: another robot, or torque that is none? Move one joint alone and see which columns change."
+        return None
+
+
+def _decide(findings: tuple[SetupFinding, ...]) -> str:
+    return findings[0].next_experiment or measurement(findings[0].mistake.effect, findings[0].mistake.joint)
+
+
+def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:
+    """How a recording is to be read.
+
+    inertial: (10 * joints,) of the links of the simulation, None without one.
+    """
+    channels = thin_channels(recording, tuning)
+    if channels is None:
+        return Answer((), recording, None)
+    judge = Judge(Fitter(channels, tuning), recording)
+    start = judge.trial(read_as_is(recording, inertial))
+    found = find_mistakes(judge, start)
+    share = overall_error(judge, start.reading)
+    if found.best is found.start:
+        tried = tuple(describe(each.reading.mistakes[-1]) for each in found.tried)
+        return Answer((), recording, None, share, tried=tried, looks=found.looks)
+    findings = tuple(_finding(judge, found, place) for place in range(len(found.best.reading.mistakes)))
+    open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
+    if open_ones:
+        return Answer((), recording, None, share, open=open_ones, looks=found.looks)
+    zeros = found.undecided if any(each.mistake.effect == "encoder_offset" for each in findings) else ()
+    corrected = correct_recording(recording, found.best.reading)
+    errors, _ = judge.errors(start.reading, near=True)
+    before = float(np.sqrt(np.mean(errors**2)))
+    return Answer(findings, corrected, found.best.reading, before, zeros, looks=found.looks)
+
+
+def overall_error(judge: Judge, reading: Reading) -> float:
+    """Held-out error with free links, geometric mean over the joints, of the torque's scatter."""
+    errors, _ = judge.errors(reading, near=False)
+    return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-6)))))
+
+
+SMALLEST_SHARE = 1e-9  # of a joint that stands still
+
+
+def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
+    """The mistake at a place, judged against the reading that leaves it in."""
+    without, best = found.without[place], found.best
+    mistake = best.reading.mistakes[place]
+    (before, rms_before), (after, rms_after) = (judge.errors(each.reading, near=True) for each in (without, best))
+    before, after = np.maximum(before, SMALLEST_SHARE), np.maximum(after, SMALLEST_SHARE)
+    worst = int(np.argmax(np.log(before) - np.log(after)))
+    if mistake.joint is not None and mistake.effect not in ("link_data_error",):
+        worst = mistake.joint - 1 if after[mistake.joint - 1] < before[mistake.joint - 1] else worst
+    gain = Gain.between(without, best)
+    rivals = [(each.reading.mistakes[-1], each.loss) for each in found.rivals[place]]
+    weights = np.array([best.loss, *(loss for _, loss in rivals)])
+    chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
+    by_links = not is_told_by_geometry(gain, judge.tuning)
+    chances = np.append(chances, np.mean(chances) * judge.tuning.other_links_chance if by_links else 0.0)
+    chances = chances / chances.sum()
+    listed = [
+        Rival(each.effect, each.joint, each.joints, describe(each), float(chance))
+        for (each, _), chance in zip(rivals, chances[1:-1], strict=True)
+    ]
+    if by_links:
+        link = len(best.reading.arm) if mistake.joint is None else mistake.joint
+        listed.append(Rival(INERTIAL_ERROR, link, (), f"link {link} is not as simulated", float(chances[-1])))
+    measure = dict.fromkeys(
+        measurement(effect, joint)
+        for effect, joint in ((mistake.effect, mistake.joint), *((each.effect, each.joint) for each in listed))
+    )
+    return SetupFinding(
+        mistake,
+        worst + 1,
+        float(rms_before[worst]),
+        float(rms_after[worst]),
+        float(np.sqrt(np.mean(before**2))),
+        float(np.sqrt(np.mean(after**2))),
+        gain.near_sigmas,
+        float(chances[0]),
+        tuple(listed),
+        "; ".join(list(measure)[:2]) if listed else None,
+    )
+
+
+def is_told_by_geometry(gain: Gain, tuning: ReadingTuning) -> bool:
+    """Whether no other links would explain what was recorded as well."""
+    return gain.free >= tuning.min_free_gain and gain.free_sigmas >= tuning.min_body_sigmas

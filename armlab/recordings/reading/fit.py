@@ -1,0 +1,362 @@
+"""Rigid links with usual friction, fitted to a reading: errors on blocks of time that are held out.
+
+    tau_j = Y_j(q, qd, qdd) phi + v_j qd_j + c_j sign(qd_j) + I_j qdd_j + o_j,    v, c, I >= 0
+
+The links phi are drawn to those of the simulation by a normal prior in the metric of pseudo-inertias (Lee and Park
+2018): `near` where they may be as far off as simulations usually are, `free` where the data decide. Links that are
+physically consistent are fitted with the entropic divergence to the same bodies (Lee, Wensing and Park 2020), whose
+barrier keeps every pseudo-inertia positive definite.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from armlab.recordings.reading.reading import Reading
+from armlab.recordings.reading.signals import Channels
+from armlab.recordings.reading.tuning import ReadingTuning
+from problem.arm import Arm, Link
+from problem.motion import Motion
+from problem.pseudo_inertia import (
+    entropic_information,
+    links_of,
+    parameters_of,
+    pseudo_inertia_basis,
+    pseudo_inertias,
+    regular_nominal,
+)
+from problem.regressor import observation_matrix, rigid_body_torque
+
+FOLDS = 2  # even and odd blocks are held out in turn
+OWN = 4  # columns of a joint: viscous and Coulomb friction, rotor inertia, offset
+SIGNED = 3  # of them the first ones, which are not negative
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 4), and their products on each fold.
+
+    grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones.
+    """
+
+    motion: Motion
+    rigid: Array
+    own: Array
+    grams: Array
+
+
+def make_columns(arm: Arm, motion: Motion, fold: NDArray[np.intp], sign_width: float) -> Columns:
+    """The columns of a motion (rows, joints); fold: (rows,) of each row."""
+    joints = len(arm)
+    rigid = observation_matrix(arm, motion).reshape(motion.samples, joints, 10 * joints)
+    speed = np.abs(motion.velocity).max(axis=0)
+    sign = np.tanh(motion.velocity / (sign_width * np.where(speed > 0, speed, 1.0)))
+    own = np.stack([motion.velocity, sign, motion.acceleration, np.ones_like(sign)], axis=2)
+    grams = np.zeros((FOLDS, joints, 10 * joints + OWN, 10 * joints + OWN))
+    for number in range(FOLDS):
+        rows = fold == number
+        for joint in range(joints):
+            used = np.arange(10 * joint, 10 * joints + OWN)  # links before a joint do not load it
+            part = np.concatenate([rigid[rows, joint, 10 * joint :], own[rows, joint]], axis=1)
+            grams[number, joint][np.ix_(used, used)] = part.T @ part
+    return Columns(motion, rigid, own, grams)
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """Bodies that links are drawn to: centre (10 * joints,), and the information about it at width one."""
+
+    centre: Array
+    information: Array
+    pseudos: Array
+
+
+@lru_cache(maxsize=64)
+def _typical_prior(arm: Arm, mass: float, reach: float) -> Prior:
+    body = mass * np.array([0.1, 0.1, 0.1]) * reach**2
+    links = tuple(Link(mass, (0.0, 0.0, 0.0), (*(2 * body).tolist(), 0.0, 0.0, 0.0)) for _ in arm.joints)
+    return _prior(replace(arm, links=links))
+
+
+def _prior(arm: Arm) -> Prior:
+    pseudos = regular_nominal(arm)
+    return Prior(arm.parameters, entropic_information(pseudos), pseudos)
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """Held-out errors of a reading. shares: (blocks, joints), mean squares over the scatter of the joint's torque.
+
+    values: (folds, 10 * joints) of the links, own: (folds, joints, 4) of the joints. distance: of the links from those
+    of the simulation, minus the logarithm of their prior over the number of independent rows.
+    """
+
+    shares: Array
+    values: Array
+    own: Array
+    distance: float
+
+    def errors(self) -> Array:
+        """RMS error over scatter of each joint, (joints,)."""
+        return np.array(np.sqrt(np.mean(self.shares, axis=0)), dtype=np.float64)
+
+    def losses(self, smallest: float) -> Array:
+        """Logarithms of the errors of each block and joint, (blocks, joints), flat below the smallest error.
+
+        The distance of the links is shared out among the joints.
+        """
+        return np.asarray(0.5 * np.log(self.shares + smallest**2) + self.distance / self.shares.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Fitter:
+    """Fits readings of the channels of one recording."""
+
+    channels: Channels
+    tuning: ReadingTuning
+    _columns: dict[tuple[object, ...], Columns] = field(default_factory=dict)
+    _priors: dict[bytes, Prior] = field(default_factory=dict)
+
+    @property
+    def fold(self) -> NDArray[np.intp]:
+        """(rows,), 0 for even blocks and 1 for odd ones."""
+        return np.asarray(self.channels.block % FOLDS, dtype=np.intp)
+
+    def columns(self, reading: Reading) -> Columns:
+        """Columns of a reading's motion, kept for readings that differ in torque alone."""
+        key = (
+            reading.position.tobytes(),
+            reading.offset.tobytes(),
+            reading.position_order,
+            reading.clock,
+            id(reading.arm.joints),
+            reading.arm.gravity,
+        )
+        if key not in self._columns:
+            if len(self._columns) > 24:
+                self._columns.pop(next(iter(self._columns)))
+            motion = self.channels.read_motion(reading)
+            self._columns[key] = make_columns(reading.arm, motion, self.fold, self.tuning.sign_width)
+        return self._columns[key]
+
+    def prior(self, reading: Reading, torque: Array) -> Prior:
+        """About the links of the simulation, or about bodies of the size that the torque suggests."""
+        arm = reading.arm
+        if reading.inertial is not None:
+            key = reading.inertial.tobytes()
+            if key not in self._priors:
+                self._priors[key] = _prior(replace(arm, links=links_of(reading.inertial)))
+            return self._priors[key]
+        reach = sum(float(np.linalg.norm(j.before[:3, 3]) + np.linalg.norm(j.after[:3, 3])) for j in arm.joints) or 1.0
+        turning = arm.joints[0].kind == "revolute"
+        mass = float(np.std(torque, axis=0).max()) / (9.81 * (reach if turning else 1.0))
+        return _typical_prior(arm, 2.0 ** round(np.log2(max(mass, 1e-6))), round(reach, 3))
+
+    def scores(self, reading: Reading, widths: Sequence[float], physical: bool = False) -> list[Score]:
+        """Held-out errors with links of each width about the simulation.
+
+        The last link may carry a load: it is free in any case.
+        """
+        columns, torque = self.columns(reading), self.channels.read_torque(reading)
+        scatter = np.std(torque, axis=0)
+        weight = np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
+        prior = self.prior(reading, torque)
+        normal = [self._normal_equations(columns, torque, weight, 1 - number) for number in range(FOLDS)]
+        count = np.bincount(self.channels.block, minlength=self.channels.blocks)
+        out = []
+        for width in widths:
+            each = np.full(reading.joints, width)
+            each[-1] = max(width, self.tuning.free_width)
+            shares, distance = np.zeros((self.channels.blocks, reading.joints)), 0.0
+            fitted = []
+            for number, (gram, product) in enumerate(normal):
+                task = _Task(gram, product, prior, each**-2.0, reading.joints)
+                links, own = task.physical() if physical else task.gaussian()
+                rows = self.fold == number
+                found = columns.rigid[rows] @ links + np.einsum("rjk,jk->rj", columns.own[rows], own)
+                np.add.at(shares, self.channels.block[rows], ((torque[rows] - found) * weight) ** 2)
+                distance += task.distance(links, physical) / (
+                    self.channels.blocks * self.tuning.independent_rows * FOLDS
+                )
+                fitted.append((links, own))
+            values, owns = (np.stack(parts) for parts in zip(*fitted, strict=True))
+            out.append(Score(shares / count[:, None], values, owns, distance))
+        return out
+
+    def _normal_equations(self, columns: Columns, torque: Array, weight: Array, fold: int) -> tuple[Array, Array]:
+        """Gram matrix and product with the torque, in nats, of the rows of a fold."""
+        joints, rows = torque.shape[1], self.fold == fold
+        blocks = len(np.unique(self.channels.block[rows]))
+        scale = blocks * self.tuning.independent_rows / (max(rows.sum(), 1) * self.tuning.model_error**2) * weight**2
+        links, size = 10 * joints, (10 + OWN) * joints
+        gram, product = np.zeros((size, size)), np.zeros(size)
+        grams, target = columns.grams[fold], torque[rows]
+        gram[:links, :links] = np.tensordot(scale, grams[:, :links, :links], axes=1)
+        product[:links] = np.einsum("rjp,rj->p", columns.rigid[rows], target * scale, optimize=True)
+        own = scale[:, None] * np.einsum("rjk,rj->jk", columns.own[rows], target)
+        for joint in range(joints):
+            places = slice(links + OWN * joint, links + OWN * (joint + 1))
+            gram[:links, places] = scale[joint] * grams[joint, :links, links:]
+            gram[places, :links] = gram[:links, places].T
+            gram[places, places] = scale[joint] * grams[joint, links:, links:]
+            product[places] = own[joint]
+        return gram, product
+
+    def beyond_limits(self, reading: Reading) -> int:
+        """How many joints move beyond their limits."""
+        position = self.columns(reading).motion.position
+        out = 0
+        for joint, own in enumerate(reading.arm.joints):
+            low, high = own.limits.position
+            slack = self.tuning.limit_slack * (high - low)
+            out += bool(
+                np.isfinite(slack)
+                and (position[:, joint].min() < low - slack or position[:, joint].max() > high + slack)
+            )
+        return out
+
+    def implausible(self, reading: Reading) -> frozenset[int]:
+        """Joints (from 0) that would be faster, or slower at their fastest, than joints of arms are."""
+        speed = np.abs(self.columns(reading).motion.velocity).max(axis=0)
+        low, high = self.tuning.slowest_speed, self.tuning.fastest_speed
+        return frozenset(np.flatnonzero((speed < low) | (speed > high)).tolist())
+
+    def torque_gains(self, reading: Reading) -> list[tuple[float, float]]:
+        """Factor between the torque of each joint and that of the links as given, and the share that it explains."""
+        columns, torque = self.columns(reading), self.channels.read_torque(reading)
+        given = rigid_body_torque(reading.arm, columns.motion, reading.inertial)
+        out = []
+        for joint in range(reading.joints):
+            own = columns.own[:, joint]
+            model, measured = (
+                each[:, joint] - own @ np.linalg.lstsq(own, each[:, joint])[0] for each in (given, torque)
+            )
+            power, total = float(model @ model), float(measured @ measured)
+            gain = float(model @ measured) / power if power > 0 else 0.0
+            out.append((gain, gain**2 * power / total if total > 0 else 0.0))
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Task:
+    """One fit: minimise half of x' gram x - product' x plus the prior of the links, x = links and own columns."""
+
+    gram: Array
+    product: Array
+    prior: Prior
+    precision: Array  # (joints,) of the prior of each link
+    joints: int
+
+    @property
+    def _signed(self) -> NDArray[np.intp]:
+        links = 10 * self.joints
+        return np.concatenate([links + OWN * joint + np.arange(SIGNED) for joint in range(self.joints)])
+
+    @property
+    def _information(self) -> Array:
+        return self.prior.information * np.repeat(self.precision, 10)[:, None]
+
+    def distance(self, values: Array, physical: bool) -> float:
+        """Minus the logarithm of the prior at links (10 * joints,)."""
+        if physical:
+            ratios = np.linalg.solve(self.prior.pseudos, pseudo_inertias(values))
+            traces = np.trace(ratios, axis1=1, axis2=2)
+            return float(self.precision @ (traces - np.linalg.slogdet(ratios)[1] - 4))
+        off = values - self.prior.centre
+        return 0.5 * float(off @ self._information @ off)
+
+    def gaussian(self) -> tuple[Array, Array]:
+        """Links under the normal prior; friction and rotors that would be negative are left out."""
+        links = 10 * self.joints
+        gram, product = self.gram.copy(), self.product.copy()
+        free = np.ones(len(gram), dtype=bool)
+        x = np.zeros(len(gram))
+        information = self._information
+        gram[:links, :links] += information
+        product[:links] += information @ self.prior.centre
+        lengths = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        unit = gram / np.outer(lengths, lengths) + 1e-10 * np.eye(len(gram))
+        signed = self._signed
+        for _ in range(SIGNED * self.joints):
+            chosen = np.flatnonzero(free)
+            x[chosen] = np.linalg.solve(unit[np.ix_(chosen, chosen)], (product / lengths)[chosen]) / lengths[chosen]
+            negative = [place for place in signed if free[place] and x[place] < 0]
+            if not negative:
+                break
+            free[negative] = False
+            x[negative] = 0.0
+        return x[:links], x[links:].reshape(self.joints, OWN)
+
+    def physical(self) -> tuple[Array, Array]:
+        """Links that bodies can have; friction and rotors stay positive by a barrier.
+
+        Damped Newton steps, while the barriers fall to the wanted precision: an interior-point method.
+        """
+        links, signed = 10 * self.joints, self._signed
+        size = np.sqrt(np.maximum(np.diag(self.gram), SMALLEST))
+        x = np.zeros(len(self.gram))
+        x[:links] = parameters_of(self.prior.pseudos)
+        x[signed] = 1 / np.maximum(size, 1e-6 * size.max())[signed]
+        factor = max(FIRST_BARRIER / float(self.precision.min()), 1.0)
+        while True:
+            x = self._newton(x, factor * self.precision, factor * FRICTION_BARRIER)
+            if factor <= 1:
+                return x[:links], x[links:].reshape(self.joints, OWN)
+            factor = max(factor * BARRIER_FALL, 1.0)
+
+    def _newton(self, x: Array, precision: Array, barrier: float) -> Array:
+        """Newton steps for one weight of the barriers."""
+        links, signed = 10 * self.joints, self._signed
+        pull = np.linalg.inv(self.prior.pseudos)
+        slope = np.einsum("jab,pba->jp", pull, pseudo_inertia_basis())
+        each = np.repeat(precision, 10)
+        value = self._objective(x, slope, precision, barrier)
+        for _ in range(MAX_NEWTON_STEPS):
+            pseudos = pseudo_inertias(x[:links])
+            inverse = np.einsum("jab,pba->jp", np.linalg.inv(pseudos), pseudo_inertia_basis())
+            gradient, hessian = self.gram @ x - self.product, self.gram.copy()
+            gradient[:links] += each * (slope - inverse).ravel()
+            hessian[:links, :links] += each[:, None] * entropic_information(pseudos)
+            gradient[signed] -= barrier / x[signed]
+            hessian[signed, signed] += barrier / x[signed] ** 2
+            lengths = np.sqrt(np.diag(hessian) + SMALLEST)
+            unit = hessian / np.outer(lengths, lengths) + 1e-12 * np.eye(len(x))
+            step = -np.linalg.solve(unit, gradient / lengths) / lengths
+            decrement = -float(gradient @ step)
+            if decrement < NEWTON_TOLERANCE * float(each.sum()):
+                break
+            length, trial = 1.0, np.inf
+            while length > 1e-6:
+                trial = self._objective(x + length * step, slope, precision, barrier)
+                if trial < value - 1e-4 * length * decrement:
+                    break
+                length /= 2
+            else:
+                break
+            x, value = x + length * step, trial
+        return x
+
+    def _objective(self, x: Array, slope: Array, precision: Array, barrier: float) -> float:
+        links, signed = 10 * self.joints, self._signed
+        if np.any(x[signed] <= 0):
+            return np.inf
+        try:
+            roots = np.linalg.cholesky(pseudo_inertias(x[:links]))
+        except np.linalg.LinAlgError:
+            return np.inf
+        logarithms = 2 * np.sum(np.log(np.diagonal(roots, axis1=1, axis2=2)), axis=1)
+        fit = 0.5 * float(x @ self.gram @ x) - float(self.product @ x)
+        divergence = np.sum(slope * x[:links].reshape(self.joints, 10), axis=1) - logarithms
+        return fit + float(precision @ divergence) - barrier * float(np.sum(np.log(x[signed])))
+
+
+SMALLEST = 1e-100
+MAX_NEWTON_STEPS = 40  # for each weight of the barriers
+NEWTON_TOLERANCE = 1e-2  # of the weight of the barriers
+BARRIER_FALL = 0.1
+FIRST_BARRIER = 100.0
+FRICTION_BARRIER = 0.1  # nats: a friction that the data do not want goes to almost zero

@@ -1,0 +1,243 @@
+"""The table of mistakes: each function lists the readings in which one mistake of a kind is taken back.
+
+| effect | what is tried |
+|---|---|
+| torque_sign, joint_direction | each joint, and the torque of all |
+| channel_swap, channel_order | each pair of columns; all columns shifted by one, backwards, or in alphabetical order |
+| encoder_offset | each joint that turns, in steps of 30 degrees, then refined |
+| unit_error, gear_ratio | factors between usual units, and ratios of gears |
+| base_tilt, gravity_compensated_torque | gravity along the axes and diagonals, then refined; no gravity |
+| dh_convention, inertia_reference, link_data_error | other meanings of the numbers of the robot file |
+| clock_error, time_delay, channel_skew | factors of time and shifts of torque, then refined |
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations, product
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.common.settings import read_yaml, validate
+from armlab.recordings.reading.reading import Mistake, Reading
+from armlab.recordings.recording import Recording
+from problem.arm import Arm
+from problem.pseudo_inertia import link_from_centre_of_mass, links_of
+from problem.robot_file import BUILT_IN_FOLDER, RobotFile, built_in_arms
+
+POSITION, TORQUE, BOTH, TIME = "position", "torque", "position and torque", "time"
+DEGREES = 180 / np.pi
+STANDARD_GRAVITY = 9.81  # m/s2
+UNIT_FACTORS = {POSITION: (DEGREES, 1 / DEGREES, 1000.0, 1e-3), TORQUE: (1000.0, 1e-3), TIME: (1000.0, 1e-3)}
+TORQUE_UNITS = (1000.0, 1e-3, 1 / 9.80665, 9.80665, 1 / 1.355818, 1.355818, 8.850746, 1 / 8.850746)
+GEAR_RATIOS = tuple(np.geomspace(5, 300, 83).tolist())
+COARSE_GEAR_RATIOS = (30.0, 45.0, 60.0, 80.0, 100.0, 121.0, 160.0, 220.0)
+QUARTERS = (90, 180, -90)
+ZERO_STEPS = tuple(range(-150, 181, 30))  # degrees
+
+
+def signs(reading: Reading) -> Iterator[Reading]:
+    """Joints that count, or report torque, the other way round."""
+    for joint in range(reading.joints):
+        turned = reading.scale_torque(joint, -1.0)
+        yield turned.with_mistake(Mistake("torque_sign", joint + 1))
+        for form, start in ((POSITION, reading), (BOTH, turned)):
+            yield start.scale_position(joint, -1.0).with_mistake(Mistake("joint_direction", joint + 1, form=form))
+    if reading.joints > 1:
+        yield reading.scale_torque(slice(None), -1.0).with_mistake(Mistake("torque_sign"))
+
+
+def exchanges(reading: Reading, names: tuple[str, ...]) -> Iterator[Reading]:
+    """Columns in another order. names: of the joints."""
+    count = reading.joints
+    forms = ((POSITION, "position"), (TORQUE, "torque"), ("both", "both"))
+    for first, second in combinations(range(count), 2):
+        exchanged = list(range(count))
+        exchanged[first], exchanged[second] = second, first
+        for form, what in forms:
+            mistake = Mistake("channel_swap", joints=(first + 1, second + 1), form=form)
+            yield reading.reorder(tuple(exchanged), what).with_mistake(mistake)
+    own = tuple(range(count))
+    # recorded columns that stand in alphabetical order of the joints, where the order of the robot was named
+    alphabetical = tuple(int(place) for place in np.argsort(np.argsort(names)))
+    for order in {own[::-1], (*own[1:], 0), (own[-1], *own[:-1]), alphabetical}:
+        if sum(place != each for place, each in enumerate(order)) > 2:
+            for form, what in forms:
+                mistake = Mistake("channel_order", joints=tuple(each + 1 for each in order), form=form)
+                yield reading.reorder(order, what).with_mistake(mistake)
+
+
+def unit_error(reading: Reading, joint: int | None, form: str, factor: float) -> Reading:
+    """The reading without a factor: recorded = factor x true."""
+    number = None if joint is None else joint + 1
+    mistake = Mistake("unit_error", number, form=form, parameters=(("factor", factor, ""),))
+    if form == TIME:
+        return replace(reading, clock=reading.clock * factor).with_mistake(mistake)
+    where = slice(None) if joint is None else joint
+    changed = reading.scale_position if form == POSITION else reading.scale_torque
+    return changed(where, 1 / factor).with_mistake(mistake)
+
+
+def units(reading: Reading) -> Iterator[Reading]:
+    """Usual units that were taken for each other."""
+    kinds = [joint.kind for joint in reading.arm.joints]
+    for form, factors in UNIT_FACTORS.items():
+        for factor in factors:
+            angle = factor in (DEGREES, 1 / DEGREES)
+            places: list[int | None] = [None] if form == TIME or reading.joints > 1 else []
+            if form != TIME:
+                places += list(range(reading.joints))
+            for joint in places:
+                kind = kinds[joint or 0]
+                if form != POSITION or angle == (kind == "revolute"):
+                    yield unit_error(reading, joint, form, factor)
+
+
+def gear_ratio(reading: Reading, joint: int, ratio: float) -> Reading:
+    """The reading of a joint that was recorded on the other side of a gear: position = ratio x true, torque / ratio."""
+    mistake = Mistake("gear_ratio", joint + 1, parameters=(("ratio", ratio, ""),))
+    return reading.scale_position(joint, 1 / ratio).scale_torque(joint, ratio).with_mistake(mistake)
+
+
+def encoder_offset(reading: Reading, joint: int, angle: float) -> Reading:
+    """The reading with another zero of a joint. angle: rad (m), what has to be added."""
+    unit = "rad" if reading.arm.joints[joint].kind == "revolute" else "m"
+    mistake = Mistake("encoder_offset", joint + 1, parameters=(("offset", angle, unit),))
+    return reading.shift_zero(joint, angle).with_mistake(mistake)
+
+
+def base_tilt(reading: Reading, gravity: Array) -> Reading:
+    """The reading with another gravity (3,), m/s2."""
+    vector = tuple(float(value) for value in gravity)
+    return reading.with_gravity(gravity).with_mistake(Mistake("base_tilt", parameters=(("gravity", vector, "m/s2"),)))
+
+
+def gravity_directions(reading: Reading) -> Iterator[Reading]:
+    """Gravity of the same size along the axes and the diagonals of the base frame."""
+    size = float(np.linalg.norm(reading.arm.gravity)) or STANDARD_GRAVITY
+    for direction in product((-1, 0, 1), repeat=3):
+        length = float(np.linalg.norm(direction))
+        if length > 0 and len([each for each in direction if each]) != 2:
+            gravity = size * np.array(direction) / length
+            if np.linalg.norm(gravity - np.array(reading.arm.gravity)) > 0.1 * size:
+                yield base_tilt(reading, gravity)
+
+
+def without_gravity(reading: Reading) -> Reading:
+    """The reading in which the drive reports torque without gravity."""
+    return reading.with_gravity(np.zeros(3)).with_mistake(Mistake("gravity_compensated_torque"))
+
+
+def late_torque(reading: Reading, joint: int | None, seconds: float) -> Reading:
+    """The reading in which the torque, of one joint or of all, is late."""
+    effect = "time_delay" if joint is None else "channel_skew"
+    mistake = Mistake(effect, None if joint is None else joint + 1, parameters=(("seconds", seconds, "s"),))
+    return reading.late_by(seconds, joint).with_mistake(mistake)
+
+
+def clock_error(reading: Reading, factor: float) -> Reading:
+    """The reading in which recorded time is true time times a factor."""
+    mistake = Mistake("clock_error", parameters=(("factor", factor, ""),))
+    return replace(reading, clock=reading.clock * factor).with_mistake(mistake)
+
+
+def robot_file_meanings(reading: Reading, recording: Recording) -> Iterator[Reading]:
+    """Other meanings of the numbers in the robot file."""
+    file = read_robot_file(recording)
+    if file is None:
+        return
+    other = "modified" if file.dh_convention == "standard" else "standard"
+    arm = file.model_copy(update={"dh_convention": other}).build()
+    changed = replace(reading.arm, joints=arm.joints)
+    yield replace(reading, arm=changed).with_mistake(Mistake("dh_convention", form=other))
+    if reading.inertial is None or recording.simulation is not None:
+        return
+    for form in ("inertia", "centre", "inertia and centre"):
+        yield _with_links(reading, _moved_reference(reading.inertial, form), Mistake("inertia_reference", form=form))
+    ten = np.arange(10)
+    shapes = {
+        ("centre_sign", -1.0): (ten >= 1) & (ten <= 3),
+        ("mass_unit", 1000.0): ten >= 0,
+        ("mass_unit", 1e-3): ten >= 0,
+        ("inertia_unit", 1e6): ten >= 4,
+        ("inertia_unit", 1e3): ten >= 4,
+    }
+    for (form, factor), chosen in shapes.items():
+        scale = np.where(chosen, 1 / factor, 1.0)
+        for link in (None, *range(reading.joints)):
+            factors = np.ones((reading.joints, 10))
+            factors[slice(None) if link is None else link] = scale
+            number = None if link is None else link + 1
+            parameters = (("factor", factor, ""),) if factor != -1.0 else ()
+            mistake = Mistake("link_data_error", number, form=form, parameters=parameters)
+            yield _with_links(reading, reading.inertial * factors.ravel(), mistake)
+
+
+def _with_links(reading: Reading, inertial: Array, mistake: Mistake) -> Reading:
+    return replace(reading, inertial=inertial).with_mistake(mistake)
+
+
+def _moved_reference(inertial: Array, form: str) -> Array:
+    """Links whose inertias were about the centre of mass, or whose first moments were centres."""
+    out = []
+    for link in links_of(inertial):
+        moment = np.array(link.first_moment)
+        centre = moment if "centre" in form else moment / link.mass if link.mass > 0 else 0 * moment
+        xx, yy, zz, xy, xz, yz = link.inertia
+        body = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        own = link.mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        about_centre = body if "inertia" in form else body - own
+        out.append(link_from_centre_of_mass(link.mass, centre, about_centre).parameters)
+    return np.concatenate(out)
+
+
+def read_robot_file(recording: Recording) -> RobotFile | None:
+    """The D-H table and the links of the robot, None for a URDF."""
+    if recording.robot in built_in_arms():
+        path = BUILT_IN_FOLDER / f"{recording.robot}.yaml"
+    else:
+        path = recording.folder / recording.robot
+    return validate(RobotFile, read_yaml(path), str(path)) if path.suffix in (".yaml", ".yml") else None
+
+
+def joint_names(arm: Arm) -> tuple[str, ...]:
+    """Names of the joints in the order of the robot file."""
+    return tuple(joint.name for joint in arm.joints)
+
+
+RARE = ("link_data_error", "inertia_reference", "channel_order", "clock_error", "channel_skew")
+
+
+def is_rare(mistake: Mistake) -> bool:
+    """Whether a mistake comes after the others where they fit alike: it is rarer, or has more to choose."""
+    return mistake.effect in RARE
+
+
+def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Reading:
+    """The reading without a mistake of this table.
+
+    Raises ValueError for a mistake that is not of this table.
+    """
+    joint = None if mistake.joint is None else mistake.joint - 1
+    if mistake.effect == "encoder_offset":
+        return encoder_offset(reading, joint or 0, mistake.value("offset"))
+    if mistake.effect == "unit_error":
+        return unit_error(reading, joint, mistake.form, mistake.value("factor"))
+    if mistake.effect == "gear_ratio":
+        return gear_ratio(reading, joint or 0, mistake.value("ratio"))
+    if mistake.effect == "base_tilt":
+        return base_tilt(reading, np.array(mistake.parameters[0][1]))
+    if mistake.effect in ("time_delay", "channel_skew"):
+        return late_torque(reading, joint, mistake.value("seconds"))
+    if mistake.effect == "clock_error":
+        return clock_error(reading, mistake.value("factor"))
+    exact = [
+        *signs(reading),
+        *exchanges(reading, joint_names(reading.arm)),
+        without_gravity(reading),
+        *robot_file_meanings(reading, recording),
+    ]
+    for each in exact:
+        if each.mistakes[-1] == mistake:
+            return each
+    raise ValueError(f"no such mistake: {mistake}")

@@ -1,0 +1,111 @@
+"""Filtered channels of the identification runs at a few instants, cut into blocks of time."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from armlab.recordings.differentiate import differentiate
+from armlab.recordings.reading.reading import Reading
+from armlab.recordings.reading.tuning import ReadingTuning
+from armlab.recordings.recording import Recording, Run
+from problem.motion import Motion
+
+
+@dataclass(frozen=True, eq=False)
+class Channels:
+    """Recorded channels, filtered, before any reading.
+
+    motion: (rows, channels) of the positions. stamps: (rows,), s. run: (rows,), the number of the run. torques: of each
+    run all stamps (samples,) and torques (samples, channels). block: (rows,), the number of the block of time.
+    margin_s: how far torque can be shifted in time.
+    """
+
+    motion: Motion
+    stamps: Array
+    run: NDArray[np.intp]
+    torques: tuple[tuple[Array, Array], ...]
+    block: NDArray[np.intp]
+    margin_s: float
+    _shifted: dict[float, Array] = field(default_factory=dict)
+
+    @property
+    def rows(self) -> int:
+        """Number of instants."""
+        return len(self.stamps)
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return int(self.block.max()) + 1
+
+    def torque_at(self, shift_s: float) -> Array:
+        """Torque channels (rows, channels) so much later than the instants, by linear interpolation."""
+        key = round(shift_s, 9)
+        if key not in self._shifted:
+            out = np.empty((self.rows, self.torques[0][1].shape[1]))
+            for number, (known, values) in enumerate(self.torques):
+                own = self.run == number
+                for channel, signal in enumerate(values.T):
+                    out[own, channel] = np.interp(self.stamps[own] + shift_s, known, signal)
+            self._shifted[key] = out
+        return self._shifted[key]
+
+    def read_motion(self, reading: Reading) -> Motion:
+        """Motion of the joints, (rows, joints)."""
+        order, to_joints = list(reading.position_order), reading.position.T
+        position = self.motion.position[:, order] @ to_joints + reading.offset
+        velocity = self.motion.velocity[:, order] @ to_joints * reading.clock
+        acceleration = self.motion.acceleration[:, order] @ to_joints * reading.clock**2
+        return Motion(position, velocity, acceleration)
+
+    def read_torque(self, reading: Reading) -> Array:
+        """Torque of the joints, (rows, joints)."""
+        order, out = list(reading.torque_order), np.empty((self.rows, reading.joints))
+        for joint, (row, delay) in enumerate(zip(reading.torque, reading.delay, strict=True)):
+            out[:, joint] = self.torque_at(float(delay * reading.clock))[:, order] @ row
+        return out
+
+
+def thin_channels(recording: Recording, tuning: ReadingTuning) -> Channels | None:
+    """The channels of the runs that identify; None where they are too short or the transmission cannot be undone."""
+    given = recording.transmission
+    to_torque = given.torque * given.gains
+    for matrix in (given.position, to_torque):
+        if matrix.shape[0] != matrix.shape[1] or np.linalg.cond(matrix) > tuning.max_transmission_condition:
+            return None
+    undo, undo_torque = np.linalg.inv(given.position).T, np.linalg.inv(to_torque).T
+    runs = recording.with_role("identify") or recording.runs
+    if min(_length(run) for run in runs) < tuning.min_run_s:
+        return None
+    margin = min(tuning.max_delay_s, *(tuning.max_delay_share * _length(run) for run in runs))
+    step_s = sum(_length(run) for run in runs) / tuning.max_rows
+    motions, stamps, numbers, torques, blocks = [], [], [], [], []
+    first = 0
+    for number, run in enumerate(runs):
+        signals = differentiate(run)
+        time = signals.run.time
+        inside = signals.filter.rows
+        low, high = time[inside][0] + margin, time[inside][-1] - margin
+        rows = np.flatnonzero((time >= low) & (time <= high))[:: max(round(step_s * run.rate_hz), 1)]
+        motion = signals.motion
+        raw = (motion.position[rows] - given.offset) @ undo
+        motions.append(Motion(raw, motion.velocity[rows] @ undo, motion.acceleration[rows] @ undo))
+        stamps.append(time[rows])
+        numbers.append(np.full(len(rows), number))
+        torques.append((time, signals.filter.smooth(signals.run.torque) @ undo_torque))
+        count = max(round(tuning.blocks / len(runs)), 4)
+        blocks.append(first + np.arange(len(rows)) * count // len(rows))
+        first += count
+    motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))
+    return Channels(
+        motion, np.concatenate(stamps), np.concatenate(numbers), tuple(torques), np.concatenate(blocks), margin
+    )
+
+
+_MOTION = ("position", "velocity", "acceleration")
+
+
+def _length(run: Run) -> float:
+    return float(run.time[-1] - run.time[0])

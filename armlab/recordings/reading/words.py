@@ -1,0 +1,100 @@
+"""Setup mistakes in words: what is wrong, how the recording is to be read, and which measurement decides."""
+
+import numpy as np
+
+from armlab.recordings.reading.reading import Mistake
+
+POSITION_AND_TORQUE = "position and torque"
+INERTIAL_ERROR = "inertial_parameter_error"
+NAMES = {
+    "torque_sign": "torque of the other sign",
+    "joint_direction": "a joint that counts the other way round",
+    "channel_swap": "exchanged columns",
+    "channel_order": "columns in another order",
+    "unit_error": "another unit",
+    "gear_ratio": "recorded on the other side of a gear",
+    "encoder_offset": "a wrong zero",
+    "base_tilt": "gravity of another direction",
+    "gravity_compensated_torque": "torque without gravity",
+    "dh_convention": "the D-H table of the other convention",
+    "inertia_reference": "inertias or centres about another point",
+    "link_data_error": "wrong numbers of a link",
+    "clock_error": "a clock that is wrong",
+    "time_delay": "late torque",
+    "channel_skew": "late torque of one joint",
+    INERTIAL_ERROR: "links that are not as simulated",
+}
+SETUP_EFFECTS = tuple(name for name in NAMES if name != INERTIAL_ERROR)
+
+MEASUREMENTS = {
+    "torque_sign": "push joint {joint} by hand in the direction in which its position grows: the drive's torque has to "
+    "point the other way",
+    "joint_direction": "turn joint {joint} alone in the direction that the drawing of the robot calls positive: its "
+    "position has to grow",
+    "channel_swap": "move one joint alone: the column that changes is its own",
+    "channel_order": "move one joint alone: the column that changes is its own",
+    "unit_error": "turn a joint by a known angle, or hold a known load, and compare with the numbers of the file",
+    "gear_ratio": "turn joint {joint} by a known angle and compare with its position",
+    "encoder_offset": "drive joint {joint} to the zero of the drawing and read its position",
+    "base_tilt": "lay a level on the base, and hold one pose with the arm stretched out",
+    "gravity_compensated_torque": "hold one pose with the arm stretched out: the torque has to carry the arm",
+    "dh_convention": "measure where the second joint axis is, and compare with the D-H table",
+    "inertia_reference": "ask the source of the robot file about which point its inertias are",
+    "link_data_error": "weigh link {joint}, or the tool, and measure its centre",
+    "clock_error": "compare the length of a run with a watch",
+    "time_delay": "step one joint and compare when torque and position begin to move",
+    "channel_skew": "step joint {joint} alone and compare when torque and position begin to move",
+    INERTIAL_ERROR: "weigh the link, or the tool, and measure its centre",
+}
+
+
+def describe(mistake: Mistake) -> str:
+    """What is wrong, in a clause."""
+    numbers = {name: value for name, value, _ in mistake.parameters}
+    place = "all joints" if mistake.joint is None else f"joint {mistake.joint}"
+    link = "all links" if mistake.joint is None else f"link {mistake.joint}"
+    pair = " and ".join(map(str, mistake.joints))
+    form = mistake.form
+    columns = POSITION_AND_TORQUE if form == "both" else form
+    texts = {
+        "torque_sign": f"the torque of {place} has the other sign",
+        "joint_direction": f"{place} counts the other way round ({form})",
+        "channel_swap": f"the {columns} columns of joints {pair} are exchanged",
+        "channel_order": f"the {columns} columns stand in the order {', '.join(map(str, mistake.joints))}",
+        "gravity_compensated_torque": "the recorded torque holds no gravity",
+        "dh_convention": f"the D-H table is of the {form} convention",
+        "inertia_reference": _reference_text(form),
+    }
+    if mistake.effect in texts:
+        return texts[mistake.effect]
+    value = float(np.sum(next(iter(numbers.values()), 0.0)))
+    if mistake.effect == "base_tilt":
+        gravity = ", ".join(f"{each:.2f}" for each in np.atleast_1d(np.array(numbers["gravity"])))
+        return f"gravity in the base frame is [{gravity}] m/s2: the base is mounted otherwise"
+    if mistake.effect == "encoder_offset":
+        turn = f"{np.rad2deg(value):+.1f} deg" if mistake.parameters[0][2] == "rad" else f"{value:+.4g} m"
+        return f"the zero of {place} is off: add {turn}"
+    if mistake.effect == "link_data_error":
+        what = {"centre_sign": "the centre has the other sign", "mass_unit": f"mass data are {value:g} times the true"}
+        return f"{link}: {what.get(form, f'inertias are {value:g} times the true')}"
+    if mistake.effect in ("time_delay", "channel_skew"):
+        return f"the torque of {place} is {1e3 * value:.0f} ms {'late' if value > 0 else 'early'}".replace("-", "")
+    if mistake.effect == "clock_error":
+        return f"the clock counts {value:.3g} times the true time"
+    if mistake.effect == "gear_ratio":
+        return f"{place} is recorded on the other side of a gear of ratio {value:.4g}"
+    return f"the {form} {'' if form == 'time' else f'of {place} '}is {value:.4g} times the true one: another unit"
+
+
+def _reference_text(form: str) -> str:
+    meanings = {
+        "inertia": "inertias are about the centres of mass, not about the link frames",
+        "centre": "first moments are given as centres of mass",
+        "inertia and centre": "centres of mass are given, and inertias about them",
+    }
+    return f"in the robot file {meanings.get(form, form)}"
+
+
+def measurement(effect: str, joint: int | None) -> str:
+    """What to measure to decide whether an effect is there."""
+    return MEASUREMENTS[effect].format(joint="one after the other" if joint is None else joint)

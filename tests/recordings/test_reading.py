@@ -1,0 +1,235 @@
+"""How recordings are to be read: each mistake is found at its joint, and nothing where nothing is wrong."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from recording_folders import ARM, POSITION, TORQUE, folder_with, frame
+
+from armlab.common.errors import InputError
+from armlab.recordings.check import check_recording
+from armlab.recordings.load import load_recording
+from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.corrected import correct_recording, corrected_texts
+from armlab.recordings.reading.fit import Fitter
+from armlab.recordings.reading.mistakes import encoder_offset, late_torque, signs, take_back
+from armlab.recordings.reading.reading import Mistake, read_as_is
+from armlab.recordings.reading.search import Judge, is_accepted, search_singles
+from armlab.recordings.reading.signals import thin_channels
+from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
+from armlab.recordings.reading.tuning import ReadingTuning
+from armlab.recordings.recording import Recording
+from problem.motion import Motion
+from problem.pseudo_inertia import least_eigenvalues
+from problem.regressor import rigid_body_torque
+
+TUNING = ReadingTuning()
+Change = Callable[[pd.DataFrame], None]
+
+
+def recording_with(folder: Path, change: Change | None = None, settings: dict[str, Any] | None = None) -> Recording:
+    """The three-joint arm, both runs changed alike."""
+    folder_with(folder, frame(), settings)
+    for file in ("run.csv", "check.csv"):
+        table = pd.read_csv(folder / file)
+        if change is not None:
+            change(table)
+        table.to_csv(folder / file, index=False)
+    return load_recording(folder)
+
+
+def answer_to(recording: Recording) -> Answer:
+    return read_rightly(recording, recording.arm.parameters, TUNING)
+
+
+def names_of(answer: Answer) -> list[str]:
+    return [each.mistake.label for each in answer.findings]
+
+
+def scale(columns: list[str], factor: float) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        table[columns] *= factor
+
+    return change
+
+
+def exchange(first: str, second: str) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        table[[first, second]] = table[[second, first]].to_numpy()
+
+    return change
+
+
+def shift(column: str, angle_deg: float) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        table[column] += np.deg2rad(angle_deg)
+
+    return change
+
+
+def late(columns: list[str], seconds: float) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        time = table["t"].to_numpy()
+        for column in columns:
+            table[column] = np.interp(time - seconds, time, table[column])
+
+    return change
+
+
+def test_a_recording_that_is_read_rightly_is_left_as_it_is(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "right")
+    answer = answer_to(recording)
+    assert answer.findings == ()
+    assert answer.recording is recording
+    assert answer.reason_inconclusive(TUNING) is None
+
+
+CASES: dict[str, tuple[Change, str, dict[str, float]]] = {
+    "torque sign": (scale(["tau2"], -1.0), "torque_sign@2", {}),
+    "both signs": (lambda table: scale(["q3", "tau3"], -1.0)(table), "joint_direction@3", {}),
+    "torque columns": (exchange("tau1", "tau3"), "channel_swap@1,3", {}),
+    "position columns": (exchange("q2", "q3"), "channel_swap@2,3", {}),
+    "zero by a quarter": (shift("q2", -90.0), "encoder_offset@2", {"offset": np.pi / 2}),
+    "zero of another size": (shift("q2", 40.0), "encoder_offset@2", {"offset": np.deg2rad(-40)}),
+    "degrees": (scale(POSITION, 180 / np.pi), "unit_error", {"factor": 180 / np.pi}),
+    "mN m": (scale(TORQUE, 1000.0), "unit_error", {"factor": 1000.0}),
+    "late torque": (late(TORQUE, 0.12), "time_delay", {"seconds": 0.12}),
+    "one late torque": (late(["tau2"], 0.2), "channel_skew@2", {"seconds": 0.2}),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_mistake_is_found_at_its_joint_and_taken_back(tmp_path: Path, case: str) -> None:
+    change, label, numbers = CASES[case]
+    right, wrong = recording_with(tmp_path / "right"), recording_with(tmp_path / "wrong", change)
+    answer = answer_to(wrong)
+    (found,) = answer.findings
+    assert label in [found.mistake.label, *(f"{each.effect}@{each.joint}" for each in found.rivals)]
+    for name, value in numbers.items():
+        assert answer.findings[0].mistake.value(name) == pytest.approx(value, rel=0.05)
+    for before, after in zip(right.runs if label == found.mistake.label else (), answer.recording.runs, strict=False):
+        rows = np.searchsorted(before.time, after.time)
+        assert after.torque == pytest.approx(before.torque[rows], abs=2.0)
+        assert after.position == pytest.approx(before.position[rows], abs=0.06)
+
+
+def test_gravity_of_another_direction_is_found_within_three_degrees(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig")
+    hanging = replace(recording, arm=replace(ARM, gravity=(0.0, 0.0, 9.81)))
+    (finding,) = answer_to(hanging).findings
+    assert finding.mistake.effect == "base_tilt"
+    direction = np.array(finding.mistake.parameters[0][1]) / 9.81
+    assert np.rad2deg(np.arccos(direction @ [0, 0, -1])) < 3
+
+
+def test_torque_without_gravity_is_found(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig")
+    changed = tuple(replace(run, torque=run.torque - _gravity_torque(run.position)) for run in recording.runs)
+    assert "gravity_compensated_torque" in names_of(answer_to(replace(recording, runs=changed)))
+
+
+def _gravity_torque(position: np.ndarray) -> np.ndarray:
+    still = np.zeros_like(position)
+    return rigid_body_torque(ARM, Motion(position, still, still))
+
+
+def test_two_mistakes_are_found_together(tmp_path: Path) -> None:
+    def change(table: pd.DataFrame) -> None:
+        scale(["tau2"], -1.0)(table)
+        shift("q3", -90.0)(table)
+
+    assert set(names_of(answer_to(recording_with(tmp_path / "rig", change)))) == {"torque_sign@2", "encoder_offset@3"}
+
+
+def test_the_corrected_folder_holds_the_recording_read_rightly(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "wrong")
+    reading = read_as_is(recording, ARM.parameters)
+    mistakes = (
+        Mistake("channel_swap", joints=(1, 3), form="torque"),
+        Mistake("joint_direction", 2, form="position"),
+        Mistake("encoder_offset", 3, parameters=(("offset", 0.5, "rad"),)),
+        Mistake("time_delay", parameters=(("seconds", 0.1, "s"),)),
+        Mistake("clock_error", parameters=(("factor", 1.25, ""),)),
+        Mistake("base_tilt", parameters=(("gravity", (0.0, 0.0, 9.81), "m/s2"),)),
+    )
+    for mistake in mistakes:
+        reading = take_back(reading, mistake, recording)
+    folder = tmp_path / "out" / "corrected"
+    folder.mkdir(parents=True)
+    for name, text in corrected_texts(recording.folder, reading, folder).items():
+        (folder / name).write_text(text)
+    again, wanted = load_recording(folder), correct_recording(recording, reading)
+    assert again.arm.gravity == (0.0, 0.0, 9.81)
+    for one, other in zip(again.runs, wanted.runs, strict=True):
+        assert one.time == pytest.approx(other.time, abs=1e-9)
+        assert one.torque == pytest.approx(other.torque, abs=1e-9)
+        assert one.position == pytest.approx(other.position, abs=1e-9)
+
+
+def test_a_mistake_is_the_same_when_it_is_taken_back_by_its_name(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig")
+    reading = read_as_is(recording, ARM.parameters)
+    for made in (next(iter(signs(reading))), encoder_offset(reading, 1, 0.5), late_torque(reading, None, 0.1)):
+        again = take_back(reading, made.mistakes[-1], recording)
+        assert np.array_equal(again.torque, made.torque)
+        assert np.array_equal(again.offset, made.offset)
+        assert np.array_equal(again.delay, made.delay)
+    with pytest.raises(ValueError, match="no such mistake"):
+        take_back(reading, Mistake("magic"), recording)
+
+
+def test_fitted_bodies_can_exist_and_friction_takes_energy(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig")
+    channels = thin_channels(recording, TUNING)
+    assert channels is not None
+    (score,) = Fitter(channels, TUNING).scores(read_as_is(recording, ARM.parameters), (TUNING.free_width,), True)
+    assert all(least_eigenvalues(values).min() > 0 for values in score.values)
+    assert score.own[:, :, :3].min() >= 0
+
+
+def test_what_frees_the_joints_of_their_links_is_no_unit(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig")
+    channels = thin_channels(recording, TUNING)
+    assert channels is not None
+    judge = Judge(Fitter(channels, TUNING), recording)
+    start = judge.trial(read_as_is(recording, ARM.parameters))
+    assert not any(is_accepted(judge, start, each) for each in search_singles(judge, start))
+
+
+def test_columns_that_bear_the_names_of_other_joints_are_named() -> None:
+    findings = compare_joint_names(["position_joint2", "position_joint1", "q3"], ARM, "position")
+    assert [each.joint for each in findings] == [1, 2]
+    assert "joint 2" in findings[0].text
+
+
+def test_torque_at_standstill_against_gravity_is_a_line_of_the_check(tmp_path: Path) -> None:
+    def hold(table: pd.DataFrame) -> None:
+        table.loc[:300, POSITION] = [0.0, 1.2, 0.0]
+        table.loc[:300, TORQUE] = 0.0
+
+    recording = recording_with(tmp_path / "rig", hold)
+    found = compare_standstill(recording, ARM.parameters, replace(TUNING, min_standstill_load=0.2))
+    assert {each.kind for each in found} == {"standstill"}
+
+
+def test_the_check_says_how_a_recording_is_to_be_read(tmp_path: Path) -> None:
+    recording_with(tmp_path / "wrong", scale(["tau2"], -1.0))
+    lines = [each.text for _, each in check_recording(tmp_path / "wrong").findings if each.kind == "setup"]
+    assert len(lines) == 1
+    assert "the torque of joint 2 has the other sign" in lines[0]
+
+
+def test_delays_for_another_number_of_joints_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="torque_delay should hold one number or 3, not 2"):
+        recording_with(tmp_path / "rig", settings={"timing": {"torque_delay": [0.1, 0.2]}})
+
+
+def test_a_recording_may_say_how_its_arm_is_mounted(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig", settings={"gravity": [0.0, 0.0, 9.81]})
+    assert recording.arm.gravity == (0.0, 0.0, 9.81)
+    assert yaml.safe_load((tmp_path / "rig" / "recording.yaml").read_text())["gravity"] == [0.0, 0.0, 9.81]
