@@ -4,7 +4,7 @@ BIN := .venv/bin
 COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study best-known real real-leave-one-out relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -49,6 +49,9 @@ paper: .venv/run ## all tables and figures of the paper, and what of it holds: r
 
 study: .venv/run ## the comparison where the paper stops: results/study/
 	$(BIN)/armlab study
+
+tune: .venv/dev ## every algorithm tuned with the same budget, judged on problems that took no part: results/tune/
+	$(BIN)/armlab tune
 
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
 	$(BIN)/armlab best-known

@@ -53,6 +53,7 @@ def _print_progress(text: str) -> None:
 @click.option(
     "--update-baseline", "task", flag_value="update_baseline", help="Make the results of the present code the baseline."
 )
+@click.option("--extend-baseline", "task", flag_value="extend_baseline", help="Add the cells that the baseline lacks.")
 @click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power (minutes).")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @click.option("--config", type=click.Path(path_type=Path), default=Path("configs/regression.yaml"), show_default=True)

@@ -39,7 +39,7 @@ def has_entry(names, year, known):
 
 
 def plain(text):
-    return text.replace("é", "e").replace("š", "s").replace("’", "'").lower()
+    return text.replace("é", "e").replace("ä", "a").replace("š", "s").replace("’", "'").lower()
 
 
 def docstrings_and_comments(path):

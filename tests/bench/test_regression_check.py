@@ -80,6 +80,24 @@ def test_unchanged_code_passes_and_is_identical_to_the_baselines_own_run(config:
     assert (config.parent / "results" / BASELINE_FILE).read_bytes() == written
 
 
+def test_a_baseline_gets_the_cells_that_it_lacks_and_keeps_the_others_to_the_digit(config: Path) -> None:
+    task = regression(config)
+    task.update_baseline()
+    path = task.results / BASELINE_FILE
+    before = json.loads(path.read_text())
+    config.write_text(SWEEP.replace("[spso, de]", "[spso, woa, de]"))
+    assert task.extend_baseline().lines[0].endswith("1 cells are new, 2 as they were")
+    after = json.loads(path.read_text())
+    assert [cell["algorithm"] for cell in after["cells"]] == ["spso", "woa", "de"]
+    assert [after["cells"][place] for place in (0, 2)] == before["cells"]
+    assert after["kept"] == before["provenance"]
+    assert task.check().exit_code == 0
+    assert "has every cell" in task.extend_baseline().lines[0]
+    config.write_text(config.read_text().replace("seed: 2}", "seed: 7}"))
+    with pytest.raises(InputError, match="was made with another 'baseline'"):
+        task.extend_baseline()
+
+
 def test_a_defect_fails_the_check_with_its_algorithm_named(config: Path) -> None:
     check = regression(config)
     check.update_baseline()

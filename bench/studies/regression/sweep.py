@@ -131,13 +131,17 @@ class Baseline:
     fixed_run: Ends
 
 
-def write_baseline(path: Path, sweep: Sweep, baseline: Baseline) -> None:
-    """Write the baseline with its configuration and provenance, a line for each sample of each cell."""
+def write_baseline(path: Path, sweep: Sweep, baseline: Baseline, kept: Any = None) -> None:
+    """Write the baseline with its configuration and provenance, a line for each sample of each cell.
+
+    kept: provenance of the cells that another code made, where there are any.
+    """
     head = {
         "schema": BASELINE_SCHEMA,
         "configuration": _sweep_configuration(sweep),
         "provenance": json.loads(provenance()),
     }
+    head |= {"kept": kept} if kept else {}
     cells = ",\n".join(_cell_text(cell, baseline) for cell in baseline.ends)
     text = json.dumps(head, indent=1, sort_keys=True).removesuffix("\n}")
     write_whole(path, f'{text},\n "cells": [\n{cells}\n ]\n}}\n')
@@ -145,6 +149,30 @@ def write_baseline(path: Path, sweep: Sweep, baseline: Baseline) -> None:
 
 def read_baseline(path: Path, sweep: Sweep) -> Baseline:
     """The baseline of that sweep; raises InputError if there is none, it is broken, or it is of another sweep."""
+    content = _read_content(path)
+    _check_configuration(content.get("configuration"), sweep, path)
+    baseline = _read_cells(content, path)
+    if baseline.ends.keys() != set(sweep.cells):
+        raise InputError(f"'cells' in {path} are not those of configuration '{sweep.name}': {_BASELINE_REMEDY}")
+    return baseline
+
+
+def read_part_of_baseline(path: Path, sweep: Sweep) -> tuple[Baseline, Any]:
+    """A baseline that may lack problems and algorithms of the sweep, and its provenance.
+
+    Raises InputError as `read_baseline` does, for every other difference.
+    """
+    content = _read_content(path)
+    recorded, wanted = content.get("configuration"), _sweep_configuration(sweep)
+    if isinstance(recorded, dict):
+        for key in ("problem", "algorithms"):  # what is added may differ, what was there may not
+            if all(entry in wanted[key] for entry in recorded.get(key, [])):
+                recorded = recorded | {key: wanted[key]}
+    _check_configuration(recorded, sweep, path)
+    return _read_cells(content, path), content.get("kept") or content.get("provenance")
+
+
+def _read_content(path: Path) -> dict[str, Any]:
     try:
         content = json.loads(path.read_text())
     except FileNotFoundError:
@@ -153,14 +181,14 @@ def read_baseline(path: Path, sweep: Sweep) -> Baseline:
         raise InputError(f"cannot read the baseline {path}: {error}") from None
     if not isinstance(content, dict) or content.get("schema") != BASELINE_SCHEMA:
         raise InputError(f"{path} is not a baseline of schema '{BASELINE_SCHEMA}': {_BASELINE_REMEDY}")
-    _check_configuration(content.get("configuration"), sweep, path)
+    return content
+
+
+def _read_cells(content: dict[str, Any], path: Path) -> Baseline:
     try:
-        baseline = Baseline(_read_ends(content, "baseline"), _read_ends(content, "fixed_run"))
+        return Baseline(_read_ends(content, "baseline"), _read_ends(content, "fixed_run"))
     except (KeyError, TypeError, ValueError):
         raise InputError(f"'cells' in {path} are not as they were written: {_BASELINE_REMEDY}") from None
-    if baseline.ends.keys() != set(sweep.cells):
-        raise InputError(f"'cells' in {path} are not those of configuration '{sweep.name}': {_BASELINE_REMEDY}")
-    return baseline
 
 
 def _sweep_configuration(sweep: Sweep) -> dict[str, Any]:

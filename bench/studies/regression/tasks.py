@@ -9,8 +9,10 @@ from bench.run import ProgressBar
 from bench.studies.regression.check import judge_run
 from bench.studies.regression.sweep import (
     Baseline,
+    Cell,
     plan_entries,
     read_baseline,
+    read_part_of_baseline,
     read_sweep,
     run_entries,
     write_baseline,
@@ -61,6 +63,28 @@ class RegressionTasks:
         write_baseline(path, sweep, baseline)
         verdict = judge_run(baseline, baseline.fixed_run, sweep.false_alarm_rate)
         return TaskReport([f"wrote {path}", *verdict.lines()], 0 if verdict.passed else 1)
+
+    def extend_baseline(self) -> TaskReport:
+        """Add the cells that the baseline lacks, and leave those that it has as they are.
+
+        Whether the present code still gives those is what `check` says afterwards.
+        """
+        sweep, path = read_sweep(self.config), self.results / BASELINE_FILE
+        known, kept = read_part_of_baseline(path, sweep)
+        ends, fixed = (
+            [entry for entry in entries if Cell(entry.problem, entry.algorithm) not in known.ends]
+            for entries in (plan_entries(sweep, sweep.baseline), plan_entries(sweep))
+        )
+        if not ends:
+            return TaskReport([f"{path} has every cell of configuration '{sweep.name}'"])
+        with self.bar(len(ends) + len(fixed), 0) as progress:
+            added = Baseline(
+                run_entries(ends, self.workers, progress.update), run_entries(fixed, self.workers, progress.update)
+            )
+        samples = ({**known.ends, **added.ends}, {**known.fixed_run, **added.fixed_run})
+        ordered = [{cell: sample[cell] for cell in sweep.cells if cell in sample} for sample in samples]
+        write_baseline(path, sweep, Baseline(*ordered), kept)
+        return TaskReport([f"wrote {path}: {len(added.ends)} cells are new, {len(known.ends)} as they were"])
 
     def calibrate(self) -> TaskReport:
         """Compute the check's false-alarm rate and power, and write them down."""
