@@ -111,7 +111,8 @@ def diagnose_recording(
     if diagnosis.setup is not None and diagnosis.setup.findings:
         yield f"corrected: {out / CORRECTED_FOLDER} holds the recording and the robot as they should be"
     if diagnosis.seconds:
-        yield f"diagnosed in {diagnosis.seconds:.1f} s once read; {_peak_memory_gb():.2f} GB of memory at most"
+        asked = f", {diagnosis.setup_seconds:.1f} s of it how it is to be read" if diagnosis.setup else ""
+        yield f"diagnosed in {diagnosis.seconds:.1f} s once read{asked}; {_peak_memory_gb():.2f} GB of memory at most"
 
 
 def _peak_memory_gb() -> float:
