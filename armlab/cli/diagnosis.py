@@ -71,6 +71,7 @@ def next_experiment(
     "--set", "changes", multiple=True, metavar="NUMBER=VALUE", help="Another tuning number, like noise.max_order=8."
 )
 @click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
+@click.option("--only-setup", is_flag=True, help="Look for these mistakes alone, not for physics.")
 def diagnose(
     recordings: tuple[Path, ...],
     out: Path,
@@ -81,6 +82,7 @@ def diagnose(
     without: tuple[str, ...],
     changes: tuple[str, ...],
     as_read: bool,
+    only_setup: bool,
 ) -> None:
     """Find the physics that the simulation of RECORDING lacks.
 
@@ -94,11 +96,13 @@ def diagnose(
 
     if old is not None and changes:
         raise InputError("--set: a comparison takes the usual tuning numbers, leave out --set or --compare")
+    if as_read and only_setup:
+        raise InputError("--as-read and --only-setup: give one of them")
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     with ProgressLine() as progress:
         lines = (
-            diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, progress.tell)
+            diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, only_setup, progress.tell)
             if old is None
             else compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
         )

@@ -51,6 +51,7 @@ _COMMANDS = {
     "next-loop": "armlab.cli.proof:next_loop",
     "score": "armlab.cli.proof:score",
     "prove": "armlab.cli.proof:prove",
+    "prove-setup": "armlab.cli.proof:prove_setup",
     "prove-changes": "armlab.cli.proof:prove_changes",
     "ablate": "armlab.cli.proof:ablate",
     "speed": "armlab.cli.maintenance:speed",

@@ -68,12 +68,13 @@ def diagnose(
     settings: Settings | None = None,
     progress: Progress = lambda message: None,
     as_read: bool = False,
+    only_setup: bool = False,
 ) -> Diagnosis:
     """Where the simulation and the recording differ, what physics is missing, and how much better it then predicts.
 
     baseline: what is compared; the simulation where there is one if left out. seed: of the surrogates' random waves.
-    progress: is told what is being done. as_read: the recording and the robot file are not doubted. Raises InputError
-    where the wanted baseline is not there.
+    progress: is told what is being done. as_read: the recording and the robot file are not doubted. only_setup: nothing
+    but the reading is asked. Raises InputError where the wanted baseline is not there.
     """
     started, settings = time.perf_counter(), settings or Settings()
     signs = signs_of_wrong_reading(recording)
@@ -86,12 +87,18 @@ def diagnose(
             simulation = read_simulation(recording, baseline)
             found = Diagnosis(recording, simulation, "inconclusive", reason, signs=signs, setup=setup)
             return replace(found, setup_seconds=read_after)
+    if only_setup:
+        asked = Diagnosis(recording, read_simulation(recording, baseline), "none", READ_RIGHTLY, signs=signs)
+        return with_setup(asked, setup, read_after)
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
         return with_setup(replace(design, signs=signs), setup, read_after)
     searched = search_effects(fit_background(design, library(), seed, progress), progress)
     found = replace(conclude(recording, searched, progress), signs=signs, seconds=time.perf_counter() - started)
     return with_setup(found, setup, read_after)
+
+
+READ_RIGHTLY = "Nothing else is wrong with the reading; physics was not asked."
 
 
 def find_setup(

@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from told_recordings import POSITION, TORQUE, frame, recording_in
 
 from armlab.cli.main import main
+from armlab.recordings.load import load_recording
 
 Make = Callable[[Path], Path]
 
@@ -77,10 +78,12 @@ REFUSED = {
 INCONCLUSIVE = {
     "too short": (lambda folder: recording_in(folder, frame(0, 0.8), frame(1, 0.8)), "too short"),
     "no motion": (resting(*POSITION), "No joint moves"),
-    "torque in N mm": (scaled(1000.0), "another unit"),
-    "torque of the wrong sign": (scaled(-1.0), "opposite sign"),
     "a dead torque channel": (resting("tau2"), "never changes"),
     "robot of another arm": (another_arm, "another"),
+}
+AS_READ = {
+    "torque in N mm": (scaled(1000.0), "another unit", "unit_error"),
+    "torque of the wrong sign": (scaled(-1.0), "opposite sign", "torque_sign"),
 }
 USED = {
     "a joint that never moves": resting("q1"),
@@ -113,6 +116,27 @@ def test_unusable_input_is_refused_in_one_line_and_nothing_is_written(name: str,
     assert word in error
     assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", AS_READ)
+def test_what_is_read_wrongly_is_corrected_unless_it_is_taken_as_read(name: str, tmp_path: Path) -> None:
+    make, word, effect = AS_READ[name]
+    folder = make(tmp_path / "recording")
+    assert run(folder, tmp_path / "as-read", "--as-read")[0] == 0
+    found = json.loads((tmp_path / "as-read" / "verdict.json").read_text())
+    assert (found["status"], found["findings"]) == ("inconclusive", [])
+    assert word in found["summary"]
+    assert run(folder, tmp_path / "out", "--only-setup")[0] == 0
+    found = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert (found["status"], [each["kind"] for each in found["findings"]]) == ("mismatch", ["setup"])
+    assert found["findings"][0]["effect"] == effect
+    assert len(found["summary"].split(". ")[0].split()) <= 30
+    assert load_recording(tmp_path / "out" / "corrected").runs
+    assert "read wrongly" in (tmp_path / "out" / "report.html").read_text()
+    refused = CliRunner().invoke(main, ["identify", str(folder), "--out", str(tmp_path / "model")])
+    assert refused.exit_code == 2
+    assert "--as-read" in refused.stderr
+    assert (tmp_path / "model" / "corrected" / "recording.yaml").is_file()
 
 
 @pytest.mark.parametrize("name", INCONCLUSIVE)

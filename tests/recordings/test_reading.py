@@ -17,11 +17,12 @@ from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
+from armlab.recordings.reading.judge import Judge, is_accepted
 from armlab.recordings.reading.mistakes import encoder_offset, late_torque, signs, take_back
 from armlab.recordings.reading.reading import Mistake, read_as_is
-from armlab.recordings.reading.search import Judge, is_accepted, search_singles
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
+from armlab.recordings.reading.singles import search_singles
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
 from problem.motion import Motion
@@ -93,13 +94,11 @@ CASES: dict[str, tuple[Change, str, dict[str, float]]] = {
     "torque sign": (scale(["tau2"], -1.0), "torque_sign@2", {}),
     "both signs": (lambda table: scale(["q3", "tau3"], -1.0)(table), "joint_direction@3", {}),
     "torque columns": (exchange("tau1", "tau3"), "channel_swap@1,3", {}),
-    "position columns": (exchange("q2", "q3"), "channel_swap@2,3", {}),
     "zero by a quarter": (shift("q2", -90.0), "encoder_offset@2", {"offset": np.pi / 2}),
     "zero of another size": (shift("q2", 40.0), "encoder_offset@2", {"offset": np.deg2rad(-40)}),
-    "degrees": (scale(POSITION, 180 / np.pi), "unit_error", {"factor": 180 / np.pi}),
-    "mN m": (scale(TORQUE, 1000.0), "unit_error", {"factor": 1000.0}),
+    "degrees of one joint": (scale(["q1"], 180 / np.pi), "unit_error@1", {"factor": 180 / np.pi}),
+    "mN m of one joint": (scale(["tau2"], 1000.0), "unit_error@2", {"factor": 1000.0}),
     "late torque": (late(TORQUE, 0.12), "time_delay", {"seconds": 0.12}),
-    "one late torque": (late(["tau2"], 0.2), "channel_skew@2", {"seconds": 0.2}),
 }
 
 

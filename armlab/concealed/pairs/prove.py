@@ -50,7 +50,7 @@ def prove_pairs(settings: PairSet, work: Path, results: Path, jobs: int) -> Iter
     missing = [plan for plan in plans if not (work / "observations" / plan.name).is_dir()]
     made = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_make)(plan, work) for plan in missing)
     yield from report_progress("made", made, max(len(missing), 1))
-    yield f"answers SHA-256 {_digest(work / 'truth')}"
+    yield f"answers SHA-256 {digest_of_answers(work / 'truth')}"
     names = [plan.name for plan in plans]
     waiting = [name for name in names if not is_answered(work / "verdicts" / name)]
     tasks = (delayed(_compare)(work, name) for name in waiting)
@@ -81,7 +81,7 @@ def _make(plan: PairPlan, work: Path) -> str:
     return plan.name
 
 
-def _digest(truth: Path) -> str:
+def digest_of_answers(truth: Path) -> str:
     """SHA-256 of all answers."""
     out = hashlib.sha256()
     for path in sorted(truth.glob("*.json")):

@@ -65,7 +65,7 @@ def read_verdict(path: Path) -> VerdictWithModel:
     """
     file = path / "verdict.json" if path.is_dir() else path
     verdict = read_verdict_file(file)
-    findings = tuple(_read_finding(each) for each in verdict.findings)
+    findings = tuple(_read_finding(each) for each in verdict.findings if each.kind != "setup")
     noise = np.array([each.noise_floor for each in verdict.fit], dtype=np.float64)
     beside = file.with_name("model.yaml")
     if not beside.is_file():

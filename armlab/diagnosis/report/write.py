@@ -72,14 +72,15 @@ def diagnose_recording(
     without: tuple[str, ...] = (),
     changes: tuple[str, ...] = (),
     as_read: bool = False,
+    only_setup: bool = False,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
     out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
-    numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted. progress:
-    called with the name of each step. Raises InputError, in one line, for a recording that cannot be used, an unknown
-    guard or an unknown tuning number.
+    numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted.
+    only_setup: nothing but the reading is asked. progress: called with the name of each step. Raises InputError, in one
+    line, for a recording that cannot be used, an unknown guard or an unknown tuning number.
     """
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     settings = Settings(guards=guards_without(without))
@@ -88,14 +89,14 @@ def diagnose_recording(
     recording = load_recording(folder)
     check_output_folder(out, recording)
     try:
-        diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read)
+        diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read, only_setup)
     except ValueError as error:
         raise InputError(f"{folder}: {error}") from None
     progress("writing the report")
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += [word for guard in without for word in ("--without", guard)]
     options += [word for change in changes for word in ("--set", change)]
-    options += ["--as-read"] if as_read else []
+    options += ["--as-read"] * as_read + ["--only-setup"] * only_setup
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     texts = verdict_texts(diagnosis, out) | report_texts(diagnosis, command) | predicted_texts(diagnosis)
     write_texts(texts, out)
@@ -110,7 +111,8 @@ def diagnose_recording(
     if diagnosis.setup is not None and diagnosis.setup.findings:
         yield f"corrected: {out / CORRECTED_FOLDER} holds the recording and the robot as they should be"
     if diagnosis.seconds:
-        yield f"diagnosed in {diagnosis.seconds:.1f} s once read; {_peak_memory_gb():.2f} GB of memory at most"
+        asked = f", {diagnosis.setup_seconds:.1f} s of it how it is to be read" if diagnosis.setup else ""
+        yield f"diagnosed in {diagnosis.seconds:.1f} s once read{asked}; {_peak_memory_gb():.2f} GB of memory at most"
 
 
 def _peak_memory_gb() -> float:

@@ -7,8 +7,9 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.recordings.reading.corrected import correct_recording
 from armlab.recordings.reading.fit import Fitter
+from armlab.recordings.reading.judge import Gain, Judge
 from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
-from armlab.recordings.reading.search import Found, Gain, Judge, find_mistakes
+from armlab.recordings.reading.search import Found, find_mistakes
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement

@@ -1,0 +1,87 @@
+"""The plan of a case: a simulated or a public recording, and the mistakes that are put into it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan, random_stream
+from armlab.concealed.setup.mistakes import EFFECTS, Injected, draw_mistake
+from problem.arm import Arm
+
+Source = Literal["simulated", "real", "null"]
+Kind = Literal["alone", "pair", "beside physics", "none", "near miss"]
+PUBLIC = ("kuka-kr300", "emps", "staubli-tx40", "unisa-ur10", "unisa-panda")
+KIND_CYCLE: tuple[Kind, ...] = ("alone", "alone", "pair", "beside physics")
+NULL_CYCLE: tuple[Kind, ...] = ("none", "near miss", "none")
+MAX_DRAWS = 60
+SOURCES: tuple[Source, ...] = get_args(Source)
+
+
+@dataclass(frozen=True)
+class SetupCase:
+    """One case. index: among those of its source. recording: a public one, empty for a simulated one."""
+
+    seed: int
+    source: Source
+    index: int
+    kind: Kind
+    recording: str = ""
+
+    @property
+    def name(self) -> str:
+        """A random name, which says nothing about the case."""
+        return random_stream("setup name", self.seed, self.source, self.index).bytes(6).hex()
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects, each comes once before any comes twice."""
+        if self.kind in ("none", "near miss"):
+            return ()
+        order = random_stream("setup order", self.seed, self.source).permutation(len(EFFECTS))
+        first = EFFECTS[order[self.index % len(EFFECTS)]]
+        second = EFFECTS[order[(self.index * 5 + 3) % len(EFFECTS)]]
+        return (first, second) if self.kind == "pair" and second != first else (first,)
+
+    def plan(self) -> Plan:
+        """The simulated recording; with hidden physics where the kind asks for it, else with none."""
+        hidden = self.kind == "beside physics" or (self.source == "null" and self.index % 2 == 1)
+        development = self.seed in DEVELOPMENT_SEEDS
+        plan = draw_plan(self.seed, self.index, "realistic", not hidden, development)
+        return _hang(plan, self) if self.kind == "near miss" else plan
+
+
+def draw_cases(seed: int, simulated: int, real: int, nulls: int) -> Iterator[SetupCase]:
+    """All cases of a set."""
+    for index in range(simulated):
+        yield SetupCase(seed, "simulated", index, KIND_CYCLE[index % len(KIND_CYCLE)])
+    for index in range(real):
+        kind: Kind = "pair" if index % 4 == 3 else "alone"
+        yield SetupCase(seed, "real", index, kind, PUBLIC[index % len(PUBLIC)])
+    for index in range(nulls):
+        yield SetupCase(seed, "null", index, NULL_CYCLE[index % len(NULL_CYCLE)])
+
+
+def draw_mistakes(case: SetupCase, arm: Arm) -> tuple[Injected, ...]:
+    """The mistakes of a case on an arm; an effect that has no place there gives way to another one."""
+    rng = random_stream("setup mistakes", case.seed, case.source, case.index)
+    out: list[Injected] = []
+    for wanted in case.effects:
+        effect = wanted
+        for _ in range(MAX_DRAWS):
+            drawn = draw_mistake(rng, effect, arm)
+            if drawn is not None and drawn.effect not in [each.effect for each in out]:
+                out.append(drawn)
+                break
+            effect = str(rng.choice(EFFECTS))
+    return tuple(out)
+
+
+def _hang(plan: Plan, case: SetupCase) -> Plan:
+    """The plan of an arm that really hangs, or stands on a wall, and whose file says so."""
+    rng = random_stream("setup mount", case.seed, case.index)
+    axis = np.array([(0.0, 0.0, 9.81), (9.81, 0.0, 0.0), (0.0, -9.81, 0.0)][int(rng.integers(3))])
+    gravity = (float(axis[0]), float(axis[1]), float(axis[2]))
+    machine = replace(plan.machine, file=plan.machine.file.model_copy(update={"gravity": gravity}))
+    return replace(plan, machine=machine, true_arm=replace(plan.true_arm, gravity=gravity))

@@ -1,0 +1,162 @@
+"""The score: right names of the mistakes that can be seen, and setup findings where nothing is wrong.
+
+A mistake is named rightly where its effect and place are a setup finding, or in the class of one, of three names at
+most. What no motion tells from it counts as it: torque of the other sign and a joint whose position alone counts the
+other way round.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.statistics import wilson_interval
+from armlab.concealed.score.cases import FAILURE_FILE
+
+MAX_CLASS = 3  # names
+
+
+@dataclass(frozen=True)
+class SetupOutcome:
+    """One case: what is true of it, and what was said. right: of each mistake. false: findings that are not true.
+
+    physics_right: hidden physics that is named, of `physics`.
+    """
+
+    case: str
+    source: str
+    kind: str
+    mistakes: list[str]
+    seen: list[bool]
+    named: list[str]
+    right: list[bool]
+    false: int
+    status: str
+    physics: int
+    physics_right: int
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share with its 95 % interval (Wilson 1927)."""
+
+    name: str
+    hits: int
+    number: int
+
+    @property
+    def text(self) -> str:
+        """Share, interval and counts."""
+        low, high = wilson_interval(self.hits, self.number)
+        share = f"{self.hits / self.number:.1%}" if self.number else "-"
+        return f"{share} ({low:.1%} to {high:.1%}), {self.hits} of {self.number}"
+
+
+def score_setup(work: Path, names: Sequence[str], results: Path) -> tuple[list[Share], list[SetupOutcome]]:
+    """Judges all cases and writes setup.md and setup.json."""
+    outcomes = [_judge(work, name) for name in names]
+    shares = _measure(outcomes)
+    rows = [(each.name, each.text) for each in shares]
+    missed = [
+        (each.source, each.kind, "; ".join(each.mistakes), str(each.seen), "; ".join(each.named) or each.status)
+        for each in outcomes
+        if each.false or not all(right or not seen for right, seen in zip(each.right, each.seen, strict=True))
+    ]
+    heads = ("source", "kind", "true", "can be seen", "said")
+    page = markdown_page(
+        "How recordings are read: score",
+        markdown_table(("measure", "value"), rows),
+        "## Misses and false corrections",
+        markdown_table(heads, missed) if missed else "None.",
+    )
+    content = json.dumps([asdict(each) for each in outcomes], indent=1) + "\n"
+    write_texts({"setup.md": page, "setup.json": content}, results)
+    return shares, outcomes
+
+
+def score_lines(scored: tuple[list[Share], list[SetupOutcome]]) -> Iterator[str]:
+    """The measures as lines."""
+    yield from (f"{each.name}: {each.text}" for each in scored[0])
+
+
+def _measure(outcomes: Sequence[SetupOutcome]) -> list[Share]:
+    out = []
+    for source in ("simulated", "real"):
+        own = [each for each in outcomes if each.source == source]
+        seen = [right for each in own for right, sight in zip(each.right, each.seen, strict=True) if sight]
+        unseen = [sight for each in own for sight in each.seen]
+        out.append(Share(f"{source}: named rightly, of those that can be seen", sum(seen), len(seen)))
+        out.append(Share(f"{source}: can be seen", sum(unseen), len(unseen)))
+        out.append(Share(f"{source}: cases with a false setup finding", sum(each.false > 0 for each in own), len(own)))
+    nulls = [each for each in outcomes if each.source == "null"]
+    out.append(Share("nothing wrong: cases with a setup finding", sum(each.false > 0 for each in nulls), len(nulls)))
+    for name, own in (("beside a mistake", [each for each in outcomes if each.mistakes]), ("alone", nulls)):
+        total = sum(each.physics for each in own)
+        out.append(Share(f"hidden physics named, {name}", sum(each.physics_right for each in own), total))
+    return out
+
+
+def _judge(work: Path, name: str) -> SetupOutcome:
+    truth = json.loads((work / "truth" / f"{name}.json").read_text(encoding="utf-8"))
+    folder = work / "verdicts" / name
+    failed = (folder / FAILURE_FILE).is_file()
+    verdict = {} if failed else json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+    findings = verdict.get("findings", [])
+    setup = [each for each in findings if each.get("kind") == "setup"]
+    true = [_label(each) for each in truth["mistakes"]]
+    classes = [_class_of(each) for each in setup]
+    single = truth["arm_joints"] == 1
+    right = [any(_is_named(each, members, single) for members in classes) for each in truth["mistakes"]]
+    false = sum(not any(_is_named(each, members, single) for each in truth["mistakes"]) for members in classes)
+    named = [[each["effect"], each["joint"]] for each in findings if each.get("kind") != "setup"]
+    refused = (folder / FAILURE_FILE).read_text(encoding="utf-8").strip() if failed else ""
+    return SetupOutcome(
+        case=name,
+        source=truth["source"],
+        kind=truth["kind"],
+        mistakes=true,
+        seen=truth["seen"],
+        named=[", ".join(f"{effect}@{place}" for effect, place in members) for members in classes],
+        right=right,
+        false=false,
+        status=refused or verdict.get("status", ""),
+        physics=len(truth["physics"]),
+        physics_right=sum(each in named for each in truth["physics"]),
+    )
+
+
+def _class_of(finding: dict[str, Any]) -> list[tuple[str, str]]:
+    """Effects and places of a finding and of its class, of three names at most; none of a larger one."""
+    members = finding.get("class") or [finding]
+    if len(members) > MAX_CLASS:
+        return []
+    own = (finding["effect"], _place(finding["joint"], finding.get("joints") or []))
+    return [own, *((each["effect"], _place(each["joint"], [])) for each in members)]
+
+
+def _is_named(true: dict[str, Any], members: list[tuple[str, str]], single: bool) -> bool:
+    """Whether a class holds a mistake. single: an arm of one joint, where all joints are that joint."""
+    names = [true["effect"]]
+    if true["effect"] == "torque_sign":
+        names.append("joint_direction")
+    if true["effect"] == "joint_direction" and true["form"] == "position":
+        names.append("torque_sign")
+    if single and true["effect"] in ("time_delay", "channel_skew"):
+        names += ["time_delay", "channel_skew"]
+    place = _place(true["joint"], true["joints"])
+    return any(
+        effect in names and (where == place or (single and {where, place} <= {"-", "1"})) for effect, where in members
+    )
+
+
+def _place(joint: int | None, joints: Sequence[int]) -> str:
+    return ",".join(map(str, joints)) if len(joints) > 1 else "-" if joint is None else str(joint)
+
+
+def _label(mistake: dict[str, Any]) -> str:
+    place = _place(mistake["joint"], mistake["joints"])
+    size = f" {mistake['size']:.3g}" if mistake["size"] else ""
+    return f"{mistake['effect']}@{place} {mistake['form']}{size}".strip()

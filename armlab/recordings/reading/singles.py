@@ -1,0 +1,203 @@
+"""Every mistake alone on top of a reading; those with a number are scanned, and the best of them refined."""
+
+from collections.abc import Callable, Iterable
+from functools import partial
+
+import numpy as np
+from scipy.optimize import minimize, minimize_scalar
+
+from armlab.common.arrays import Array
+from armlab.recordings.reading import mistakes as table
+from armlab.recordings.reading.judge import Gain, Judge, Trial
+from armlab.recordings.reading.mistakes import joint_names
+from armlab.recordings.reading.reading import Reading
+
+
+def search_singles(judge: Judge, start: Trial) -> list[Trial]:
+    """Every mistake alone on top of a reading, refined, the best first."""
+    reading = start.reading
+    absurd = judge.fitter.implausible(reading)
+    found = [
+        judge.trial(each)
+        for each in _exact(judge, reading)
+        if judge.is_size_plausible(reading, each) and judge.fitter.implausible(each) <= absurd
+    ]
+    found += _zeros(judge, start)
+    found += _gravities(judge, start)
+    found += _delays(judge, start)
+    found += _clocks(judge, start)
+    found += _gears(judge, start)
+    return sorted(found, key=lambda each: each.loss + judge.tuning.rare_loss * table.is_rare(each.reading.mistakes[-1]))
+
+
+def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
+    yield from table.signs(reading)
+    yield from table.exchanges(reading, joint_names(reading.arm))
+    for each in table.units(reading):
+        if not (judge.clock_is_right and each.clock != reading.clock):
+            yield each
+    yield table.without_gravity(reading)
+    yield from table.robot_file_meanings(reading, judge.recording)
+    if reading.inertial is not None:
+        yield from _torque_factors(judge, reading)
+
+
+def _torque_factors(judge: Judge, reading: Reading) -> Iterable[Reading]:
+    """Factors between the torque and that of the links as given, where they are far from one."""
+    score = judge.fitter.torque_gains(reading)
+    own = np.array([gain for gain, _ in score])
+    sure = np.array([share for _, share in score]) > judge.tuning.min_gain_share
+    if reading.joints > 1 and sure.any():
+        yield from _torque_factor(judge, reading, None, float(np.median(own[sure])))
+    for joint in np.flatnonzero(sure):
+        yield from _torque_factor(judge, reading, int(joint), float(own[joint]))
+
+
+def _torque_factor(judge: Judge, reading: Reading, joint: int | None, factor: float) -> Iterable[Reading]:
+    limit = judge.tuning.min_unit_factor
+    if factor > limit or 0 < factor < 1 / limit:
+        near = min(table.TORQUE_UNITS, key=lambda each: abs(np.log(each / factor)))
+        known = abs(np.log(near / factor)) < judge.tuning.unit_tolerance
+        yield table.unit_error(reading, joint, table.TORQUE, near if known else factor)
+
+
+def _refine(make: Callable[[float], Reading], judge: Judge, around: float, reach: float) -> Trial:
+    """The best reading of a number within a reach of a start."""
+    outcome = minimize_scalar(
+        lambda value: judge.trial(make(float(value))).loss,
+        bounds=(around - reach, around + reach),
+        method="bounded",
+        options={"maxiter": judge.tuning.refine_steps, "xatol": 1e-3 * reach},
+    )
+    return judge.trial(make(float(outcome.x)))
+
+
+def _zeros(judge: Judge, start: Trial) -> list[Trial]:
+    """Zeros of each joint that turns: scanned, the best refined, a quarter of a turn where that is as good."""
+    out = []
+    for joint, own in enumerate(start.reading.arm.joints):
+        if own.kind != "revolute":
+            continue
+
+        def make(angle: float, joint: int = joint) -> Reading:
+            return table.encoder_offset(start.reading, joint, float(np.deg2rad(angle)))
+
+        scanned = {angle: judge.trial(make(angle)) for angle in table.ZERO_STEPS if angle}
+        out += [scanned[angle] for angle in table.QUARTERS]
+        best = min(scanned, key=lambda angle: scanned[angle].loss)
+        if scanned[best].loss > start.loss - judge.tuning.min_refined_gain and best in table.QUARTERS:
+            continue
+        refined = _refine(make, judge, best, 30.0)
+        angle = np.rad2deg(refined.reading.mistakes[-1].value("offset"))
+        quarter = round(angle / 90) * 90
+        if abs(angle) >= judge.tuning.min_zero_deg and not _is_quarter(judge, scanned.get(quarter), refined, angle):
+            out.append(refined)
+    return out
+
+
+def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float) -> bool:
+    """Whether a zero is a multiple of 90 degrees: near it, or the data do not tell it from one not far away."""
+    if turned is None:
+        return False
+    off = abs(angle - np.rad2deg(turned.reading.mistakes[-1].value("offset")))
+    if off < judge.tuning.quarter_tolerance_deg:
+        return True
+    gain = Gain.between(turned, refined)
+    doubtful = gain.near < judge.tuning.min_quarter_gain or gain.near_sigmas < judge.tuning.min_sigmas
+    return off < judge.tuning.quarter_reach_deg and doubtful
+
+
+def _gravities(judge: Judge, start: Trial) -> list[Trial]:
+    """Directions of gravity: the best of some, refined over both angles."""
+    size = float(np.linalg.norm(start.reading.arm.gravity))
+    if size == 0:
+        return []
+    coarse = [judge.trial(each) for each in table.gravity_directions(start.reading)]
+    best = min(coarse, key=lambda each: each.loss)
+    if best.loss > start.loss - judge.tuning.min_refined_gain:
+        return [best]
+    centre = np.array(best.reading.arm.gravity) / size
+    side = np.linalg.svd(centre[None])[2][1:]
+
+    def make(tilt: Array) -> Reading:
+        direction = centre + tilt @ side
+        return table.base_tilt(start.reading, size * direction / np.linalg.norm(direction))
+
+    steps = {"maxfev": 6 * judge.tuning.refine_steps, "initial_simplex": np.array([[0, 0], [0.4, 0], [0, 0.4]])}
+    outcome = minimize(lambda tilt: judge.trial(make(tilt)).loss, np.zeros(2), method="Nelder-Mead", options=steps)
+    refined = judge.trial(make(outcome.x))
+    tilt = angle_between(np.array(refined.reading.arm.gravity), np.array(start.reading.arm.gravity))
+    return [best, *([refined] if tilt >= judge.tuning.min_tilt_deg else [])]
+
+
+def angle_between(first: Array, second: Array) -> float:
+    """Angle of two vectors, degrees."""
+    size = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(np.rad2deg(np.arccos(np.clip(first @ second / size, -1, 1)))) if size > 0 else 180.0
+
+
+def _delays(judge: Judge, start: Trial) -> list[Trial]:
+    """Shifts of torque, of all joints and of one."""
+    margin, least = judge.fitter.channels.margin_s, judge.tuning.min_delay_s
+    if margin <= least:
+        return []
+    shifts = np.geomspace(least, margin, judge.tuning.delay_steps)
+    out = []
+    for joint in (None, *(range(start.reading.joints) if start.reading.joints > 1 else ())):
+
+        def make(seconds: float, joint: int | None = joint) -> Reading:
+            return table.late_torque(start.reading, joint, seconds)
+
+        scanned = {shift: judge.trial(make(float(shift))) for shift in (*shifts, *-shifts)}
+        best = min(scanned, key=lambda shift: scanned[shift].loss)
+        if scanned[best].loss > start.loss - judge.tuning.min_refined_gain:
+            continue
+        reach = abs(best) * (shifts[1] / shifts[0] - 1)
+        refined = _refine(make, judge, float(np.clip(best, reach - margin, margin - reach)), float(reach))
+        if abs(refined.reading.mistakes[-1].value("seconds")) >= least:
+            out.append(refined)
+    return out
+
+
+def _clocks(judge: Judge, start: Trial) -> list[Trial]:
+    """Clocks that run too fast or too slow."""
+    if judge.clock_is_right:
+        return []
+    scale = np.log(judge.tuning.max_clock_factor)
+
+    def make(logarithm: float) -> Reading:
+        return table.clock_error(start.reading, float(np.exp(logarithm)))
+
+    grid = scale * np.linspace(-1, 1, judge.tuning.clock_steps)
+    scanned = {value: judge.trial(make(value)) for value in grid}
+    best = min(scanned, key=lambda value: scanned[value].loss)
+    if scanned[best].loss > start.loss - judge.tuning.min_refined_gain:
+        return []
+    refined = _refine(make, judge, float(best), float(grid[1] - grid[0]))
+    factor = refined.reading.mistakes[-1].value("factor")
+    return [refined] if abs(np.log(factor)) >= np.log(judge.tuning.min_clock_factor) else []
+
+
+def _gears(judge: Judge, start: Trial) -> list[Trial]:
+    """Ratios of gears, of joints that travel further than an arm can or hardly at all."""
+    out = []
+    motion = judge.fitter.columns(start.reading).motion
+    travel = np.ptp(motion.position, axis=0)
+    for joint, own in enumerate(start.reading.arm.joints):
+        far, little = judge.tuning.far_travel, judge.tuning.little_travel
+        if own.kind != "revolute" or little <= travel[joint] <= far:
+            continue
+        outwards = travel[joint] > far
+
+        def make(logarithm: float, sign: float, joint: int = joint) -> Reading:
+            return table.gear_ratio(start.reading, joint, sign * float(np.exp(logarithm)))
+
+        grid = np.log(table.GEAR_RATIOS) * (1 if outwards else -1)
+        pairs = [(value, sign) for value in grid for sign in (1.0, -1.0)]
+        plausible = [each for each in pairs if joint not in judge.fitter.implausible(make(*each))]
+        if not plausible:
+            continue
+        scanned = {each: judge.trial(make(*each)) for each in plausible}
+        value, sign = min(scanned, key=lambda each: scanned[each].loss)
+        out.append(_refine(partial(make, sign=sign), judge, float(value), abs(float(grid[1] - grid[0]))))
+    return out
