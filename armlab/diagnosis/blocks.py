@@ -112,6 +112,16 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
     return BlockCovariance(np.asarray(spread * np.outer(scale, scale)), degrees)
 
 
+def variance_inflation(shape: Array, errors: Array) -> float:
+    """By how much correlated errors (rows,) widen the variance of the size of a known shape (rows,); at least one.
+
+    The sum of c_s(k) c_e(k) over lags k, c_s and c_e the autocorrelations of shape and errors, one at lag zero.
+    """
+    powers = [np.abs(np.fft.rfft(each, 2 * len(each))) ** 2 for each in (shape, errors)]
+    of_shape, of_errors = (np.fft.irfft(each) for each in powers)
+    return max(float(of_shape @ of_errors) / max(float(of_shape[0] * of_errors[0]), 1e-300), 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Folds:
     """Whitened rows of a wide fit, cut into folds of whole stretches of time. precision: of the parameters' prior."""

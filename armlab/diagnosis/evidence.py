@@ -12,9 +12,11 @@ from armlab.diagnosis.blocks import (
     BlockCovariance,
     Folds,
     Gain,
+    WhitenedRows,
     block_covariance,
     block_numbers,
     held_out_gain,
+    variance_inflation,
 )
 from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.fitted_model import FittedModel, fit_values, split_fit
@@ -45,14 +47,26 @@ class Comparison:
     def covariance_of(self, state: State) -> BlockCovariance:
         """Robust covariance of the parameters of a state within the wide fit."""
         chosen = self._chosen(state)
-        rows, fit = self.folds.rows, self.model.solver.fit(state)
-        errors = [
-            target - design[:, chosen] @ fit_values(fit)
-            for target, design in zip(self.folds.targets, rows.designs, strict=True)
-        ]
-        own = type(rows)(tuple(design[:, chosen] for design in rows.designs), tuple(errors), rows.blocks)
         precision = self.folds.precision[np.ix_(chosen, chosen)]
-        return block_covariance(own, precision, self.model.design.settings.guards.robust_variance)
+        return block_covariance(
+            self._rows_of(state, chosen), precision, self.model.design.settings.guards.robust_variance
+        )
+
+    def _rows_of(self, state: State, chosen: list[int]) -> WhitenedRows:
+        """Whitened rows of a state, with what it leaves."""
+        rows, values = self.folds.rows, fit_values(self.model.solver.fit(state))
+        designs = tuple(design[:, chosen] for design in rows.designs)
+        errors = (target - design @ values for target, design in zip(self.folds.targets, designs, strict=True))
+        return WhitenedRows(designs, tuple(errors), rows.blocks)
+
+    def event_inflation(self, state: State, place: Sequence[int], joint: int) -> float:
+        """`variance_inflation` of what happens once at a joint (from 0). place: of its coefficients in the fit.
+
+        No other stretch shows how its like would scatter, so the correlation of what all of them leave has to say it.
+        """
+        rows = self._rows_of(state, self._chosen(state))
+        event = rows.designs[joint][:, place] @ fit_values(self.model.solver.fit(state))[list(place)]
+        return variance_inflation(event, rows.errors[joint])
 
     def _chosen(self, state: State) -> list[int]:
         """Where the parameters of a smaller state stand among those of the wide fit."""
@@ -352,8 +366,12 @@ class Judge:
 
     def _tested(self, fit: Fit, spread: BlockCovariance, group: int) -> float:
         columns = self.model.solver.groups[group].columns
-        largest = self.model.design.settings.tuning.blocks.max_variance_ratio
-        return spread.p_value(fit.coefficients[columns], self._place(fit, group), largest)
+        largest, place = self.model.design.settings.tuning.blocks.max_variance_ratio, self._place(fit, group)
+        candidate = self.model.solver.groups[group].candidate
+        if candidate.facts.single_event:
+            inflation = self.compared.event_inflation(fit.state, place, candidate.rows[0])
+            spread = replace(spread, covariance=spread.covariance * inflation)
+        return spread.p_value(fit.coefficients[columns], place, largest)
 
     def _beyond(self, group: int, simpler: tuple[int, ...]) -> float:
         """P-value of what a group explains that the simpler ones in it do not."""

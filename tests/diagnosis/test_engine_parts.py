@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armlab.diagnosis.blocks import held_out_gain
+from armlab.diagnosis.blocks import held_out_gain, variance_inflation
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.links import link_prior
@@ -146,3 +146,14 @@ def test_a_gain_in_few_stretches_is_sure_but_in_one_alone_is_not() -> None:
     assert held_out_gain(noise + once, noise, blocks).chance > 0.01
     assert held_out_gain(noise, noise + 0.1 * few, blocks).chance > 0.5
     assert held_out_gain(noise + 0.3, noise, blocks).p_value < 1e-6
+
+
+def test_correlated_errors_widen_what_happens_once_as_they_do_on_the_average() -> None:
+    rng, rows = np.random.default_rng(0), np.arange(4000)
+    shape = np.where((rows > 2000) & (rows < 2200), 1.0, 0.0)
+    white = rng.standard_normal((400, len(rows)))
+    slow = lfilter([1.0], [1.0, -0.9], white)
+    scatter = np.var(slow @ shape) / (np.var(slow) * float(shape @ shape))
+    found = [variance_inflation(shape, each) for each in slow]
+    assert np.mean(found) == pytest.approx(scatter, rel=0.15)
+    assert np.mean([variance_inflation(shape, each) for each in white]) < 1.3
