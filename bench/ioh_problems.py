@@ -17,7 +17,7 @@ from problem.registry import parse_problem
 from problem.suite import instances
 
 
-class SuiteProblem(ioh.problem.RealSingleObjective):
+class SuiteProblem(ioh.problem.RealSingleObjective):  # type: ignore[misc]
     """A problem of a suite in its own coordinates and box; what is minimised is its fitness, penalties included."""
 
     def __init__(self, name: str, number: int) -> None:
