@@ -123,9 +123,10 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     judge = Judge(Fitter(channels, tuning), recording)
     start = judge.trial(read_as_is(recording, inertial))
     found = find_mistakes(judge, start)
-    share = overall_error(judge, start.reading)
-    if found.best is found.start:
-        tried = tuple(describe(each.reading.mistakes[-1]) for each in found.tried)
+    share = overall_error(judge, start.reading, near=False)
+    if found.best is found.start or overall_error(judge, found.best.reading, near=True) > tuning.max_read_error:
+        nearest = found.tried if found.best is found.start else (found.best,)
+        tried = tuple(describe(mistake) for each in nearest for mistake in each.reading.mistakes)
         return Answer((), recording, None, share, tried=tried, looks=found.looks)
     findings = tuple(_finding(judge, found, place) for place in range(len(found.best.reading.mistakes)))
     open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
@@ -138,9 +139,9 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     return Answer(findings, corrected, found.best.reading, before, zeros, looks=found.looks)
 
 
-def overall_error(judge: Judge, reading: Reading) -> float:
-    """Held-out error with free links, geometric mean over the joints, of the torque's scatter."""
-    errors, _ = judge.errors(reading, near=False)
+def overall_error(judge: Judge, reading: Reading, near: bool) -> float:
+    """Held-out error, geometric mean over the joints, of the torque's scatter. near: links near the simulation's."""
+    errors, _ = judge.errors(reading, near)
     return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-6)))))
 
 
