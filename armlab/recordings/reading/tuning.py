@@ -163,3 +163,6 @@ class ReadingTuning:
         meaning="what a corrected recording leaves at most, geometric mean over joints; else no correction is made",
         source="public arms read rightly leave 0.05 to 0.15; a robot file of another arm 0.3 at its best reading",
     )
+    level_reach_deg: float = tuned(
+        10.0, unit="deg", meaning="gravity so near to an axis of the base is that axis where the data do not tell"
+    )
