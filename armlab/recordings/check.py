@@ -206,6 +206,7 @@ def _check_reading(recording: Recording, inertial: Array | None, tuning: Reading
     findings = []
     for each in answer.findings:
         rivals = "".join(f"; or {rival.text}" for rival in each.rivals)
-        text = f"{describe(each.mistake)}{rivals} (error {each.share_before:.0%}, read so {each.share_after:.0%})"
+        text = f"{describe(each.mistake)}{rivals} (error of joint {each.worst_joint} {each.share_before:.0%}, read so "
+        text += f"{each.share_after:.0%})"
         findings.append(Finding("setup", "warning", text, each.mistake.joint))
     return tuple(findings)

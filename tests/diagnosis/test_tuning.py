@@ -27,7 +27,8 @@ def test_every_number_says_what_it_means_and_where_it_comes_from() -> None:
 
 
 def test_every_number_is_used() -> None:
-    files = [each for each in (ROOT / "armlab" / "diagnosis").rglob("*.py") if each.name != "tuning.py"]
+    folders = (ROOT / "armlab" / "diagnosis", ROOT / "armlab" / "recordings" / "reading")
+    files = [each for folder in folders for each in folder.rglob("*.py") if each.name != "tuning.py"]
     code = "\n".join(each.read_text(encoding="utf-8") for each in files)
     names = [each.name.split(".")[1] for each in tuning_numbers(Tuning())]
     assert [name for name in names if not re.search(rf"\.{name}\b", code)] == []

@@ -92,7 +92,7 @@ def setup_section(diagnosis: Diagnosis) -> str:
         size = joint_unit(diagnosis.simulation.arm, each.worst_joint - 1)
         error = (
             f"{format_number(each.rms_before)} → {format_number(each.rms_after)} {size} (joint {each.worst_joint}); "
-            f"{each.share_before:.0%} → {each.share_after:.0%} of all"
+            f"{each.share_before:.0%} → {each.share_after:.0%} of its torque"
         )
         rivals = "; ".join(rival.text for rival in each.rivals)
         rows.append([describe(each.mistake), error, rivals or "–", each.next_experiment or "–"])

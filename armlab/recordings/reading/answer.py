@@ -31,7 +31,7 @@ class Rival:
 class SetupFinding:
     """One mistake. worst_joint: from 1, where the errors fall most; rms_before, rms_after: there, N m (N).
 
-    share_before, share_after: of all joints, of the torque's scatter, without and with this one taken back. sigmas: of
+    share_before, share_after: the same over the torque's scatter, without and with this one taken back. sigmas: of
     the fall between blocks of time. probability: of the name against its rivals.
     """
 
@@ -50,8 +50,8 @@ class SetupFinding:
     def text(self) -> str:
         """What is wrong, and the evidence."""
         return (
-            f"{describe(self.mistake)} (read so, the held-out error falls from {self.share_before:.0%} to "
-            f"{self.share_after:.0%})"
+            f"{describe(self.mistake)} (read so, the held-out error of joint {self.worst_joint} falls from "
+            f"{self.share_before:.0%} to {self.share_after:.0%} of its torque)"
         )
 
 
@@ -64,6 +64,7 @@ class Answer:
     are findings. undecided: joints whose zero the data do
     not tell by quarters of a turn, where a zero is a finding. open: mistakes of which too many fit alike to correct
     one. tried: what was tried where the recording fits badly. looks: how many readings were compared.
+    share_after: of the recording as it should be read.
     """
 
     findings: tuple[SetupFinding, ...]
@@ -74,6 +75,7 @@ class Answer:
     open: tuple[SetupFinding, ...] = ()
     tried: tuple[str, ...] = ()
     looks: int = 0
+    share_after: float = 0.0
 
     @property
     def sentence(self) -> str:
@@ -81,12 +83,11 @@ class Answer:
         if not self.findings:
             return ""
         mistakes = "; ".join(describe(each.mistake) for each in self.findings)
-        before, after = self.share, self.findings[-1].share_after
         zeros = ", ".join(map(str, self.undecided))
         told = f" These data do not tell the zero of joint {zeros} by quarters of a turn." if zeros else ""
         return (
-            f"The recording is read wrongly: {mistakes}. Read rightly, the held-out error falls from {before:.0%} to "
-            f"{after:.0%} of the torque.{told}"
+            f"The recording is read wrongly: {mistakes}. Read rightly, the held-out error falls from {self.share:.1%} "
+            f"to {self.share_after:.1%} of the torque.{told}"
         )
 
     def reason_inconclusive(self, tuning: ReadingTuning) -> str | None:
@@ -123,9 +124,10 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     judge = Judge(Fitter(channels, tuning), recording)
     start = judge.trial(read_as_is(recording, inertial))
     found = find_mistakes(judge, start)
-    share = overall_error(judge, start.reading)
-    if found.best is found.start:
-        tried = tuple(describe(each.reading.mistakes[-1]) for each in found.tried)
+    share = overall_error(judge, start.reading, near=False)
+    if found.best is found.start or overall_error(judge, found.best.reading, near=True) > tuning.max_read_error:
+        nearest = found.tried if found.best is found.start else (found.best,)
+        tried = tuple(describe(mistake) for each in nearest for mistake in each.reading.mistakes)
         return Answer((), recording, None, share, tried=tried, looks=found.looks)
     findings = tuple(_finding(judge, found, place) for place in range(len(found.best.reading.mistakes)))
     open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
@@ -133,14 +135,13 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
         return Answer((), recording, None, share, open=open_ones, looks=found.looks)
     zeros = found.undecided if any(each.mistake.effect == "encoder_offset" for each in findings) else ()
     corrected = correct_recording(recording, found.best.reading)
-    errors, _ = judge.errors(start.reading, near=True)
-    before = float(np.sqrt(np.mean(errors**2)))
-    return Answer(findings, corrected, found.best.reading, before, zeros, looks=found.looks)
+    before, after = (overall_error(judge, each.reading, near=True) for each in (start, found.best))
+    return Answer(findings, corrected, found.best.reading, before, zeros, looks=found.looks, share_after=after)
 
 
-def overall_error(judge: Judge, reading: Reading) -> float:
-    """Held-out error with free links, geometric mean over the joints, of the torque's scatter."""
-    errors, _ = judge.errors(reading, near=False)
+def overall_error(judge: Judge, reading: Reading, near: bool) -> float:
+    """Held-out error, geometric mean over the joints, of the torque's scatter. near: links near the simulation's."""
+    errors, _ = judge.errors(reading, near)
     return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-6)))))
 
 
@@ -160,7 +161,7 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     rivals = [(each.reading.mistakes[-1], each.loss) for each in found.rivals[place]]
     weights = np.array([best.loss, *(loss for _, loss in rivals)])
     chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
-    by_links = not is_told_by_geometry(gain, judge.tuning)
+    by_links = best.near is not None and not is_told_by_geometry(gain, judge.tuning)
     chances = np.append(chances, np.mean(chances) * judge.tuning.other_links_chance if by_links else 0.0)
     chances = chances / chances.sum()
     listed = [
@@ -179,8 +180,8 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
         worst + 1,
         float(rms_before[worst]),
         float(rms_after[worst]),
-        float(np.sqrt(np.mean(before**2))),
-        float(np.sqrt(np.mean(after**2))),
+        float(before[worst]),
+        float(after[worst]),
         gain.near_sigmas,
         float(chances[0]),
         tuple(listed),

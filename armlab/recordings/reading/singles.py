@@ -127,7 +127,20 @@ def _gravities(judge: Judge, start: Trial) -> list[Trial]:
     outcome = minimize(lambda tilt: judge.trial(make(tilt)).loss, np.zeros(2), method="Nelder-Mead", options=steps)
     refined = judge.trial(make(outcome.x))
     tilt = angle_between(np.array(refined.reading.arm.gravity), np.array(start.reading.arm.gravity))
-    return [best, *([refined] if tilt >= judge.tuning.min_tilt_deg else [])]
+    if tilt < judge.tuning.min_tilt_deg or _is_level(judge, coarse, refined):
+        return coarse
+    return [*coarse, refined]
+
+
+def _is_level(judge: Judge, coarse: list[Trial], refined: Trial) -> bool:
+    """Whether the data do not tell gravity from a near axis of the base: floors, walls and ceilings are level."""
+    own = np.array(refined.reading.arm.gravity)
+    for each in coarse:
+        axis = np.array(each.reading.arm.gravity)
+        if np.count_nonzero(axis) == 1 and angle_between(own, axis) < judge.tuning.level_reach_deg:
+            gain = Gain.between(each, refined)
+            return gain.near < judge.tuning.min_quarter_gain or gain.near_sigmas < judge.tuning.min_sigmas
+    return False
 
 
 def angle_between(first: Array, second: Array) -> float:

@@ -157,3 +157,12 @@ class ReadingTuning:
         0.2, meaning="a joint that holds less of its gravity torque at standstill is read wrongly"
     )
     rare_loss: float = tuned(0.03, unit="nats", meaning="what a rare mistake has to fit better than a common one")
+    max_read_error: float = tuned(
+        0.22,
+        unit="of the torque's scatter",
+        meaning="what a corrected recording leaves at most, geometric mean over joints; else no correction is made",
+        source="public arms read rightly leave 0.05 to 0.15; a robot file of another arm 0.3 at its best reading",
+    )
+    level_reach_deg: float = tuned(
+        10.0, unit="deg", meaning="gravity so near to an axis of the base is that axis where the data do not tell"
+    )
