@@ -86,6 +86,7 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
 @click.option("--gains", metavar="NUMBERS", help="Gain of each channel, N.m per A or V.")
+@click.option("--joints", metavar="NAMES", help="Motion only: joints of the robot in the order of the columns.")
 @click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
 @click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
@@ -94,7 +95,8 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
     """Convert files of other formats.
 
-    Reads .mat, ROS bags, MCAP, Parquet and CSV of any layout, and writes a new recording folder.
+    Reads .mat, ROS bags, MCAP, Parquet, CSV of any layout and LeRobot datasets, and writes a new recording folder.
+    Without --torque, --reference-position makes a recording of motion only.
 
     NAMES are column names with commas between them; * and ? stand for any characters.
     """

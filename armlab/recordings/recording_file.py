@@ -122,10 +122,21 @@ class TimingEntry(Settings):
 
 
 class RunEntry(Settings):
-    """One run file and what it is for."""
+    """One run file and what it is for.
+
+    exclude: stretches [first, last] of the time column, s, that are left out: contact, a hand that touched the arm.
+    """
 
     file: str
     role: Role = "identify"
+    exclude: tuple[tuple[float, float], ...] = ()
+
+    @model_validator(mode="after")
+    def _stretches_in_order(self) -> "RunEntry":
+        for first, last in self.exclude:
+            if first >= last:
+                raise ValueError(f"exclude of {self.file} should hold [first, last], so [{last:g}, {first:g}]")
+        return self
 
 
 class RecordingFile(Settings):
@@ -135,7 +146,8 @@ class RecordingFile(Settings):
     units: of each signal, one for all its columns or one a column. gains: N m (N) per A or V, one a channel.
     controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31. timing: errors of the
     clock that are taken back. gravity: m/s2 in the base frame, where the arm is mounted otherwise than its robot file
-    says.
+    says. joints: of a recording of motion only, names of the robot's joints that the columns belong to; all if left out.
+    The others are held at zero.
     """
 
     schema_: Literal["recording/1"] = Field(alias="schema")
@@ -147,6 +159,7 @@ class RecordingFile(Settings):
     transmission: TransmissionEntry = TransmissionEntry()
     gains: tuple[float, ...] | None = None
     controller: ControllerEntry | None = None
+    joints: Names | None = None
     recorded: date | None = None
     timing: TimingEntry | None = None
     gravity: tuple[float, float, float] | None = None
