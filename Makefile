@@ -1,7 +1,8 @@
 # armlab. `make table3` and `make test` do everything on a machine with Python 3.11, git, make and gcc.
 PYTHON ?= python3
 BIN := .venv/bin
-COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py
+COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py \
+	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py
 
 .DEFAULT_GOAL := help
 .PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
@@ -100,5 +101,6 @@ fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in
 	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
 
 clean: ## everything that was made here, the environment included
-	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so
+	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
+		armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -92,7 +92,9 @@ def diagnose(
     """
     from armlab.common.errors import InputError
     from armlab.diagnosis.compare.report import compare_recordings
+    from armlab.diagnosis.motion.write import diagnose_motion_recording
     from armlab.diagnosis.report.write import diagnose_recording
+    from armlab.recordings.motion import is_motion_only
 
     if old is not None and changes:
         raise InputError("--set: a comparison takes the usual tuning numbers, leave out --set or --compare")
@@ -100,11 +102,20 @@ def diagnose(
         raise InputError("--as-read and --only-setup: give one of them")
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
+    motion_only = is_motion_only(recordings[0])
+    if motion_only and (baseline, without, changes) != (None, (), ()):
+        raise InputError("--baseline, --without and --set have no part in a recording of motion only: leave them out")
     with ProgressLine() as progress:
         lines = (
-            diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, only_setup, progress.tell)
-            if old is None
-            else compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
+            diagnose_motion_recording(recordings[0], out, progress.tell)
+            if motion_only and old is None
+            else (
+                diagnose_recording(
+                    recordings[0], out, baseline, seed, without, changes, as_read, only_setup, progress.tell
+                )
+                if old is None
+                else compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
+            )
         )
         for line in lines:
             progress.clear()

@@ -21,7 +21,19 @@ from armlab.recordings.table import read_table
 from problem.arm import Arm
 from problem.robot_file import load_arm
 
-PER_JOINT_KEYS = ("kp", "kd", "ki", "torque_limit", "integral_limit", "read_delay", "kt", "resistance")
+PER_JOINT_KEYS = (
+    "kp",
+    "kd",
+    "ki",
+    "delay",
+    "torque_limit",
+    "integral_limit",
+    "offset",
+    "dead_band",
+    "read_delay",
+    "kt",
+    "resistance",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +113,7 @@ def _recorded_joints(file: RecordingFile, arm: Arm, folder: Path) -> tuple[int, 
 def _check_controller(file: RecordingFile, joints: int, folder: Path) -> None:
     for key in PER_JOINT_KEYS if file.controller is not None else ():
         values = getattr(file.controller, key)
-        if values is not None and len(values) != joints:
+        if isinstance(values, tuple) and len(values) != joints:
             where = f"controller.{key} in {folder / FILE_NAME}"
             raise InputError(f"{where} should hold {joints} numbers, one a joint, not {len(values)}")
 
