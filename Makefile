@@ -5,7 +5,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -62,6 +62,9 @@ real: .venv/dev ## identify and diagnose the public recordings of real arms: res
 
 real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
 	$(BIN)/armlab real --leave-one-out
+
+real-motion: .venv/dev ## diagnose the public recordings of position servos: results/real/motion.md
+	$(BIN)/armlab real-motion
 
 relations: .venv/dev ## relations that need no truth, on real and simulated recordings: results/relations/
 	$(BIN)/armlab conceal --cases 8 --seed 1800 --out .armlab/relations-set

@@ -20,6 +20,7 @@ PUBLIC_RECORDING_NAMES = (
     "friction-damper-35-lb",
     "friction-damper-80-lb",
 )
+PUBLIC_MOTION_NAMES = ("so101", "xl330-kp-100", "xl330-kp-200", "xl330-kp-400", "xl330-kp-800")
 ASKED_SIGNALS = ("time", "position", "torque")
 OPTIONAL_SIGNALS = (
     "velocity",
@@ -59,7 +60,7 @@ def check(folder: Path, out: Path | None) -> None:
 
 
 @recording.command()
-@click.argument("name", type=click.Choice(PUBLIC_RECORDING_NAMES))
+@click.argument("name", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
 @click.option("--out", type=click.Path(path_type=Path), help="New folder for the recording [default: NAME].")
 def fetch(name: str, out: Path | None) -> None:
     """Fetch a public recording of a real arm.
@@ -67,7 +68,13 @@ def fetch(name: str, out: Path | None) -> None:
     The recording is written as a recording folder.
     """
     from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
+    from armlab.recordings.public_motion import fetch_motion_recording
 
+    if name in PUBLIC_MOTION_NAMES:
+        click.echo(
+            f"{fetch_motion_recording(name, out or Path(name))}: motion only; its recording.yaml names the source"
+        )
+        return
     folder = fetch_recording(name, out or Path(name))
     click.echo(f"{folder}: from {PUBLIC_RECORDINGS[name].source}, licence {PUBLIC_RECORDINGS[name].licence}")
 

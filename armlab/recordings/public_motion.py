@@ -69,6 +69,7 @@ XL330_GAINS = (100, 200, 400, 800)
 XL330_MOTIONS = ("sin_sin", "lift_and_drop", "up_and_down", "sin_time_square")
 XL330_HELD_OUT = "sin_time_square"
 XL330_MASS, XL330_LENGTH = 0.49, 0.1  # kg, m, conditions.csv; the mass of the arm between servo and weight is unknown
+XL330_SUPPLY = 7.4  # V, nominal, conditions.csv
 PENDULUM = f"""<mujoco model="xl330-pendulum">
   <compiler angle="radian"/>
   <option timestep="0.001" integrator="implicitfast"/>
@@ -141,4 +142,5 @@ def _xl330(name: str) -> Draft:
         role: Role = "validate" if motion == XL330_HELD_OUT else "identify"
         runs.append(DraftRun(f"{motion}.csv", role, names, table.to_numpy(np.float64)[:last]))
     comment = (f"Public recording {name}, from {BAM_SOURCE}, licence Apache-2.0; gain register P = {gain}.",)
-    return Draft("pendulum.xml", columns, units, tuple(runs), {}, comment)
+    controller = {"type": "pd", "kp": [None], "kd": [None], "supply": XL330_SUPPLY}
+    return Draft("pendulum.xml", columns, units, tuple(runs), {"controller": controller}, comment)

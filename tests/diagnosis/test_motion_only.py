@@ -13,6 +13,8 @@ from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
 from armlab.cli.main import main
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
+from armlab.diagnosis.motion.compare import compare_motion
+from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.joint_replay import replay_joint
@@ -204,3 +206,25 @@ def test_a_controller_that_the_replay_lacks_is_refused(tmp_path: Path) -> None:
 def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:
     model = mujoco.MjModel.from_xml_string(arm_text(kp=7.0))
     assert model.actuator_gainprm[0, 0] == 7.0
+
+
+def test_a_comparison_names_the_gain_that_was_raised_and_nothing_else(tmp_path: Path) -> None:
+    old = write_recording(tmp_path / "old", TRUTH, seconds=10.0)
+    new = write_recording(tmp_path / "new", {**TRUTH, "kp": 16.0}, seconds=10.0)
+    comparison = compare_motion(load_motion_recording(old), load_motion_recording(new))
+    assert {(each.parameter.key, each.joint) for each in comparison.changed} == {("kp", 1), ("kp", 2)}
+    for each in comparison.changed:
+        assert each.ratio is not None
+        assert each.ratio[0] == pytest.approx(2.0, rel=0.06)
+    file = make_motion_comparison(comparison)
+    assert file.status == "changed"
+    assert "a factor of" in file.summary
+    assert "controller gain" in comparison_page(comparison, "armlab diagnose --compare")
+
+
+def test_recordings_of_other_kinds_are_not_compared(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path / "one", {}, seconds=4.0)
+    command = ["diagnose", "--compare", str(folder), str(folder), str(folder), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 2
+    assert "two at a time" in result.output

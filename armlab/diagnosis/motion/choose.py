@@ -1,15 +1,15 @@
 """Which parameters of a servo differ from the simulation's, chosen on blocks of the runs that identify.
 
-Even and odd windows take turns: parameters are fitted on one half and judged on the other. A parameter earns its place
+Even and odd windows take turns: parameters are fitted on one half and judged on the other. A parameter joins the model
 where the model without it (the parameter at the value of the simulation) predicts the other half worse, by a share that
-matters and in enough windows not to be chance.
+matters and hardly by chance. It is a finding where that holds after a correction for all tests.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
+from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import (
@@ -26,9 +26,10 @@ from armlab.diagnosis.motion.servo import OPTIONAL, SCALE, USUAL, place
 from armlab.diagnosis.motion.windows import Windows
 
 MIN_GAIN = 0.02  # of the squared error on windows that took no part (chosen by eye)
-MAX_P_VALUE = 0.01  # of no gain, after Bonferroni's correction for the parameters of all joints
+MAX_P_VALUE = 0.01  # of no gain, for a finding: after Bonferroni's correction for the parameters of all joints
+MAX_JOINING_P_VALUE = 0.05  # of no gain, for a place in the model: no correction
 MAX_JUDGED_WINDOWS = 60  # for the choice; the numbers come from all windows
-TRIED = 2  # parameters that are fitted in each round, of those that a linear model gains most from
+TRIED = 4  # parameters that are fitted in each round, of those that a linear model gains most from
 REFIT_EVALUATIONS = 8  # of a fit that starts near its end
 ODD_FACTOR = 4.0  # times the median error: a window that something else than the servo has moved (chosen by eye)
 MAX_ODD_SHARE = 0.1  # of the windows
@@ -49,10 +50,10 @@ class Gain:
 
 @dataclass(frozen=True, eq=False)
 class ChosenServo:
-    """A joint's servo with the parameters that earned their place.
+    """A joint's servo: a fit with the parameters that have a place in the model.
 
     nominal: numbers of the simulation, all damping outside the drive where the fit has it so.
-    gains: what each parameter is worth that earned its place, by its place in PARAMETERS. odd: windows that the servo
+    gains: what each parameter is worth that may be a finding, by its place in PARAMETERS. odd: windows that the servo
     of all others does not explain (contact, a lost command), left out of the fit.
     """
 
@@ -65,7 +66,7 @@ class ChosenServo:
 def choose_servo(windows: Windows, nominal: Array, looks: int) -> ChosenServo:
     """The servo of one joint. nominal: (parameters,), NaN where unknown. looks: number of tests in the diagnosis.
 
-    The usual parameters are fitted first; of the others, the one that is worth most joins, until none earns its place.
+    The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
     """
     free = np.array(USUAL)
     start, nominal = _choose_damping(windows, nominal, free)
@@ -80,12 +81,12 @@ def choose_servo(windows: Windows, nominal: Array, looks: int) -> ChosenServo:
         tried = {number: _with_parameter(few, fit, number) for number in _most_promising(few, fit, waiting)}
         gains = {number: _gain(few, judged, errors) for number, (_, errors) in tried.items()}
         best = max(gains, key=lambda number: gains[number].share)
-        if not _earns_place(gains[best], looks):
+        if gains[best].share < MIN_GAIN or gains[best].p_value > MAX_JOINING_P_VALUE:
             break
         fit, judged = tried[best]
         waiting.remove(best)
     gains = {number: _gain_of(few, fit, number, base, judged) for number in np.flatnonzero(fit.free).tolist()}
-    worth = {number: gain for number, gain in gains.items() if _earns_place(gain, looks)}
+    worth = {number: gain for number, gain in gains.items() if _is_finding(gain, looks)}
     return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free), worth, odd)
 
 
@@ -119,7 +120,7 @@ def find_odd_windows(windows: Windows, values: Array) -> NDArray[np.intp]:
 
 def _most_promising(windows: Windows, fit: ServoFit, waiting: list[int]) -> list[int]:
     """The parameters that a linear model of the errors gains most from: one replay each, and no fit."""
-    guesses = np.stack([fit.values, *(_first_guess(windows, fit.values, number) for number in waiting)])
+    guesses = np.stack([fit.values, *(first_guess(windows, fit.values, number) for number in waiting)])
     errors = joint_errors(windows, guesses)
     slopes = np.linalg.qr(jacobian(windows, fit.values, fit.free))[0]
     left = errors[0] - slopes @ (slopes.T @ errors[0])
@@ -134,19 +135,19 @@ def _with_parameter(windows: Windows, fit: ServoFit, number: int) -> tuple[Servo
     """The fit with one parameter more, and its squared error of each window, learned on the other half."""
     free = fit.free.copy()
     free[number] = True
-    more = fit_servo(windows, _first_guess(windows, fit.values, number), free, REFIT_EVALUATIONS)
+    more = fit_servo(windows, first_guess(windows, fit.values, number), free, REFIT_EVALUATIONS)
     return more, _errors_on_other_half(windows, more.values, free)
 
 
-def _earns_place(gain: Gain, looks: int) -> bool:
+def _is_finding(gain: Gain, looks: int) -> bool:
     return gain.share > MIN_GAIN and gain.p_value * looks < MAX_P_VALUE
 
 
-def _first_guess(windows: Windows, values: Array, number: int) -> Array:
+def first_guess(windows: Windows, values: Array, number: int) -> Array:
     """A start from which a parameter that was not fitted yet has a slope."""
     guess = values.copy()
     if number == place("limit"):
-        guess[number] = min(guess[number], unsaturated_limit(windows, values))
+        guess[number] = min(guess[number], 0.6 * unsaturated_limit(windows, values))
     else:
         guess[number] += 2 * SCALE[number]
     return guess
@@ -177,17 +178,25 @@ def _gain_of(windows: Windows, fit: ServoFit, number: int, base: Array, judged: 
     return _gain(windows, _errors_on_other_half(windows, held, fixed), judged)
 
 
+def chance_of_gain(difference: Array) -> float:
+    """P-value of no gain by Wilcoxon's signed ranks (1945): few windows with large errors do not decide.
+
+    difference: (windows,), squared error without a parameter minus that with it.
+    """
+    if not np.any(difference):
+        return 1.0
+    return float(wilcoxon(difference, alternative="greater").pvalue)
+
+
 def _gain(windows: Windows, without: Array, with_it: Array) -> Gain:
     """Squared errors of each window without and with a parameter, (windows,) each."""
     samples = len(windows.position)
     if not np.isfinite(without).all():
         return Gain(1.0, 0.0, np.inf, float(np.sqrt(with_it.sum() / samples)))
     difference = without - with_it
-    spread = float(np.std(difference, ddof=1)) / np.sqrt(len(difference)) if len(difference) > 1 else np.inf
-    score = float(np.mean(difference)) / max(spread, 1e-300)
     return Gain(
         share=float(difference.sum() / max(without.sum(), 1e-300)),
-        p_value=float(student.sf(score, max(windows.count - 1, 1))),
+        p_value=chance_of_gain(difference),
         rms_without=float(np.sqrt(without.sum() / samples)),
         rms_with=float(np.sqrt(with_it.sum() / samples)),
     )

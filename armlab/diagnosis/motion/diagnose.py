@@ -262,7 +262,7 @@ def name_differences(
                 joint=number + 1,
                 value=value,
                 interval=ends,
-                nominal=nominal,
+                nominal=kd if name == "kd" else nominal,
                 before=_rms(error) if np.isfinite(nominal) else _rms(_command_error(judged)),
                 after=after,
                 p_value=min(gain.p_value * len(simulation.joints) * len(PARAMETERS), 1.0),

@@ -23,7 +23,7 @@ from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
 LONGEST_WINDOW_S = 10.0  # s, about: longer than any servo settles
-SHORTEST_WINDOW_S = 1.5  # s: below it a window tells little but its first state
+SHORTEST_WINDOW_S = 1.0  # s: below it a window tells little but its first state
 WANTED_WINDOWS = 24  # blocks for the statistics, where the recording is long enough
 LONGEST_STEP_S = 0.0025  # s, of the integration
 HISTORY_S = 0.3  # s of commands before a window, for delays

@@ -80,7 +80,7 @@ def finding_phrase(finding: ServoFinding) -> str:
     low, high = finding.interval
     unit = finding.parameter.unit.replace(".", " ")
     words = f"joint {finding.joint}: {effect_named(finding.effect).words}, {finding.name} {finding.value:.4g} "
-    words += f"({low:.4g} to {high:.4g}) {unit}".replace(" 1", "")
+    words += f"({low:.4g} to {high:.4g}){'' if unit == '1' else f' {unit}'}"
     known = f"; the simulation has {finding.nominal:.4g}" if finding.nominal == finding.nominal else ""
     rivals = " or ".join(effect_named(each).words for each in finding.rivals)
     return f"{words}{known}{f'; it could also be {rivals}' if rivals else ''}"
