@@ -18,7 +18,7 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo, choose_servo
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
-from armlab.diagnosis.motion.separate import confused_parameters
+from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, Servos
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
@@ -239,6 +239,7 @@ def name_differences(
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd))
     confused = confused_parameters(sound, fit)
+    scale = ("rotor_inertia", "inertial_parameter_error") if has_weak_load(sound, fit.values) else ()
     if not chosen.gains:
         return []
     errors = joint_errors(judged, np.stack([_with_nominal(fit.values, chosen.nominal, each) for each in chosen.gains]))
@@ -252,6 +253,7 @@ def name_differences(
         kd = float(simulation.nominal.get("kd")[number])
         effect, name, value, ends = _named(parameter, float(fit.values[place_of]), ends_of, kd)
         rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in confused[place_of]))
+        rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
         if effect != parameter.effect:
             rivals = (parameter.effect, *rivals)
         found.append(

@@ -13,6 +13,8 @@ from armlab.diagnosis.motion.windows import Windows
 
 CLASS_FACTOR = 3.0  # of a standard error (chosen by eye)
 CLASS_CORRELATION = 0.95  # of two parameters that are both fitted
+MIN_LOAD_SHARE = 0.1  # of the drive's torque: below it gravity does not set the scale of torques (chosen by eye)
+TORQUE_SCALED = ("kp", "kd", "damping", "friction", "limit", "armature")  # one factor for all, and for the inertia
 
 
 def confused_parameters(windows: Windows, fit: ServoFit) -> dict[int, tuple[int, ...]]:
@@ -37,6 +39,13 @@ def confused_parameters(windows: Windows, fit: ServoFit) -> dict[int, tuple[int,
             if np.sqrt(wider[position, position] / alone[position, position]) > CLASS_FACTOR:
                 found[number].append(other)
     return {number: tuple(sorted(others)) for number, others in found.items()}
+
+
+def has_weak_load(windows: Windows, values: Array) -> bool:
+    """Whether gravity is too weak at a joint to set the scale of torques, so that the simulation's inertia alone does."""
+    command = windows.command[:, windows.history : windows.history + windows.measured.shape[1]]
+    drive = values[place("kp")] * (command - windows.measured)
+    return bool(np.sqrt(np.mean(windows.load**2)) < MIN_LOAD_SHARE * np.sqrt(np.mean(drive**2)))
 
 
 def _inverse(columns: list[Array]) -> Array:
