@@ -1,10 +1,11 @@
 # armlab. `make table3` and `make test` do everything on a machine with Python 3.11, git, make and gcc.
 PYTHON ?= python3
 BIN := .venv/bin
-COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py
+COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.c armlab/effects/drive_train_build.py \
+	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -62,6 +63,9 @@ real: .venv/dev ## identify and diagnose the public recordings of real arms: res
 real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
 	$(BIN)/armlab real --leave-one-out
 
+real-motion: .venv/dev ## diagnose the public recordings of position servos: results/real/motion.md
+	$(BIN)/armlab real-motion
+
 relations: .venv/dev ## relations that need no truth, on real and simulated recordings: results/relations/
 	$(BIN)/armlab conceal --cases 8 --seed 1800 --out .armlab/relations-set
 	$(BIN)/armlab relations .armlab/relations-set/observations/*
@@ -100,5 +104,6 @@ fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in
 	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
 
 clean: ## everything that was made here, the environment included
-	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so
+	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
+		armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,4 +1,4 @@
-"""Robot files: `robot.yaml` with Denavit-Hartenberg parameters, a URDF, or the name of a built-in arm."""
+"""Robot files: `robot.yaml` with Denavit-Hartenberg parameters, a URDF, an MJCF, or the name of a built-in arm."""
 
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from problem.arm import Arm, Joint, Limits, Link
+from problem.mjcf import read_mjcf
 from problem.transforms import rotation_x, rotation_z, translation
 from problem.urdf import read_urdf
 
@@ -98,7 +99,7 @@ def built_in_arms() -> list[str]:
 
 
 def load_arm(robot: str, beside: Path | None = None) -> Arm:
-    """The arm of a robot file, a URDF, or a built-in name.
+    """The arm of a robot file, a URDF, an MJCF (.xml), or a built-in name.
 
     robot: a path (relative to the folder `beside`, else to the working folder) or a built-in name.
     Raises InputError, in one line, for a missing or faulty file and for a chain that is not serial.
@@ -108,10 +109,12 @@ def load_arm(robot: str, beside: Path | None = None) -> Arm:
     path = (beside or Path()) / robot
     if path.suffix == ".urdf":
         return read_urdf(path)
+    if path.suffix == ".xml":
+        return read_mjcf(path)
     if path.suffix in (".yaml", ".yml"):
         return _read_yaml_arm(path, str(path))
     raise InputError(
-        f"unknown robot '{robot}', neither a .yaml or .urdf file nor a built-in arm: "
+        f"unknown robot '{robot}', neither a .yaml, .urdf or .xml (MJCF) file nor a built-in arm: "
         f"{suggest_name(robot, built_in_arms())}"
     )
 

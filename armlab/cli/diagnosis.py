@@ -92,7 +92,10 @@ def diagnose(
     """
     from armlab.common.errors import InputError
     from armlab.diagnosis.compare.report import compare_recordings
+    from armlab.diagnosis.motion.compare_write import compare_motion_recordings
+    from armlab.diagnosis.motion.write import diagnose_motion_recording
     from armlab.diagnosis.report.write import diagnose_recording
+    from armlab.recordings.motion import is_motion_only
 
     if old is not None and changes:
         raise InputError("--set: a comparison takes the usual tuning numbers, leave out --set or --compare")
@@ -100,12 +103,22 @@ def diagnose(
         raise InputError("--as-read and --only-setup: give one of them")
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
+    motion_only = is_motion_only(recordings[0])
+    if motion_only and (baseline or without or changes or as_read or only_setup):
+        raise InputError("a recording of motion only takes --out, --compare and nothing else: leave out the others")
+    if old is not None and is_motion_only(old) != motion_only:
+        raise InputError("--compare: one recording has torque, the other is motion only; they cannot be compared")
     with ProgressLine() as progress:
-        lines = (
-            diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, only_setup, progress.tell)
-            if old is None
-            else compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
-        )
+        if motion_only and old is None:
+            lines = diagnose_motion_recording(recordings[0], out, progress.tell)
+        elif motion_only and old is not None:
+            lines = compare_motion_recordings((old, *recordings), out, progress.tell)
+        elif old is None:
+            lines = diagnose_recording(
+                recordings[0], out, baseline, seed, without, changes, as_read, only_setup, progress.tell
+            )
+        else:
+            lines = compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
         for line in lines:
             progress.clear()
             click.echo(line)
@@ -172,6 +185,22 @@ def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | N
             else bench_real_arms(results, recordings, only, peers, progress.tell)
         )
         for line in lines:
+            progress.clear()
+            click.echo(line)
+
+
+@click.command("real-motion")
+@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+def real_motion(results: Path, recordings: Path) -> None:
+    """Diagnose public recordings of position servos.
+
+    An SO-101 arm against its public MJCF, and an XL330 servo at four gains, pair by pair. Writes motion.md.
+    """
+    from armlab.diagnosis.motion.real import bench_real_motion
+
+    with ProgressLine() as progress:
+        for line in bench_real_motion(results, recordings, progress.tell):
             progress.clear()
             click.echo(line)
 

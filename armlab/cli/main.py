@@ -40,6 +40,7 @@ _COMMANDS = {
     "gains": "armlab.cli.identification:gains",
     "export-model": "armlab.cli.diagnosis:export_model",
     "real": "armlab.cli.diagnosis:real",
+    "real-motion": "armlab.cli.diagnosis:real_motion",
     "real-concealed": "armlab.cli.diagnosis:real_concealed",
     "coverage": "armlab.cli.identification:coverage",
     "diagnose": "armlab.cli.diagnosis:diagnose",

@@ -20,6 +20,7 @@ PUBLIC_RECORDING_NAMES = (
     "friction-damper-35-lb",
     "friction-damper-80-lb",
 )
+PUBLIC_MOTION_NAMES = ("so101", "xl330-kp-100", "xl330-kp-200", "xl330-kp-400", "xl330-kp-800")
 ASKED_SIGNALS = ("time", "position", "torque")
 OPTIONAL_SIGNALS = (
     "velocity",
@@ -59,7 +60,7 @@ def check(folder: Path, out: Path | None) -> None:
 
 
 @recording.command()
-@click.argument("name", type=click.Choice(PUBLIC_RECORDING_NAMES))
+@click.argument("name", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
 @click.option("--out", type=click.Path(path_type=Path), help="New folder for the recording [default: NAME].")
 def fetch(name: str, out: Path | None) -> None:
     """Fetch a public recording of a real arm.
@@ -67,7 +68,13 @@ def fetch(name: str, out: Path | None) -> None:
     The recording is written as a recording folder.
     """
     from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
+    from armlab.recordings.public_motion import fetch_motion_recording
 
+    if name in PUBLIC_MOTION_NAMES:
+        click.echo(
+            f"{fetch_motion_recording(name, out or Path(name))}: motion only; its recording.yaml names the source"
+        )
+        return
     folder = fetch_recording(name, out or Path(name))
     click.echo(f"{folder}: from {PUBLIC_RECORDINGS[name].source}, licence {PUBLIC_RECORDINGS[name].licence}")
 
@@ -86,6 +93,7 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
 @click.option("--gains", metavar="NUMBERS", help="Gain of each channel, N.m per A or V.")
+@click.option("--joints", metavar="NAMES", help="Motion only: joints of the robot in the order of the columns.")
 @click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
 @click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
@@ -94,7 +102,8 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
     """Convert files of other formats.
 
-    Reads .mat, ROS bags, MCAP, Parquet and CSV of any layout, and writes a new recording folder.
+    Reads .mat, ROS bags, MCAP, Parquet, CSV of any layout and LeRobot datasets, and writes a new recording folder.
+    Without --torque, --reference-position makes a recording of motion only.
 
     NAMES are column names with commas between them; * and ? stand for any characters.
     """

@@ -20,6 +20,7 @@ from armlab.effects.friction_curve import FRICTION_CURVE
 from armlab.effects.geometry import BASE_TILT, ENCODER_OFFSET, GEOMETRY_ERROR
 from armlab.effects.links import INERTIAL_ERROR, PAYLOAD
 from armlab.effects.memory import FRICTION_DRIFT, PRESLIDING
+from armlab.effects.servo import SERVO_EFFECTS
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR, TORQUE_RIPPLE
 from armlab.effects.timing import CHANNEL_SKEW, TIME_DELAY
 from armlab.effects.transmission import BACKLASH, JOINT_ELASTICITY
@@ -54,7 +55,8 @@ BUILT_IN: tuple[Family, ...] = (
     FRICTION_CURVE,
 )
 _BUILT_IN_BY_NAME = {family.effect: family for family in BUILT_IN}
-EFFECT_IDS = (*(family.effect for family in BUILT_IN), UNKNOWN.id)
+WITHOUT_FAMILY = {effect.id: effect for effect in (*SERVO_EFFECTS, UNKNOWN)}
+EFFECT_IDS = (*(family.effect for family in BUILT_IN), *WITHOUT_FAMILY)
 ENTRY_POINT_GROUP = "armlab.effects"
 
 
@@ -105,5 +107,5 @@ def family_named(name: str) -> Family:
 
 
 def effect_named(name: str) -> Effect:
-    """The facts of an effect, or of `unknown`; ValueError, with the nearest id, for another name."""
-    return UNKNOWN if name == UNKNOWN.id else family_named(name).facts
+    """The facts of an effect, of a servo or `unknown` included; ValueError, with the nearest id, for another name."""
+    return WITHOUT_FAMILY[name] if name in WITHOUT_FAMILY else family_named(name).facts

@@ -19,6 +19,7 @@ from armlab.effects.library import family_named
 from armlab.effects.parameters import Interval, ParameterValue
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel, joint_fields
+from armlab.recordings.recording_file import ControllerEntry
 from problem.arm import Arm
 from problem.pseudo_inertia import links_of
 from problem.robot_file import LinkEntry, built_in_arms, load_arm
@@ -59,13 +60,14 @@ class BaseEntry(Settings):
 
 
 class ModelFile(Settings):
-    """The content of `model.yaml`."""
+    """The content of `model.yaml`. controller: of position servos, where a recording of motion only was diagnosed."""
 
     schema_: Literal["model/1"] = Field(alias="schema")
     robot: str
     links: tuple[LinkEntry, ...] | None = None
     base_parameters: BaseEntry | None = None
     components: tuple[ComponentEntry, ...]
+    controller: ControllerEntry | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)
 
 

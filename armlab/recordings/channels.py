@@ -8,7 +8,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
-from armlab.recordings.recording import Finding, Run, Transmission
+from armlab.recordings.recording import AnyRun, Finding, MotionRun, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, TimingEntry
 from armlab.recordings.table import Table
 from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, TIME_UNITS, Unit, resolve_units
@@ -20,15 +20,34 @@ MOTOR_SIDE_SIGNALS = ("position", "velocity", "reference_position", "reference_v
 
 def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]) -> Run:
     """The run of a table; values may still be NaN, stamps in any order."""
+    signals = _read_signals(table, file, units)
+    time = signals.pop("time")[:, 0]
+    torque = signals.pop("torque" if file.columns.torque else "current")
+    findings = (*table.findings, *report_assumed_units(file))
+    run = Run(entry.file, entry.role, time, signals.pop("position"), torque, findings=findings)
+    return run.with_signals(time, signals)
+
+
+def make_raw_motion_run(
+    table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]
+) -> MotionRun:
+    """The run of a table without torque; values may still be NaN, stamps in any order."""
+    signals = _read_signals(table, file, units)
+    time, position = signals.pop("time")[:, 0], signals.pop("position")
+    findings = (*table.findings, *report_assumed_units(file))
+    return MotionRun(entry.file, entry.role, time, position, findings=findings).with_signals(time, signals)
+
+
+def _read_signals(table: Table, file: RecordingFile, units: dict[str, tuple[Unit, ...]]) -> dict[str, Array]:
+    """All signals of a table in SI units, (rows, channels) each."""
     signals = {}
     for name, columns in file.columns.signals().items():
         factors = np.array([unit.factor for unit in units[name]])
         shifts = np.array([unit.shift for unit in units[name]])
         with np.errstate(over="ignore"):
             values = table.columns(columns, name) * factors + shifts
-        signals["torque" if name == "current" else name] = values
-    time = signals.pop("time")[:, 0]
-    return Run(entry.file, entry.role, time, findings=(*table.findings, *report_assumed_units(file)), **signals)
+        signals[name] = values
+    return signals
 
 
 def channel_units(file: RecordingFile, arm: Arm, folder: Path) -> dict[str, tuple[Unit, ...]]:
@@ -65,6 +84,8 @@ def _si_units(name: str, arm: Arm, channels: int) -> str | tuple[str, ...]:
 
 
 def _check_joints(name: str, units: tuple[Unit, ...], file: RecordingFile, arm: Arm, where: str) -> None:
+    if not file.has_torque and name in DRIVE_SIGNALS:
+        return
     if name in DRIVE_SIGNALS and any(unit.quantity in ("A", "V") for unit in units):
         if file.gains is None:
             raise InputError(f"units.{name} in {where} is A or V: `gains` (N.m per A or V) are missing")
@@ -98,7 +119,7 @@ def make_transmission(file: RecordingFile, arm: Arm, folder: Path) -> Transmissi
     """
     where = folder / FILE_NAME
     channels = len(file.columns.position)
-    torques = len(file.columns.torque or file.columns.current or ())
+    torques = len(file.columns.torque or file.columns.current or ()) if file.has_torque else len(arm)
     given = file.transmission
     position = _make_matrix(given.position, len(arm), channels, "position", where)
     torque = _make_matrix(given.torque, len(arm), torques, "torque", where)
@@ -130,17 +151,16 @@ def _make_vector(values: tuple[float, ...] | None, default: float, length: int, 
     return np.array(values, dtype=np.float64)
 
 
-def to_joint_side(run: Run, transmission: Transmission) -> Run:
+def to_joint_side(run: AnyRun, transmission: Transmission) -> AnyRun:
     """The run with motor signals carried over to the joints.
 
     Positions, velocities and references go through the position matrix. link_position and the simulated signals are on
     the joint side already.
     """
     to_joints = transmission.position.T
-    signals = {
-        "position": run.position @ to_joints + transmission.offset,
-        "torque": run.torque * transmission.gains @ transmission.torque.T,
-    }
+    signals = {"position": run.position @ to_joints + transmission.offset}
+    if isinstance(run, Run):
+        signals["torque"] = run.torque * transmission.gains @ transmission.torque.T
     if run.velocity is not None:
         signals["velocity"] = run.velocity @ to_joints
     if run.reference_position is not None:
@@ -180,7 +200,7 @@ SLOWEST_HZ = 5.0  # no drive is recorded more slowly
 RATE_TOLERANCE = 0.02  # relative: clocks that are off by so little are one clock
 
 
-def check_rate(run: Run, nominal_hz: float | None) -> Run:
+def check_rate(run: AnyRun, nominal_hz: float | None) -> AnyRun:
     """A warning where the time column and the nominal rate differ, or where no drive is recorded so slowly.
 
     The time column decides. Raises InputError where it counts in another unit than it is said to.

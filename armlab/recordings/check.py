@@ -1,6 +1,6 @@
 """The check of a recording folder: repairs, refused files, and warnings about channels and geometry."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,11 +9,20 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.load import load_runs, open_recording, with_runs
+from armlab.recordings.motion import (
+    MotionRecording,
+    is_motion_only,
+    load_motion_runs,
+    open_motion_recording,
+    with_motion_runs,
+)
+from armlab.recordings.motion_check import check_answers
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.signs import compare_standstill
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import describe
-from armlab.recordings.recording import Finding, Recording, Run
+from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, Run
+from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
@@ -21,13 +30,13 @@ LIMIT_TOLERANCE_FACTOR = 1.05  # times a limit: calibration and rounding aside
 MIN_SLOPE_CORRELATION = 0.9  # correlation of a velocity channel with the slope of its position
 
 
-def check_channels(run: Run, arm: Arm) -> tuple[Finding, ...]:
+def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
     """Warnings about the channels of a run, joint by joint."""
     findings: list[Finding] = []
     for joint in range(run.joints):
-        findings += (
-            _find_dead_channels(run, joint) + _find_frozen_torque(run, joint) + _find_limit_violations(run, arm, joint)
-        )
+        findings += _find_dead_channels(run, joint) + _find_limit_violations(run, arm, joint)
+        if isinstance(run, Run):
+            findings += _find_frozen_torque(run, joint)
         findings += _check_velocity(run, joint)
     return tuple(findings)
 
@@ -48,7 +57,7 @@ def _joint_warning(kind: str, joint: int, text: str) -> list[Finding]:
     return [Finding(kind, "warning", text, joint + 1)]
 
 
-def _find_dead_channels(run: Run, joint: int) -> list[Finding]:
+def _find_dead_channels(run: MotionRun, joint: int) -> list[Finding]:
     found = []
     for name, signal in run.signals.items():
         if name in ("torque", "velocity") and np.ptp(signal[:, joint]) == 0:
@@ -80,7 +89,7 @@ def _longest_repetition(values: Array) -> tuple[int, int]:
     return int(lengths[longest]), int(starts[longest])
 
 
-def _find_limit_violations(run: Run, arm: Arm, joint: int) -> list[Finding]:
+def _find_limit_violations(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     limits = arm.joints[joint].limits
     low, high = run.position[:, joint].min(), run.position[:, joint].max()
     slack = (LIMIT_TOLERANCE_FACTOR - 1) * (limits.position[1] - limits.position[0])
@@ -95,14 +104,14 @@ def _find_limit_violations(run: Run, arm: Arm, joint: int) -> list[Finding]:
     if fastest > LIMIT_TOLERANCE_FACTOR * limits.velocity:
         text = f"joint {joint + 1} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}: another unit or clock?"
         found += _joint_warning("beyond_limits", joint, text)
-    peak = float(np.abs(run.torque[:, joint]).max())
+    peak = float(np.abs(run.torque[:, joint]).max()) if isinstance(run, Run) else 0.0
     if peak > LIMIT_TOLERANCE_FACTOR * limits.torque:
         text = f"torque of joint {joint + 1} reaches {peak:.4g}, its limit is {limits.torque:.4g}: another unit?"
         found += _joint_warning("beyond_limits", joint, text)
     return found
 
 
-def _check_velocity(run: Run, joint: int) -> list[Finding]:
+def _check_velocity(run: MotionRun, joint: int) -> list[Finding]:
     """Compares a velocity channel with the slope of the position; averages remove the steps of the encoder."""
     if run.velocity is None or np.ptp(run.velocity[:, joint]) == 0:
         return []
@@ -152,7 +161,7 @@ class CheckResult:
     be read, by its name.
     """
 
-    recording: Recording
+    recording: Recording | MotionRecording
     findings: tuple[tuple[str, Finding], ...]
     refused: tuple[tuple[str, str], ...]
 
@@ -168,27 +177,43 @@ def check_recording(folder: Path) -> CheckResult:
 
     Raises InputError where `recording.yaml` or the robot file is wrong.
     """
-    recording, file = open_recording(folder)
-    runs: list[Run] = []
+    if is_motion_only(folder):
+        moved, file = open_motion_recording(folder)
+        motions, refused = _read_runs(lambda entry: load_motion_runs(moved, file, entry), file)
+        recording = with_motion_runs(moved, motions)
+        answers = check_answers(motions) if motions else ()
+        findings = _collect_findings(recording, recording.recorded_arm, (*recording.findings, *answers))
+        return CheckResult(recording, tuple(findings), refused)
+    empty, file = open_recording(folder)
+    runs, refused = _read_runs(lambda entry: load_runs(empty, file, entry), file)
+    whole = with_runs(empty, runs)
+    geometry = _check_geometry(whole) if runs else ()
+    return CheckResult(whole, tuple(_collect_findings(whole, whole.arm, (*whole.findings, *geometry))), refused)
+
+
+def _read_runs(
+    read: Callable[[RunEntry], tuple[AnyRun, ...]], file: RecordingFile
+) -> tuple[list[AnyRun], tuple[tuple[str, str], ...]]:
+    """The runs that can be read, and why each of the others is refused."""
+    runs: list[AnyRun] = []
     refused: list[tuple[str, str]] = []
     for entry in file.runs:
         try:
-            runs.extend(load_runs(recording, file, entry))
+            runs.extend(read(entry))
         except InputError as error:
             refused.append((entry.file, str(error)))
-    recording = with_runs(recording, runs)
-    return CheckResult(recording, tuple(_collect_findings(recording)), tuple(refused))
+    return runs, tuple(refused)
 
 
-def _collect_findings(recording: Recording) -> Iterator[tuple[str, Finding]]:
+def _collect_findings(
+    recording: Recording | MotionRecording, arm: Arm, whole: tuple[Finding, ...]
+) -> Iterator[tuple[str, Finding]]:
+    """Findings of each run, and those of the whole recording. arm: the joints of the columns."""
     reported: set[tuple[str, Finding]] = set()  # a file that is split has the findings of the whole at each part
     for run in recording.runs:
         yield from ((run.name, finding) for finding in run.findings if (run.file, finding) not in reported)
         reported.update((run.file, finding) for finding in run.findings)
-        yield from ((run.name, finding) for finding in check_channels(run, recording.arm))
-    whole = recording.findings
-    if recording.runs:
-        whole = (*whole, *_check_geometry(recording))
+        yield from ((run.name, finding) for finding in check_channels(run, arm))
     yield from (("all runs", finding) for finding in whole)
 
 

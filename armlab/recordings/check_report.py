@@ -16,7 +16,8 @@ from armlab.common.errors import InputError
 from armlab.recordings.check import CheckResult
 from armlab.recordings.cutoff import CutoffChoice
 from armlab.recordings.differentiate import Signals, differentiate
-from armlab.recordings.recording import ROLES, Recording, Run
+from armlab.recordings.motion import MotionRecording
+from armlab.recordings.recording import ROLES, MotionRun, Recording, Run
 from problem.arm import Arm
 
 FIGURE_WIDTH_IN, ROW_HEIGHT_IN = 11.0, 1.5  # inches
@@ -52,6 +53,28 @@ def draw_signals(signals: Signals, arm: Arm) -> Figure:
     return figure
 
 
+def draw_motion(run: MotionRun, arm: Arm) -> Figure:
+    """Position with the command, and their difference, of each joint over time."""
+    assert run.reference_position is not None
+    figure = Figure((FIGURE_WIDTH_IN, ROW_HEIGHT_IN * run.joints + 0.6), layout="constrained")
+    axes = figure.subplots(run.joints, 2, sharex=True, squeeze=False)
+    for joint, (left, right) in enumerate(axes):
+        unit = "rad" if arm.joints[joint].kind == "revolute" else "m"
+        left.plot(run.time, run.reference_position[:, joint], color=RAW_COLOR, linewidth=0.8, label="command")
+        left.plot(run.time, run.position[:, joint], color=FILTERED_COLOR, linewidth=1, label="position")
+        right.plot(run.time, run.reference_position[:, joint] - run.position[:, joint], color="black", linewidth=0.8)
+        left.set_ylabel(f"{arm.joints[joint].name}\n{unit}", fontsize=8)
+        right.set_ylabel(unit, fontsize=8)
+        _show_limits(left, arm.joints[joint].limits.position, run.position[:, joint])
+    axes[0, 0].set_title("command and position", fontsize=9)
+    axes[0, 1].set_title("command - position", fontsize=9)
+    axes[0, 0].legend(fontsize=7, loc="upper right")
+    for axis in axes[-1]:
+        axis.set_xlabel("time, s", fontsize=8)
+    _shrink_labels(axes)
+    return figure
+
+
 def _show_limits(axis: Axes, limits: tuple[float, float], position: Array) -> None:
     """Draws a limit that the position comes near to or passes."""
     span = float(np.ptp(position)) or 1.0
@@ -60,7 +83,7 @@ def _show_limits(axis: Axes, limits: tuple[float, float], position: Array) -> No
             axis.axhline(limit, color="tab:red", linewidth=0.8, linestyle="--")
 
 
-def draw_stamps(run: Run) -> Figure:
+def draw_stamps(run: MotionRun) -> Figure:
     """Steps between the stamps of a run, as they are after the repairs."""
     figure = Figure((FIGURE_WIDTH_IN / 2, 2.4), layout="constrained")
     axis = figure.subplots()
@@ -146,7 +169,7 @@ def _render_body(check: CheckResult) -> Iterator[str]:
         yield from _render_run(run, recording)
 
 
-def _summarize_recording(recording: Recording) -> str:
+def _summarize_recording(recording: Recording | MotionRecording) -> str:
     roles = [f"{len(recording.with_role(role))} to {role}" for role in ROLES]
     seconds = sum(run.time[-1] - run.time[0] for run in recording.runs)
     arm = recording.arm
@@ -172,20 +195,29 @@ def _render_findings(check: CheckResult) -> str:
     return f"<table><tr><th></th><th>run</th><th>joint</th><th>what</th></tr>{cells}</table>"
 
 
-def _render_run(run: Run, recording: Recording) -> Iterator[str]:
-    signals = differentiate(run)
+def _render_run(run: MotionRun, recording: Recording | MotionRecording) -> Iterator[str]:
     yield f"<h2>{escape(run.name)} ({run.role})</h2>"
     yield f"<p>{run.samples} samples at {run.rate_hz:.5g} Hz, {run.time[-1] - run.time[0]:.4g} s.</p>"
-    yield _embed_picture(encode_png(draw_signals(signals, recording.arm)), f"position and torque of {run.name}")
+    if isinstance(recording, MotionRecording):
+        picture = encode_png(draw_motion(run, recording.recorded_arm))
+        yield _embed_picture(picture, f"command and position of {run.name}")
+    elif isinstance(run, Run):
+        yield from _render_filtering(run, recording.arm)
+    if not run.even:
+        yield _embed_picture(encode_png(draw_stamps(run)), f"time between the samples of {run.name}")
+
+
+def _render_filtering(run: Run, arm: Arm) -> Iterator[str]:
+    """Torque as recorded and filtered, and why the cut-off was chosen."""
+    signals = differentiate(run)
+    yield _embed_picture(encode_png(draw_signals(signals, arm)), f"position and torque of {run.name}")
     if signals.cutoff is not None:
         choice = signals.cutoff
         yield (
             f"<p>Cut-off {choice.cutoff_hz:.3g} Hz: the least estimated error of the acceleration, at most ten times "
             f"the bandwidth of the motion ({choice.motion_hz:.2g} Hz).</p>"
         )
-        yield _embed_picture(encode_png(draw_cutoff(choice, recording.arm)), f"choice of the cut-off for {run.name}")
-    if not run.even:
-        yield _embed_picture(encode_png(draw_stamps(run)), f"time between the samples of {run.name}")
+        yield _embed_picture(encode_png(draw_cutoff(choice, arm)), f"choice of the cut-off for {run.name}")
 
 
 def _embed_picture(address: str, text: str) -> str:

@@ -14,18 +14,20 @@ from armlab.recordings.channels import (
     to_joint_side,
 )
 from armlab.recordings.reading.signs import compare_joint_names
-from armlab.recordings.recording import Finding, Recording, Run
+from armlab.recordings.recording import AnyRun, Finding, Recording, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, read_recording_file
 from armlab.recordings.repair import (
     drop_bad_rows,
     drop_duplicate_rows,
     fill_optional_signals,
+    leave_out,
     sort_rows,
     split_at_gaps,
     unwrap_encoders,
 )
 from armlab.recordings.stamps import repair_stamps
 from armlab.recordings.table import read_table
+from armlab.recordings.units import Unit
 from problem.arm import Arm
 from problem.robot_file import load_arm
 
@@ -48,9 +50,11 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     file = read_recording_file(folder)
     if not file.has_torque:
         raise InputError(
-            f"columns in {folder / FILE_NAME} has neither torque nor current with `gains`: "
-            "motion-only recordings cannot be diagnosed yet"
+            f"columns in {folder / FILE_NAME} has neither torque nor current with `gains`: a recording of motion only, "
+            "which `armlab diagnose` takes, and `armlab recording check`"
         )
+    if file.joints is not None:
+        raise InputError(f"joints in {folder / FILE_NAME}: only a recording of motion only may name joints")
     arm = load_arm(file.robot, folder)
     if file.gravity is not None:
         arm = replace(arm, gravity=file.gravity)
@@ -80,11 +84,23 @@ def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tup
     names = file.columns.signals()
     names["torque"] = file.columns.torque or file.columns.current or ()
     run = drop_bad_rows(make_raw_run(table, file, entry, units), table.row_numbers, names)
-    run = fill_optional_signals(drop_duplicate_rows(sort_rows(run)))
+    parts = repair_run(run, recording.transmission, file, entry, units)
+    return tuple(take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in parts)
+
+
+def repair_run(
+    run: AnyRun,
+    transmission: Transmission,
+    file: RecordingFile,
+    entry: RunEntry,
+    units: dict[str, tuple[Unit, ...]],
+) -> tuple[AnyRun, ...]:
+    """The run without bad rows, repaired and on the joint side; several if its clock steps back or pauses."""
+    run = leave_out(fill_optional_signals(drop_duplicate_rows(sort_rows(run))), entry.exclude)
     angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in units.items()}
     sound = (unwrap_encoders(repair_stamps(part), angles) for part in split_at_gaps(run))
-    joints = (check_rate(to_joint_side(part, recording.transmission), file.sample_rate_hz) for part in sound)
-    return tuple(take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in joints)
+    joints = (to_joint_side(part, transmission) for part in sound)
+    return tuple(check_rate(part, file.sample_rate_hz) for part in joints)
 
 
 def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:

@@ -1,9 +1,9 @@
 """A recording: an arm, its runs in SI units on the joint side, and remarks about them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ SIGNALS = (
     "position",
     "torque",
     "velocity",
+    "current",
     "temperature",
     "voltage",
     "link_position",
@@ -43,21 +44,22 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One run, SI units, on the joint side of the transmission.
+class MotionRun:
+    """One run without torque, SI units, on the joint side of the transmission.
 
-    time: (samples,), s, strictly increasing. position, torque: (samples, joints), rad and N m (m and N for
-    prismatic joints). The other signals are None where they were not recorded; a column of NaN in one of them
-    is a joint without that sensor. temperature, voltage: (samples, sensors), degrees Celsius and V.
-    file: name of its file; part: from 1 where one file was cut into several runs, else 0.
+    time: (samples,), s, strictly increasing. position: (samples, joints), rad (m for prismatic joints). The other
+    signals are None where they were not recorded; a column of NaN in one of them is a joint without that sensor.
+    current: A or V of the drives, of unknown scale and sign. temperature, voltage: (samples, sensors), degrees Celsius
+    and V. file: name of its file; part: from 1 where one file was cut into several runs, else 0.
     """
 
     file: str
     role: Role
     time: Array
     position: Array
-    torque: Array
+    _: KW_ONLY
     velocity: Array | None = None
+    current: Array | None = None
     temperature: Array | None = None
     voltage: Array | None = None
     link_position: Array | None = None
@@ -105,21 +107,31 @@ class Run:
     @property
     def signals(self) -> dict[str, Array]:
         """The recorded signals by name, time aside."""
-        recorded = {name: getattr(self, name) for name in SIGNALS}
+        recorded = {name: getattr(self, name, None) for name in SIGNALS}
         return {name: signal for name, signal in recorded.items() if signal is not None}
 
-    def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> "Run":
+    def rows(self, chosen: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Self:
         """The same run with only the chosen rows, or with rows in another order."""
         return self.with_signals(self.time[chosen], {name: signal[chosen] for name, signal in self.signals.items()})
 
-    def with_signals(self, time: Array, signals: dict[str, Array]) -> "Run":
+    def with_signals(self, time: Array, signals: dict[str, Array]) -> Self:
         """The same run with other stamps and other values for the named signals."""
         changed: dict[str, Any] = {"time": time, **signals}
         return replace(self, **changed)
 
-    def with_findings(self, *findings: Finding) -> "Run":
+    def with_findings(self, *findings: Finding) -> Self:
         """The same run with more findings."""
         return replace(self, findings=(*self.findings, *findings))
+
+
+@dataclass(frozen=True, eq=False)
+class Run(MotionRun):
+    """One run with torque: (samples, joints), N m (N for prismatic joints)."""
+
+    torque: Array
+
+
+AnyRun = TypeVar("AnyRun", bound=MotionRun)
 
 
 @dataclass(frozen=True, eq=False)

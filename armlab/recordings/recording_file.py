@@ -82,9 +82,10 @@ class ControllerEntry(Settings):
 
     kp: N m/rad; kd: N m s/rad; ki: N m/(rad s); torque_limit, integral_limit: N m; one a joint, null where unknown.
     reference_velocity: zero, or the derivative of the reference. feedforward: what the drive adds, from the simulation.
-    delay: s, of the command. read_delay: s, one a joint, where joints are read one after another. rate_hz: how often
-    the command is taken over and held. velocity_filter_hz: cut-off of the velocity that the drive feeds back.
-    supply, kt, resistance: V, N m/A, ohm, of a drive that commands a voltage.
+    delay: s, of the command, of all joints or one a joint. read_delay: s, one a joint, where joints are read one after
+    another. offset: rad (m), added to the command; dead_band: rad (m), whole width of the errors that the drive
+    ignores. rate_hz: how often the command is taken over and held. velocity_filter_hz: cut-off of the velocity that the
+    drive feeds back. supply, kt, resistance: V, N m/A, ohm, of a drive that commands a voltage.
     """
 
     type: Literal["pd"]
@@ -95,7 +96,9 @@ class ControllerEntry(Settings):
     feedforward: Literal["none", "gravity", "model"] = "none"
     torque_limit: PerJoint | None = None
     integral_limit: PerJoint | None = None
-    delay: NotNegative = 0.0
+    delay: NotNegative | Annotated[tuple[NotNegative, ...], Len(min_length=1)] = 0.0
+    offset: PerJoint | None = None
+    dead_band: PerJoint | None = None
     read_delay: tuple[NotNegative, ...] | None = None
     rate_hz: Positive | None = None
     velocity_filter_hz: Positive | None = None
@@ -122,10 +125,21 @@ class TimingEntry(Settings):
 
 
 class RunEntry(Settings):
-    """One run file and what it is for."""
+    """One run file and what it is for.
+
+    exclude: stretches [first, last] of the time column, s, that are left out: contact, a hand that touched the arm.
+    """
 
     file: str
     role: Role = "identify"
+    exclude: tuple[tuple[float, float], ...] = ()
+
+    @model_validator(mode="after")
+    def _stretches_in_order(self) -> "RunEntry":
+        for first, last in self.exclude:
+            if first >= last:
+                raise ValueError(f"exclude of {self.file} should hold [first, last], so [{last:g}, {first:g}]")
+        return self
 
 
 class RecordingFile(Settings):
@@ -135,7 +149,8 @@ class RecordingFile(Settings):
     units: of each signal, one for all its columns or one a column. gains: N m (N) per A or V, one a channel.
     controller: of the simulation; null where it is unknown. recorded: the day, as 2026-01-31. timing: errors of the
     clock that are taken back. gravity: m/s2 in the base frame, where the arm is mounted otherwise than its robot file
-    says.
+    says. joints: of a recording of motion only, names of the joints that the columns belong to; all if left out.
+    The others are held at zero.
     """
 
     schema_: Literal["recording/1"] = Field(alias="schema")
@@ -147,6 +162,7 @@ class RecordingFile(Settings):
     transmission: TransmissionEntry = TransmissionEntry()
     gains: tuple[float, ...] | None = None
     controller: ControllerEntry | None = None
+    joints: Names | None = None
     recorded: date | None = None
     timing: TimingEntry | None = None
     gravity: tuple[float, float, float] | None = None
@@ -181,12 +197,16 @@ Keys = dict[str, str | tuple[str, ...]]
 
 @dataclass(frozen=True, eq=False)
 class DraftRun:
-    """One run to be written: values (samples, columns) as they were recorded, under their names."""
+    """One run to be written: values (samples, columns) as they were recorded, under their names.
+
+    exclude: stretches of time that are left out when it is read, as in `RunEntry`.
+    """
 
     file: str
     role: Role
     names: tuple[str, ...]
     values: Array
+    exclude: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +226,10 @@ class Draft:
 
     def settings(self) -> dict[str, Any]:
         """The content of `recording.yaml`."""
-        runs = [{"file": run.file, "role": run.role} for run in self.runs]
+        runs: list[dict[str, Any]] = [{"file": run.file, "role": run.role} for run in self.runs]
+        for entry, run in zip(runs, self.runs, strict=True):
+            if run.exclude:
+                entry["exclude"] = run.exclude
         given = {"columns": self.columns, "units": self.units, **self.others, "runs": runs}
         return {"schema": "recording/1", "robot": self.robot, **given}
 

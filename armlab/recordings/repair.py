@@ -10,15 +10,21 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import Finding, Run
+from armlab.recordings.recording import AnyRun, Finding, MotionRun, Run
 
 MAX_PLAUSIBLE_VALUE = 1e9  # no arm moves, pulls or lasts this much in SI units
 MAX_BAD_ROW_SHARE = 0.05  # more bad rows than this, and the file is broken rather than a few rows
-REQUIRED_SIGNALS = ("position", "torque")
 
 
-def drop_bad_rows(run: Run, rows: NDArray[np.intp], names: dict[str, tuple[str, ...]]) -> Run:
+def required_names(run: MotionRun) -> tuple[str, str]:
+    """The signals without which a row of a run is worth nothing."""
+    return ("position", "torque") if isinstance(run, Run) else ("position", "reference_position")
+
+
+def drop_bad_rows(run: AnyRun, rows: NDArray[np.intp], names: dict[str, tuple[str, ...]]) -> AnyRun:
     """Leaves out rows whose time, position or torque is not a number, infinite, or larger than any arm can give.
+
+    In a run without torque the command counts instead.
 
     rows: (samples,), number of each row in the file. names: of the columns of each signal, for the message.
     Raises InputError where more than a few rows are bad.
@@ -37,8 +43,8 @@ def drop_bad_rows(run: Run, rows: NDArray[np.intp], names: dict[str, tuple[str, 
     return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
 
 
-def _required_signals(run: Run) -> dict[str, Array]:
-    return {"time": run.time[:, None], **{name: run.signals[name] for name in REQUIRED_SIGNALS}}
+def _required_signals(run: MotionRun) -> dict[str, Array]:
+    return {"time": run.time[:, None], **{name: run.signals[name] for name in required_names(run)}}
 
 
 def _is_plausible(values: Array) -> NDArray[np.bool_]:
@@ -46,10 +52,10 @@ def _is_plausible(values: Array) -> NDArray[np.bool_]:
         return np.asarray(np.abs(values) < MAX_PLAUSIBLE_VALUE)
 
 
-def fill_optional_signals(run: Run) -> Run:
+def fill_optional_signals(run: AnyRun) -> AnyRun:
     """Fills missing cells of the optional signals by linear interpolation; empty columns stay empty."""
     for name, signal in run.signals.items():
-        if name in REQUIRED_SIGNALS:
+        if name in required_names(run):
             continue
         good = _is_plausible(signal)
         torn = good.any(axis=0) & ~good.all(axis=0)
@@ -65,7 +71,7 @@ def fill_optional_signals(run: Run) -> Run:
     return run
 
 
-def drop_duplicate_rows(run: Run) -> Run:
+def drop_duplicate_rows(run: AnyRun) -> AnyRun:
     """Leaves out rows that are equal to the row before."""
     table = np.column_stack([run.time, *run.signals.values()])
     same = np.append(False, np.all((table[1:] == table[:-1]) | np.isnan(table[1:]), axis=1))
@@ -75,7 +81,7 @@ def drop_duplicate_rows(run: Run) -> Run:
     return run.rows(~same).with_findings(Finding("duplicate_row", "repaired", text))
 
 
-def sort_rows(run: Run) -> Run:
+def sort_rows(run: AnyRun) -> AnyRun:
     """Sorts rows that are in the wrong order, if the sorted stamps are evenly spaced.
 
     If the clock stepped back, sorted stamps would overlap: then the rows stay, and the run is split there.
@@ -95,7 +101,7 @@ MAX_BRIDGED_GAP = 5.5  # samples: over a shorter gap of a well sampled motion, i
 MIN_PART_SAMPLES = 50  # samples: a shorter part tells nothing
 
 
-def split_at_gaps(run: Run) -> tuple[Run, ...]:
+def split_at_gaps(run: AnyRun) -> tuple[AnyRun, ...]:
     """The parts of a run between gaps and backward steps of the clock; parts that are too short are left out.
 
     Raises InputError if nothing is left.
@@ -142,7 +148,7 @@ ENCODER_SIGNALS = ("position", "link_position", "reference_position", "simulated
 MIN_STEP_TURNS = 1e-3  # of a turn, at rest
 
 
-def unwrap_encoders(run: Run, angles: dict[str, tuple[bool, ...]]) -> Run:
+def unwrap_encoders(run: AnyRun, angles: dict[str, tuple[bool, ...]]) -> AnyRun:
     """Adds whole turns where a channel jumps by some between two samples.
 
     angles: for each signal, which of its channels are angles. A jump that is no whole turn is left alone.
@@ -154,7 +160,7 @@ def unwrap_encoders(run: Run, angles: dict[str, tuple[bool, ...]]) -> Run:
     return run
 
 
-def _unwrap_channel(run: Run, name: str, channel: int) -> Run:
+def _unwrap_channel(run: AnyRun, name: str, channel: int) -> AnyRun:
     signal = run.signals[name]
     steps = np.diff(signal[:, channel])
     turns = np.rint(steps / TURN_RAD)
@@ -170,3 +176,15 @@ def _unwrap_channel(run: Run, name: str, channel: int) -> Run:
     text = f"{name} of channel {channel + 1} jumps by whole turns {wraps.sum()} time(s); unwrapped"
     finding = Finding("wrapped_encoder", "repaired", text, channel + 1)
     return run.with_signals(run.time, {name: mended}).with_findings(finding)
+
+
+def leave_out(run: AnyRun, stretches: tuple[tuple[float, float], ...]) -> AnyRun:
+    """The run without the rows within stretches of time [first, last], s; InputError for one that holds no row."""
+    for first, last in stretches:
+        inside = (run.time >= first) & (run.time <= last)
+        if not inside.any():
+            where = f"{run.time.min():g} s to {run.time.max():g} s"
+            raise InputError(f"exclude [{first:g}, {last:g}] of {run.file} holds no row: its time runs from {where}")
+        text = f"{inside.sum()} rows from {first:g} s to {last:g} s are left out, as `exclude` says"
+        run = run.rows(~inside).with_findings(Finding("excluded", "note", text))
+    return run

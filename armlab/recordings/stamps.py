@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import Finding, Run
+from armlab.recordings.recording import AnyRun, Finding, MotionRun
 
 MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
 MIN_WARNED_LATENESS = 0.1  # of a step: less is lost in what the splines do well
@@ -44,7 +44,7 @@ class Grid:
         return int(self.count[-1] + 1 - len(self.count))
 
 
-def repair_stamps(run: Run) -> Run:
+def repair_stamps(run: AnyRun) -> AnyRun:
     """The run with stamps that strictly increase, on an even grid unless the samples were taken unevenly.
 
     Raises InputError where stamps repeat and no even grid fits.
@@ -87,7 +87,7 @@ def _fit_grid(time: Array, count: NDArray[np.intp]) -> Grid:
     return Grid(start, step, count, time - start - step * count)
 
 
-def is_sampled_unevenly(run: Run, grid: Grid) -> bool:
+def is_sampled_unevenly(run: MotionRun, grid: Grid) -> bool:
     """True if the motion follows the lateness of the stamps: q(stamp) = q(grid) + velocity * lateness.
 
     Fourth differences take the smooth motion out of both sides; the slope between them is one for samples
@@ -107,7 +107,7 @@ def _fourth_difference(signal: Array) -> Array:
     return np.diff(signal, n=4, axis=0)
 
 
-def _keep_stamps(run: Run, grid: Grid, worst: float) -> Run:
+def _keep_stamps(run: AnyRun, grid: Grid, worst: float) -> AnyRun:
     """Keeps the stamps. Of rows with equal stamps and similar values only the first stays."""
     later = np.append(False, np.diff(run.time) <= 0)
     if later.any():
@@ -119,7 +119,7 @@ def _keep_stamps(run: Run, grid: Grid, worst: float) -> Run:
     return run.with_findings(Finding("time_jitter", "warning" if worst > MIN_WARNED_LATENESS else "note", text))
 
 
-def _drop_equal_stamps(run: Run, later: NDArray[np.bool_]) -> Run:
+def _drop_equal_stamps(run: AnyRun, later: NDArray[np.bool_]) -> AnyRun:
     changes = np.abs(np.diff(run.position, axis=0))
     usual = np.quantile(changes, 0.9, axis=0)
     if np.any(changes[later[1:]] > 3 * usual):

@@ -13,7 +13,8 @@ IDS = [
     *("rotor_inertia", "torque_gain_error", "torque_offset", "torque_ripple", "joint_elasticity", "backlash"),
     *("joint_coupling", "gravity_compensator", "cable_stiffness", "payload", "inertial_parameter_error"),
     *("base_tilt", "encoder_offset", "geometry_error", "time_delay", "channel_skew", "external_contact"),
-    *("torque_saturation", "friction_curve", "unknown"),
+    *("torque_saturation", "friction_curve"),
+    *("controller_gain_error", "command_delay", "controller_dead_band", "command_offset", "unknown"),
 ]
 # design, contract of the diagnosis
 NAMES = {

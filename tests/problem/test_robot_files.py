@@ -69,7 +69,10 @@ def test_the_file_without_mistakes_loads(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "told"),
-    [("irb12O", "did you mean 'irb120'?"), ("robot.json", "neither a .yaml or .urdf file nor a built-in arm")],
+    [
+        ("irb12O", "did you mean 'irb120'?"),
+        ("robot.json", "neither a .yaml, .urdf or .xml (MJCF) file nor a built-in arm"),
+    ],
 )
 def test_an_unknown_robot_is_told_what_there_is(name: str, told: str) -> None:
     assert told in refusal(load_arm, name)

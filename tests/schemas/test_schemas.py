@@ -361,13 +361,13 @@ def test_a_written_recording_folder_follows_the_schemas(tmp_path: Path) -> None:
     assert [run.samples for run in load_recording(folder).runs] == [200, 200]
 
 
-def test_a_recording_of_motion_only_is_understood_but_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_recording_of_motion_only_is_understood_and_what_needs_torque_refuses_it(tmp_path: Path) -> None:
     (tmp_path / "recording.yaml").write_text(yaml.safe_dump(MOTION_ONLY))
     file = read_recording_file(tmp_path)
     assert file.controller is not None
     assert (file.controller.kp, file.controller.kd) == ((7.8,), (None,))
     message = refusal(load_recording, tmp_path)
-    assert "motion-only recordings cannot be diagnosed yet" in message
+    assert "a recording of motion only, which `armlab diagnose` takes" in message
     assert str(tmp_path / "recording.yaml") in message
 
 

@@ -2,13 +2,14 @@
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
+from armlab.recordings.imports.lerobot import COMMAND, STATE, is_lerobot, read_lerobot
 from armlab.recordings.imports.matlab import read_mat
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.imports.text import read_odd_csv
@@ -58,6 +59,14 @@ def read_source(path: Path, options: ReadOptions) -> Source:
         return Source(text.table, text.units, str(text.layout))
     known = ", ".join((".mat", ".parquet", *BAG_SUFFIXES, *TEXT_SUFFIXES))
     raise InputError(f"cannot import {path}: its ending should be one of {known}, or it should be a bag's folder")
+
+
+def read_sources(path: Path, options: ReadOptions) -> dict[str, Source]:
+    """The content of a path by the paths of its runs: several for a LeRobot dataset, which holds episodes."""
+    if not is_lerobot(path):
+        return {str(path): read_source(path, options)}
+    note = "LeRobot episode; action is the command, observation.state the position"
+    return {str(path / name): Source(table, {"timestamp": "s"}, note) for name, table in read_lerobot(path).items()}
 
 
 def _bag_units(table: Table) -> dict[str, str]:
@@ -168,20 +177,40 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     """
     separator = options["separator"]
     reading = ReadOptions(SEPARATOR_WORDS.get(separator, separator), options["decimal"], options["topic"])
-    sources = {str(path): read_source(path, reading) for path in files}
+    sources = {name: source for path in files for name, source in read_sources(path, reading).items()}
     first = next(iter(sources.values()))
     robot = _choose_robot(options["robot"], ask)
+    if any(is_lerobot(path) for path in files):
+        usual = _lerobot_columns(first, options.get("joints"))
+        options = {**options, **{name: each for name, each in usual.items() if options.get(name) is None}}
     assignment = _make_assignment(first, options, ask)
     validate = [str(path) for path in options["validate"]]
     unknown = sorted(set(validate) - set(sources))
     if unknown:
         raise InputError(f"--validate {unknown[0]} should be one of the imported files")
     draft = assemble_draft(sources, robot, assignment, validate)
+    if options.get("joints"):
+        draft = replace(draft, others={**draft.others, "joints": _split_names(options["joints"])})
     write_recording(draft, out)
     return [
         *(_describe_source(path, source) for path, source in sources.items()),
         f"{out}: written; `armlab recording check {out}` examines it",
     ]
+
+
+def _split_names(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",")]
+
+
+def _lerobot_columns(source: Source, joints: str | None) -> dict[str, str]:
+    """Columns of a dataset's signals: of the named joints, else of all."""
+    states = [name.removeprefix(f"{STATE}.") for name in source.table.names if name.startswith(f"{STATE}.")]
+    chosen = _split_names(joints) if joints else states
+    return {
+        "time": "timestamp",
+        "position": ",".join(f"{STATE}.{name}" for name in chosen),
+        "reference_position": ",".join(f"{COMMAND}.{name}" for name in chosen),
+    }
 
 
 def _describe_source(path: str, source: Source) -> str:
@@ -203,7 +232,7 @@ def _make_assignment(source: Source, options: Mapping[str, Any], ask: Ask | None
     columns: dict[str, tuple[str, ...]] = {}
     for signal in SIGNAL_QUANTITIES:
         given = options.get(signal)
-        if given is None and signal in ASKED_SIGNALS:
+        if given is None and signal in ASKED_SIGNALS and not (signal == "torque" and options.get("reference_position")):
             given = _ask_columns(source, signal, ask)
         if given is not None:
             columns[signal] = _expand_names(given, source.table.names, signal)
@@ -217,7 +246,8 @@ def _ask_columns(source: Source, signal: str, ask: Ask | None) -> str:
     names = source.table.names
     if ask is None:
         shown = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
-        raise InputError(f"the columns of {signal} are missing: give --{signal}; the file holds {shown}")
+        other = ", or --reference-position of a position servo" if signal == "torque" else ""
+        raise InputError(f"the columns of {signal} are missing: give --{signal}{other}; the file holds {shown}")
     guess = ",".join(guess_columns(names, signal)) or None
     return ask(f"column(s) of {signal}, of {', '.join(names)}", guess)
 

@@ -1,0 +1,202 @@
+"""Which parameters of a servo differ from the simulation's, chosen on blocks of the runs that identify.
+
+Even and odd windows take turns: parameters are fitted on one half and judged on the other. A parameter joins the model
+where the model without it (the parameter at the value of the simulation) predicts the other half worse, by a share that
+matters and hardly by chance. It is a finding where that holds after a correction for all tests.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import wilcoxon
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.motion.estimate import (
+    ServoFit,
+    fill_unknown,
+    find_start,
+    fit_servo,
+    jacobian,
+    thin_windows,
+    unsaturated_limit,
+)
+from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.servo import OPTIONAL, SCALE, USUAL, place
+from armlab.diagnosis.motion.windows import Windows
+
+MIN_GAIN = 0.02  # of the squared error on windows that took no part (chosen by eye)
+MAX_P_VALUE = 0.01  # of no gain, for a finding: after Bonferroni's correction for the parameters of all joints
+MAX_JOINING_P_VALUE = 0.05  # of no gain, for a place in the model: no correction
+MAX_JUDGED_WINDOWS = 60  # for the choice; the numbers come from all windows
+TRIED = 4  # parameters that are fitted in each round, of those that a linear model gains most from
+REFIT_EVALUATIONS = 8  # of a fit that starts near its end
+ODD_FACTOR = 4.0  # times the median error: a window that something else than the servo has moved (chosen by eye)
+MAX_ODD_SHARE = 0.1  # of the windows
+MIN_MOTION = 0.01  # rad (m): windows with less travel say nothing of the usual error
+MIN_WINDOWS_FOR_ODD = 8
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What one parameter is worth on windows that took no part. share: of the squared error without it; p_value: of
+    no gain, one-sided, over windows, not corrected. rms_without, rms_with: rad."""
+
+    share: float
+    p_value: float
+    rms_without: float
+    rms_with: float
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenServo:
+    """A joint's servo: a fit with the parameters that have a place in the model.
+
+    nominal: numbers of the simulation, all damping outside the drive where the fit has it so.
+    gains: what each parameter is worth that may be a finding, by its place in PARAMETERS. odd: windows that the servo
+    of all others does not explain (contact, a lost command), left out of the fit.
+    """
+
+    nominal: Array
+    fit: ServoFit
+    gains: dict[int, Gain]
+    odd: NDArray[np.intp]
+
+
+def choose_servo(windows: Windows, nominal: Array, looks: int) -> ChosenServo:
+    """The servo of one joint. nominal: (parameters,), NaN where unknown. looks: number of tests in the diagnosis.
+
+    The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
+    """
+    free = np.array(USUAL)
+    start, nominal = _choose_damping(windows, nominal, free)
+    base = fill_unknown(nominal)
+    odd = find_odd_windows(windows, start.values)
+    sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
+    few = thin_windows(sound, MAX_JUDGED_WINDOWS)
+    fit = fit_servo(few, start.values, free)
+    judged = _errors_on_other_half(few, fit.values, free)
+    waiting = np.flatnonzero(OPTIONAL).tolist()
+    while waiting:
+        tried = {number: _with_parameter(few, fit, number) for number in _most_promising(few, fit, waiting)}
+        gains = {number: _gain(few, judged, errors) for number, (_, errors) in tried.items()}
+        best = max(gains, key=lambda number: gains[number].share)
+        if gains[best].share < MIN_GAIN or gains[best].p_value > MAX_JOINING_P_VALUE:
+            break
+        fit, judged = tried[best]
+        waiting.remove(best)
+    gains = {number: _gain_of(few, fit, number, base, judged) for number in np.flatnonzero(fit.free).tolist()}
+    worth = {number: gain for number, gain in gains.items() if _is_finding(gain, looks)}
+    return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free), worth, odd)
+
+
+def _choose_damping(windows: Windows, nominal: Array, free: NDArray[np.bool_]) -> tuple[ServoFit, Array]:
+    """The first fit, with the simulation's kd or, where that is clearly better, with all damping outside the drive.
+
+    The nominal numbers that come back have the same sum of kd and damping, and the kd of the fit.
+    """
+    start = find_start(windows, nominal, free)
+    kd = nominal[place("kd")]
+    if not kd:
+        return start, nominal
+    outside = nominal.copy()
+    outside[[place("kd"), place("damping")]] = 0.0, nominal[place("damping")] + kd
+    other = find_start(windows, outside, free)
+    if other.rms**2 < (1 - MIN_GAIN) * start.rms**2:
+        return other, outside
+    return start, nominal
+
+
+def find_odd_windows(windows: Windows, values: Array) -> NDArray[np.intp]:
+    """Windows whose error is far above that of the others in which the joint moves: at most a tenth of them."""
+    errors = joint_errors(windows, values)[0]
+    sizes = np.sqrt(np.bincount(windows.window, errors**2) / np.diff(windows.begin))
+    moving = np.ptp(windows.measured, axis=1) > MIN_MOTION
+    if moving.sum() < MIN_WINDOWS_FOR_ODD:
+        return np.zeros(0, dtype=np.intp)
+    odd = np.flatnonzero(sizes > ODD_FACTOR * np.median(sizes[moving]))
+    return np.sort(odd[np.argsort(-sizes[odd])][: int(MAX_ODD_SHARE * windows.count)])
+
+
+def _most_promising(windows: Windows, fit: ServoFit, waiting: list[int]) -> list[int]:
+    """The parameters that a linear model of the errors gains most from: one replay each, and no fit."""
+    guesses = np.stack([fit.values, *(first_guess(windows, fit.values, number) for number in waiting)])
+    errors = joint_errors(windows, guesses)
+    slopes = np.linalg.qr(jacobian(windows, fit.values, fit.free))[0]
+    left = errors[0] - slopes @ (slopes.T @ errors[0])
+    columns = (errors[1:] - errors[0]).T
+    columns = columns - slopes @ (slopes.T @ columns)
+    sizes = np.linalg.norm(columns, axis=0)
+    gains = np.abs(left @ columns) / np.where(sizes > 0, sizes, np.inf)
+    return [waiting[number] for number in np.argsort(-gains)[:TRIED]]
+
+
+def _with_parameter(windows: Windows, fit: ServoFit, number: int) -> tuple[ServoFit, Array]:
+    """The fit with one parameter more, and its squared error of each window, learned on the other half."""
+    free = fit.free.copy()
+    free[number] = True
+    more = fit_servo(windows, first_guess(windows, fit.values, number), free, REFIT_EVALUATIONS)
+    return more, _errors_on_other_half(windows, more.values, free)
+
+
+def _is_finding(gain: Gain, looks: int) -> bool:
+    return gain.share > MIN_GAIN and gain.p_value * looks < MAX_P_VALUE
+
+
+def first_guess(windows: Windows, values: Array, number: int) -> Array:
+    """A start from which a parameter that was not fitted yet has a slope."""
+    guess = values.copy()
+    if number == place("limit"):
+        guess[number] = min(guess[number], 0.6 * unsaturated_limit(windows, values))
+    else:
+        guess[number] += 2 * SCALE[number]
+    return guess
+
+
+def _halves(windows: Windows) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    numbers = np.arange(windows.count)
+    return numbers[0::2], numbers[1::2]
+
+
+def _errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool_]) -> Array:
+    """Squared error of each window, (windows,), by parameters that were fitted on the other half."""
+    squares = np.zeros(windows.count)
+    first, second = _halves(windows)
+    for train, test in ((first, second), (second, first)):
+        fitted = fit_servo(windows.select(train), values, free, REFIT_EVALUATIONS)
+        judged = windows.select(test)
+        squares[test] = np.bincount(judged.window, joint_errors(judged, fitted.values)[0] ** 2)
+    return squares
+
+
+def _gain_of(windows: Windows, fit: ServoFit, number: int, base: Array, judged: Array) -> Gain:
+    """What a fitted parameter is worth. judged: squared error of each window with it."""
+    if not np.isfinite(base[number]):
+        return _gain(windows, np.full(windows.count, np.inf), judged)
+    fixed, held = fit.free.copy(), fit.values.copy()
+    fixed[number], held[number] = False, base[number]
+    return _gain(windows, _errors_on_other_half(windows, held, fixed), judged)
+
+
+def chance_of_gain(difference: Array) -> float:
+    """P-value of no gain by Wilcoxon's signed ranks (1945): few windows with large errors do not decide.
+
+    difference: (windows,), squared error without a parameter minus that with it.
+    """
+    if not np.any(difference):
+        return 1.0
+    return float(wilcoxon(difference, alternative="greater").pvalue)
+
+
+def _gain(windows: Windows, without: Array, with_it: Array) -> Gain:
+    """Squared errors of each window without and with a parameter, (windows,) each."""
+    samples = len(windows.position)
+    if not np.isfinite(without).all():
+        return Gain(1.0, 0.0, np.inf, float(np.sqrt(with_it.sum() / samples)))
+    difference = without - with_it
+    return Gain(
+        share=float(difference.sum() / max(without.sum(), 1e-300)),
+        p_value=chance_of_gain(difference),
+        rms_without=float(np.sqrt(without.sum() / samples)),
+        rms_with=float(np.sqrt(with_it.sum() / samples)),
+    )

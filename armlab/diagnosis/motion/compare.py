@@ -1,0 +1,288 @@
+"""What changed between two recordings of motion only: one servo for both, in which each number may change.
+
+Each recording has its own numbers at first. The number whose two values are missed least on the other half of the
+windows is tied, and so on, until each number that is left is missed: by a share of the squared error that matters and
+in enough windows not to be chance. So a gain that was raised is one change, not a new set of all numbers.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.diagnosis.motion.choose import (
+    MAX_JUDGED_WINDOWS,
+    MIN_GAIN,
+    chance_of_gain,
+    choose_servo,
+)
+from armlab.diagnosis.motion.diagnose import reason_unusable
+from armlab.diagnosis.motion.estimate import (
+    LOGARITHMIC,
+    from_coordinates,
+    jacobian,
+    thin_windows,
+    to_coordinates,
+)
+from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, SCALE, ServoParameter
+from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.windows import Windows, make_windows
+from armlab.recordings.motion import MotionRecording
+
+LEVEL = 0.01  # of a false change, after Bonferroni's correction for all numbers of all joints
+EVALUATIONS = 8
+POWER_QUANTILE = 1.2816  # of 90 % power, for the smallest change that would have been seen
+Pair = tuple[Windows, Windows]
+
+
+@dataclass(frozen=True)
+class ServoChange:
+    """One number in both recordings. joint: from 1. old, new: SI units. difference, difference_interval: new minus old.
+
+    ratio: new over old with its interval, of a number that is fitted as a logarithm. p_value: of no change, corrected.
+    before, after: error on the other half of the windows without and with the change, rad; None where it was not found.
+    detectable: the smallest change that would have been seen.
+    """
+
+    parameter: ServoParameter
+    joint: int
+    old: float
+    new: float
+    difference_interval: tuple[float, float]
+    ratio: tuple[float, float, float] | None
+    p_value: float
+    changed: bool
+    detectable: float
+    before: float | None = None
+    after: float | None = None
+
+    @property
+    def difference(self) -> float:
+        """New minus old."""
+        return self.new - self.old
+
+
+@dataclass(frozen=True, eq=False)
+class MotionComparison:
+    """What changed. reason: of an inconclusive one. notes: temperature and voltage in both recordings."""
+
+    names: tuple[str, str]
+    reason: str
+    changes: tuple[ServoChange, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def changed(self) -> tuple[ServoChange, ...]:
+        """The numbers that changed."""
+        return tuple(each for each in self.changes if each.changed)
+
+
+def compare_motion(
+    old: MotionRecording, new: MotionRecording, progress: Callable[[str], None] = lambda message: None
+) -> MotionComparison:
+    """What changed from one recording to another of the same robot; all runs of both take part.
+
+    Raises InputError where the recordings have other joints.
+    """
+    if [joint.name for joint in old.recorded_arm.joints] != [joint.name for joint in new.recorded_arm.joints]:
+        raise InputError(f"{old.name} and {new.name} have different joints: compare recordings of one robot")
+    names = (old.name, new.name)
+    for recording in (old, new):
+        reason = reason_unusable(recording)
+        if reason is not None:
+            return MotionComparison(names, f"{recording.name}: {reason}", ())
+    simulations = [read_servo_simulation(recording) for recording in (old, new)]
+    windows = [make_windows(each.runs, simulation) for each, simulation in zip((old, new), simulations, strict=True)]
+    looks = len(PARAMETERS) * len(old.joints)
+    changes: list[ServoChange] = []
+    for joint, pair in enumerate(zip(*windows, strict=True)):
+        progress(f"comparing joint {joint + 1} of {len(old.joints)}")
+        fits = [
+            choose_servo(each, simulation.nominal.values[joint], looks)
+            for each, simulation in zip(pair, simulations, strict=True)
+        ]
+        sound = [
+            each.select(np.setdiff1d(np.arange(each.count), fit.odd)) for each, fit in zip(pair, fits, strict=True)
+        ]
+        free = fits[0].fit.free | fits[1].fit.free
+        thinned = tuple(thin_windows(each, MAX_JUDGED_WINDOWS) for each in sound)
+        first, last = (each.fit for each in fits)
+        starts = (np.where(first.free, first.values, last.values), np.where(last.free, last.values, first.values))
+        changes += _compare_joint((thinned[0], thinned[1]), starts, free, joint, looks)
+    return MotionComparison(names, "", tuple(changes), tuple(_notes(old, new)))
+
+
+def _notes(old: MotionRecording, new: MotionRecording) -> list[str]:
+    """Temperature and voltage in both recordings, where they were recorded."""
+    notes = []
+    for signal, unit in (("temperature", "degrees Celsius"), ("voltage", "V")):
+        means = []
+        for recording in (old, new):
+            recorded = [getattr(run, signal) for run in recording.runs if getattr(run, signal) is not None]
+            means += [float(np.mean(np.concatenate([each.ravel() for each in recorded])))] if recorded else []
+        if len(means) == 2:
+            notes.append(f"{signal}: {means[0]:.3g} {unit} in {old.name}, {means[1]:.3g} in {new.name}")
+    return notes
+
+
+@dataclass(frozen=True, eq=False)
+class _PairFit:
+    """Coordinates in the old recording and their changes, (parameters,) each; covariance of (free, changing)."""
+
+    old: Array
+    change: Array
+    covariance: Array
+
+
+def _fit_pair(pair: Pair, start: Array, change: Array, free: NDArray[np.bool_], changing: Sequence[int]) -> _PairFit:
+    """One servo for both recordings, in which some numbers change."""
+    fitted, moved = np.flatnonzero(free), np.array(changing, dtype=np.intp)
+    low, high = to_coordinates(LOWEST), to_coordinates(HIGHEST)
+
+    def split(part: Array) -> tuple[Array, Array]:
+        old, difference = start.copy(), np.zeros(len(start))
+        old[fitted], difference[moved] = part[: len(fitted)], part[len(fitted) :]
+        return old, difference
+
+    def values(part: Array) -> tuple[Array, Array]:
+        old, difference = split(part)
+        return from_coordinates(np.clip(old, low, high)), from_coordinates(np.clip(old + difference, low, high))
+
+    def errors(part: Array) -> Array:
+        return np.concatenate([joint_errors(each, value)[0] for each, value in zip(pair, values(part), strict=True)])
+
+    def slopes(part: Array) -> Array:
+        blocks = [jacobian(each, value, free) for each, value in zip(pair, values(part), strict=True)]
+        columns = np.searchsorted(fitted, moved)
+        beside = np.concatenate([np.zeros((len(blocks[0]), len(moved))), blocks[1][:, columns]])
+        return np.concatenate([np.concatenate(blocks), beside], axis=1)
+
+    scale = np.where(LOGARITHMIC, 0.2, SCALE)
+    first, sizes = np.concatenate([start[fitted], change[moved]]), np.concatenate([scale[fitted], scale[moved]])
+    found = least_squares(errors, first, jac=slopes, x_scale=sizes, max_nfev=EVALUATIONS, ftol=1e-5)
+    return _PairFit(*split(found.x), _covariance(pair, slopes(found.x), errors(found.x)))
+
+
+def _covariance(pair: Pair, slopes: Array, errors: Array) -> Array:
+    """Sandwich with each window of both recordings as a block (see estimate.py)."""
+    window = np.concatenate([pair[0].window, pair[0].count + pair[1].window])
+    scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
+    inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
+    return np.asarray(inverse @ (scores.T @ scores) @ inverse * len(scores) / max(len(scores) - 1, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """A fit, which numbers it has, (parameters,), and the places of those that change."""
+
+    fit: _PairFit
+    free: NDArray[np.bool_]
+    changing: tuple[int, ...]
+
+
+def _other_half_errors(pair: Pair, model: _Model) -> Array:
+    """Squared error of each window of both recordings by numbers that were fitted on the other half."""
+    squares = [np.zeros(each.count) for each in pair]
+    for first in (0, 1):
+        train = tuple(each.select(np.arange(first, each.count, 2)) for each in pair)
+        learned = _fit_pair((train[0], train[1]), model.fit.old, model.fit.change, model.free, model.changing)
+        for number, each in enumerate(pair):
+            rows = np.arange(1 - first, each.count, 2)
+            judged = each.select(rows)
+            value = from_coordinates(learned.old + number * learned.change)
+            squares[number][rows] = np.bincount(judged.window, joint_errors(judged, value)[0] ** 2, len(rows))
+    return np.concatenate(squares)
+
+
+def _compare_joint(
+    pair: Pair, starts: Sequence[Array], free: NDArray[np.bool_], joint: int, looks: int
+) -> list[ServoChange]:
+    """All fitted numbers of one joint, changed or not. free: numbers that the model has.
+
+    All numbers differ at first. The one whose two values are missed least is tied, until each of the others is missed.
+    """
+    first, last = (to_coordinates(start) for start in starts)
+    numbers = np.flatnonzero(free).tolist()
+    every = _fit_pair(pair, first, last - first, free, numbers)
+    model = _Model(every, free, tuple(numbers))
+    judged = _other_half_errors(pair, model)
+    gains: dict[int, tuple[float, float, float]] = {}
+    samples = len(pair[0].position) + len(pair[1].position)
+    while model.changing:
+        tied = {number: _tie(pair, model, number) for number in model.changing}
+        errors = {number: _other_half_errors(pair, each) for number, each in tied.items()}
+        chances = {number: chance_of_gain(each - judged) * looks for number, each in errors.items()}
+        rms = {
+            number: (float(np.sqrt(each.sum() / samples)), float(np.sqrt(judged.sum() / samples)))
+            for number, each in errors.items()
+        }
+        gains = {number: (min(chances[number], 1.0), *rms[number]) for number in tied}
+        needless = [
+            number
+            for number in tied
+            if (errors[number] - judged).sum() < MIN_GAIN * errors[number].sum() or chances[number] > LEVEL
+        ]
+        if not needless:
+            break
+        best = min(needless, key=lambda number: float(errors[number].sum()))
+        model, judged = tied[best], errors[best]
+    return [_change(pair, number, joint, model, (every, numbers), gains, looks) for number in numbers]
+
+
+def _tie(pair: Pair, model: "_Model", number: int) -> "_Model":
+    """The model in which one number more is the same in both recordings."""
+    changing = tuple(each for each in model.changing if each != number)
+    start, change = model.fit.old.copy(), model.fit.change.copy()
+    start[number] += change[number] / 2
+    change[number] = 0.0
+    return _Model(_fit_pair(pair, start, change, model.free, changing), model.free, changing)
+
+
+def _change(
+    pair: Pair,
+    number: int,
+    joint: int,
+    model: "_Model",
+    every: tuple[_PairFit, list[int]],
+    gains: dict[int, tuple[float, float, float]],
+    looks: int,
+) -> ServoChange:
+    """One number: its change where it was found, else none, with the interval of the fit in which all change."""
+    changed = number in model.changing
+    source, places = (model.fit, list(model.changing)) if changed else every
+    count = int(model.free.sum())
+    column = count + places.index(number)
+    error = float(np.sqrt(source.covariance[column, column]))
+    freedom = max(pair[0].count + pair[1].count - count - len(places), 1)
+    half = float(student.ppf(0.975, freedom)) * error
+    low, high = LOWEST[number], HIGHEST[number]
+    old = float(np.clip(from_coordinates(source.old)[number], low, high))
+    move = float(source.change[number])
+    seen = (float(student.isf(LEVEL / looks, freedom)) + POWER_QUANTILE) * error
+    unchanged = min(2 * float(student.sf(abs(move) / max(error, 1e-300), freedom)) * looks, 1.0)
+    p_value = gains[number][0] if changed else unchanged
+    if LOGARITHMIC[number]:
+        ends = tuple(float(np.exp(np.clip(move + side * half, -50, 50))) for side in (0, -1, 1))
+        interval = (old * (ends[1] - 1), old * (ends[2] - 1))
+        new, ratio, detectable = old * ends[0], (ends[0], ends[1], ends[2]), old * float(np.expm1(min(seen, 50)))
+    else:
+        interval, new, ratio, detectable = (move - half, move + half), old + move, None, seen
+    return ServoChange(
+        parameter=PARAMETERS[number],
+        joint=joint + 1,
+        old=old,
+        new=new,
+        difference_interval=interval,
+        ratio=ratio,
+        p_value=p_value,
+        changed=changed and not interval[0] <= 0 <= interval[1],
+        detectable=detectable,
+        before=gains[number][1] if changed else None,
+        after=gains[number][2] if changed else None,
+    )

@@ -1,0 +1,150 @@
+"""Compares two recordings of motion only and writes comparison.json and a page."""
+
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.common.files import write_texts
+from armlab.diagnosis.formats import (
+    COMPARISON_SCHEMA,
+    ChangeEntry,
+    ComparisonFile,
+    DetectableEntry,
+    FindingEntry,
+    ParameterEntry,
+    RivalEntry,
+    kind_of_effect,
+)
+from armlab.diagnosis.motion.compare import LEVEL, MotionComparison, ServoChange, compare_motion
+from armlab.diagnosis.report.html import bullets, html_document, html_table, paragraph, section
+from armlab.effects.library import effect_named
+from armlab.recordings.motion import load_motion_recording
+
+
+def comparison_summary(comparison: MotionComparison) -> str:
+    """What changed and by how much."""
+    names = " and ".join(comparison.names)
+    if comparison.reason:
+        return f"{names} cannot be compared: {comparison.reason}."
+    if not comparison.changed:
+        return f"Nothing changed between {names} that the recordings show."
+    return f"Between {names} this changed: {'; '.join(map(change_phrase, comparison.changed))}. Nothing else changed."
+
+
+def change_phrase(change: ServoChange) -> str:
+    """A change with its numbers."""
+    unit = "" if change.parameter.unit == "1" else f" {change.parameter.unit.replace('.', ' ')}"
+    words = f"{effect_named(change.parameter.effect).words} at joint {change.joint} ({change.parameter.name} from "
+    words += f"{change.old:.4g} to {change.new:.4g}{unit}"
+    if change.ratio is not None:
+        return f"{words}, a factor of {change.ratio[0]:.4g}, {change.ratio[1]:.4g} to {change.ratio[2]:.4g})"
+    low, high = change.difference_interval
+    return f"{words}, a change of {change.difference:.4g}, {low:.4g} to {high:.4g})"
+
+
+def make_motion_comparison(comparison: MotionComparison) -> ComparisonFile:
+    """The content of `comparison.json`. Errors are of positions, rad (m)."""
+    return ComparisonFile(
+        schema=COMPARISON_SCHEMA,
+        status="inconclusive" if comparison.reason else "changed" if comparison.changed else "same",
+        summary=comparison_summary(comparison),
+        old=comparison.names[0],
+        new=comparison.names[1],
+        recordings=comparison.names,
+        level=LEVEL,
+        findings=tuple(_finding(each) for each in comparison.changed),
+        changes=tuple(_entry(each) for each in comparison.changes),
+        smallest_detectable=tuple(
+            DetectableEntry(
+                effect=each.parameter.effect,
+                joint=each.joint,
+                parameter=each.parameter.name,
+                change=each.detectable,
+                unit=each.parameter.unit,
+                share=each.detectable / abs(each.old) if each.old else None,
+            )
+            for each in comparison.changes
+        ),
+        notes=comparison.notes,
+    )
+
+
+def _entry(each: ServoChange) -> ChangeEntry:
+    return ChangeEntry(
+        effect=each.parameter.effect,
+        joint=each.joint,
+        joints=(each.joint,),
+        parameter=each.parameter.name,
+        old=each.old,
+        new=each.new,
+        difference=each.difference,
+        difference_ci95=each.difference_interval,
+        ratio=None if each.ratio is None else each.ratio[0],
+        ratio_ci95=None if each.ratio is None else each.ratio[1:],
+        unit=each.parameter.unit,
+        p_value=each.p_value,
+        changed=each.changed,
+    )
+
+
+def _finding(each: ServoChange) -> FindingEntry:
+    parameter = ParameterEntry(value=each.difference, ci95=each.difference_interval, unit=each.parameter.unit)
+    assert each.before is not None
+    assert each.after is not None
+    return FindingEntry(
+        effect=each.parameter.effect,
+        kind=kind_of_effect(effect_named(each.parameter.effect)),
+        joint=each.joint,
+        joints=(each.joint,),
+        parameters={each.parameter.name: parameter},
+        equation=each.parameter.equation.format(joint=each.joint, value=f"{each.old:.4g} -> {each.new:.4g}"),
+        heldout_rms_before=each.before,
+        heldout_rms_after=each.after,
+        p_value=each.p_value,
+        rivals=tuple(RivalEntry(effect=rival, joint=each.joint) for rival in each.parameter.rivals),
+    )
+
+
+def comparison_page(comparison: MotionComparison, command: str) -> str:
+    """HTML text of the page."""
+    rows = [
+        (
+            str(each.joint),
+            each.parameter.key,
+            f"{each.old:.4g}",
+            f"{each.new:.4g}" if each.changed else "",
+            f"{each.difference_interval[0]:.3g} to {each.difference_interval[1]:.3g}",
+            f"{each.detectable:.3g}",
+            each.parameter.unit,
+        )
+        for each in comparison.changes
+    ]
+    heads = ("joint", "number", "old", "new", "change, 95 % interval", "smallest change seen", "unit")
+    title = f"Comparison of {' and '.join(comparison.names)}"
+    parts = [
+        paragraph(comparison_summary(comparison), "verdict" if comparison.changed else "verdict none"),
+        section("numbers", "All numbers", html_table(heads, rows, texts=(1, 6)) if rows else ""),
+        section("notes", "Beside it", bullets(comparison.notes or ("nothing else was recorded",))),
+        section("origin", "How to repeat this", paragraph(command, "pale")),
+    ]
+    return html_document(title, parts)
+
+
+def compare_motion_recordings(
+    folders: Sequence[Path], out: Path, progress: Callable[[str], None] = lambda message: None
+) -> Iterator[str]:
+    """Compares two recordings, writes comparison.json and comparison.html into `out`, and yields lines to print.
+
+    Raises InputError, in one line, for recordings that cannot be used, and for more than two.
+    """
+    if len(folders) != 2:
+        raise InputError("recordings of motion only are compared two at a time: give one OLD and one NEW")
+    old, new = (load_motion_recording(folder) for folder in folders)
+    comparison = compare_motion(old, new, progress)
+    command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out)])
+    texts = {"comparison.json": make_motion_comparison(comparison).to_json()}
+    write_texts(texts | {"comparison.html": comparison_page(comparison, command)}, out)
+    yield f"{make_motion_comparison(comparison).status.upper()}: {comparison_summary(comparison)}"
+    yield from (f"  {note}" for note in comparison.notes)
+    yield f"wrote {out}: comparison.json, comparison.html"

@@ -1,0 +1,346 @@
+"""The diagnosis of a recording of motion only, step by step.
+
+`diagnose_motion` is the whole flow: check that positions answer their commands, cut the runs into windows, choose and
+fit the servo of each joint (`choose_servo`), name what differs from the simulation (`name_differences`), and send the
+commands of the held-out runs through the simulation before and after (`replay`).
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.diagnosis.motion.choose import ChosenServo, choose_servo
+from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
+from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
+from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, Servos
+from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
+from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
+from armlab.recordings.motion import MotionRecording
+from armlab.recordings.motion_check import MIN_MOVED, check_answers
+from armlab.recordings.recording import MotionRun
+
+HELD_OUT_SHARE = 1 / 3  # of each run, its end, where no run validates
+MAX_UNEXPLAINED = 0.5  # of the standard deviation of a position: above it no position servo of this law moved the joint
+SAME_ERROR = 1.25  # ratio of errors before and after, below which the simulation counts as right
+Status = Literal["mismatch", "none", "inconclusive"]
+
+
+@dataclass(frozen=True)
+class ServoFinding:
+    """One number of a servo that differs from the simulation's.
+
+    joint: from 1. nominal: of the simulation, NaN where it has none. before, after: error of the joint's replay on
+    held-out windows with the number of the simulation and with this one, rad. rivals: other effects at this joint.
+    """
+
+    parameter: ServoParameter
+    effect: str
+    name: str
+    joint: int
+    value: float
+    interval: tuple[float, float]
+    nominal: float
+    before: float
+    after: float
+    p_value: float
+    rivals: tuple[str, ...]
+
+    @property
+    def equation(self) -> str:
+        """The law with its number."""
+        return self.parameter.equation.format(joint=self.joint, value=f"{self.value:.4g}")
+
+
+@dataclass(frozen=True)
+class JointError:
+    """Errors of one joint on held-out data, rad (m).
+
+    before, after: of its replay in windows; replay_before, replay_after: of the whole arm over whole runs; None where
+    the simulation has no controller. command: of the command itself, taken as the position. floor: of the encoder.
+    """
+
+    joint: int
+    before: float | None
+    after: float
+    replay_before: float | None
+    replay_after: float
+    command: float
+    floor: float
+
+
+@dataclass(frozen=True, eq=False)
+class MotionDiagnosis:
+    """What a recording of motion only tells. Without an answer only status and summary are set.
+
+    chosen: of each joint, None for one that stands still or follows no servo. servos: all numbers for the simulation
+    after. odd: stretches that the servos do not explain: joint, run, from, to. replayed_before, replayed_after: the
+    held-out runs. tool: error of the tool before and after, m.
+    """
+
+    recording: MotionRecording
+    simulation: ServoSimulation
+    status: Status
+    reason: str = ""
+    chosen: tuple[ChosenServo | None, ...] = ()
+    servos: Servos | None = None
+    findings: tuple[ServoFinding, ...] = ()
+    errors: tuple[JointError, ...] = ()
+    odd: tuple[tuple[int, str, float, float], ...] = ()
+    replayed_before: tuple[Replayed, ...] = ()
+    replayed_after: tuple[Replayed, ...] = ()
+    tool: tuple[float | None, float] = (None, 0.0)
+    silent: tuple[int, ...] = ()
+    seconds: float = 0.0
+
+
+def diagnose_motion(
+    recording: MotionRecording, progress: Callable[[str], None] = lambda message: None
+) -> MotionDiagnosis:
+    """Which numbers of its servos the simulation of a recording gets wrong, and how much better it replays with others.
+
+    progress: is told what is being done. Raises InputError where the simulation cannot be used.
+    """
+    started = time.perf_counter()
+    simulation = read_servo_simulation(recording)
+    reason = reason_unusable(recording)
+    if reason is not None:
+        return MotionDiagnosis(recording, simulation, "inconclusive", reason)
+    learned, held_out = split_runs(recording)
+    windows = make_windows(learned, simulation)
+    still = [bool(np.ptp(joint.position) < MIN_MOVED) for joint in windows]
+    looks = len(windows) * len(PARAMETERS)
+    chosen: list[ChosenServo | None] = []
+    for number, joint in enumerate(windows):
+        progress(f"fitting joint {number + 1} of {len(windows)}")
+        fitted = None if still[number] else choose_servo(joint, simulation.nominal.values[number], looks)
+        chosen.append(fitted if fitted is not None and _explains(joint, fitted) else None)
+    if not any(chosen):
+        text = "no joint follows its command as a position servo does: check the columns, or the controller is another"
+        return MotionDiagnosis(recording, simulation, "inconclusive", text)
+    progress("replaying held-out runs")
+    judged = make_windows(held_out, simulation)
+    return replace(
+        _conclude(recording, simulation, (windows, judged), chosen, held_out),
+        odd=tuple(_odd_stretches(learned, chosen)),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def reason_unusable(recording: MotionRecording) -> str | None:
+    """Why nothing can be said, in one line; None where something can."""
+    findings = check_answers(recording.runs)
+    wrong = [finding.text for finding in findings if finding.kind != "still_joint"]
+    if wrong:
+        return wrong[0]
+    if len(findings) == len(recording.joints):
+        return "no joint moves: record motion of each joint, fast and slow, in both directions"
+    return None
+
+
+def split_runs(recording: MotionRecording) -> tuple[list[MotionRun], list[MotionRun]]:
+    """The runs that identify, and those that are held out: runs that validate, else the last third of each run."""
+    learned, held_out = list(recording.with_role("identify")), list(recording.with_role("validate"))
+    if not learned:
+        raise InputError(f"{recording.name}: no run has the role identify")
+    if not held_out:
+        cuts = [int((1 - HELD_OUT_SHARE) * run.samples) for run in learned]
+        held_out = [run.rows(slice(cut, None)) for run, cut in zip(learned, cuts, strict=True)]
+        learned = [run.rows(slice(cut)) for run, cut in zip(learned, cuts, strict=True)]
+    return learned, held_out
+
+
+def _explains(windows: Windows, chosen: ChosenServo) -> bool:
+    return chosen.fit.rms < MAX_UNEXPLAINED * float(np.std(windows.position))
+
+
+def _conclude(
+    recording: MotionRecording,
+    simulation: ServoSimulation,
+    windows: tuple[Sequence[Windows], Sequence[Windows]],
+    chosen: Sequence[ChosenServo | None],
+    held_out: Sequence[MotionRun],
+) -> MotionDiagnosis:
+    """Findings, replays and errors. windows: of the runs that identify, and of those that are held out."""
+    learned, judged = windows
+    values = np.stack([_values_after(simulation, number, each) for number, each in enumerate(chosen)])
+    servos = Servos(values)
+    findings = [
+        finding
+        for number, each in enumerate(chosen)
+        if each is not None
+        for finding in name_differences(number, each, simulation, learned[number], judged[number])
+    ]
+    known = bool(np.isfinite(simulation.nominal.get("kp")).all())
+    before = tuple(replay(simulation, None, held_out)) if known else ()
+    after = tuple(replay(simulation, servos, held_out))
+    errors = tuple(
+        _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
+    )
+    status, reason = _status(findings, errors, chosen, known)
+    tools = [
+        float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
+        for part in (before, after)
+        if part
+    ]
+    return MotionDiagnosis(
+        recording=recording,
+        simulation=simulation,
+        status=status,
+        reason=reason,
+        chosen=tuple(chosen),
+        servos=servos,
+        findings=tuple(findings),
+        errors=errors,
+        replayed_before=before,
+        replayed_after=after,
+        tool=(tools[0] if before else None, tools[-1]),
+        silent=tuple(number + 1 for number, each in enumerate(chosen) if each is None),
+    )
+
+
+def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo | None) -> Array:
+    """Numbers of a joint for the simulation after: those of the simulation where nothing better is known."""
+    nominal = simulation.nominal.values[number]
+    if chosen is not None and (chosen.gains or not np.isfinite(nominal).all()):
+        return chosen.fit.values
+    if not np.isfinite(nominal).all():
+        name = simulation.arm.joints[simulation.joints[number]].name
+        raise InputError(
+            f"joint {number + 1} ({name}) shows nothing of its drive, and neither the robot's file nor `controller` "
+            "tells its gain: leave it out by `joints`, or give `controller.kp` and `torque_limit`"
+        )
+    return np.asarray(nominal)
+
+
+def _status(
+    findings: Sequence[ServoFinding], errors: Sequence[JointError], chosen: Sequence[ChosenServo | None], known: bool
+) -> tuple[Status, str]:
+    if findings:
+        return "mismatch", ""
+    if not known:
+        return "inconclusive", "the simulation has no controller to compare with, and no number stands out"
+    worse = [each for each in errors if each.before is not None and each.before > SAME_ERROR * each.after]
+    if worse or any(each is None for each in chosen):
+        return "inconclusive", "the simulation replays the motion with an error that no number of the servos explains"
+    return "none", ""
+
+
+def name_differences(
+    number: int, chosen: ChosenServo, simulation: ServoSimulation, learned: Windows, judged: Windows
+) -> list[ServoFinding]:
+    """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's."""
+    fit, (low, high) = chosen.fit, chosen.fit.interval()
+    sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd))
+    confused = confused_parameters(sound, fit)
+    scale = ("rotor_inertia", "inertial_parameter_error") if has_weak_load(sound, fit.values) else ()
+    if not chosen.gains:
+        return []
+    errors = joint_errors(judged, np.stack([_with_nominal(fit.values, chosen.nominal, each) for each in chosen.gains]))
+    after = _rms(joint_errors(judged, fit.values)[0])
+    found = []
+    for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
+        parameter, nominal = PARAMETERS[place_of], float(chosen.nominal[place_of])
+        if low[place_of] <= nominal <= high[place_of]:
+            continue
+        ends_of = (float(low[place_of]), float(high[place_of]))
+        kd = float(simulation.nominal.get("kd")[number])
+        effect, name, value, ends = _named(parameter, float(fit.values[place_of]), ends_of, kd)
+        rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in confused[place_of]))
+        rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
+        if effect != parameter.effect:
+            rivals = (parameter.effect, *rivals)
+        found.append(
+            ServoFinding(
+                parameter=parameter,
+                effect=effect,
+                name=name,
+                joint=number + 1,
+                value=value,
+                interval=ends,
+                nominal=kd if name == "kd" else nominal,
+                before=_rms(error) if np.isfinite(nominal) else _rms(_command_error(judged)),
+                after=after,
+                p_value=min(gain.p_value * len(simulation.joints) * len(PARAMETERS), 1.0),
+                rivals=tuple(dict.fromkeys(each for each in rivals if each != effect)),
+            )
+        )
+    return found
+
+
+def _named(
+    parameter: ServoParameter, value: float, ends: tuple[float, float], kd: float
+) -> tuple[str, str, float, tuple[float, float]]:
+    """Effect, name, value and interval of a difference, where the sign or the simulation decides the name."""
+    low, high = float(ends[0]), float(ends[1])
+    if parameter.key == "damping" and high < kd:  # friction cannot be negative: the gain kd is too large
+        return "controller_gain_error", "kd", float(value), (0.0, high)
+    if parameter.key == "delay" and value < 0:  # what is early is read late
+        return "channel_skew", "seconds", -float(value), (-high, -low)
+    return parameter.effect, parameter.name, float(value), (low, high)
+
+
+def _with_nominal(values: Array, nominal: Array, number: int) -> Array:
+    changed = values.copy()
+    changed[number] = nominal[number] if np.isfinite(nominal[number]) else values[number]
+    return changed
+
+
+def _rms(errors: Array) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _command_error(windows: Windows) -> Array:
+    """Command minus position at the samples, rad: the error of a servo that follows without any error."""
+    command = windows.command[windows.window, windows.history + windows.row]
+    return np.asarray(command - windows.position)
+
+
+def encoder_step(positions: Array) -> float:
+    """The smallest step of a recorded position, rad (m): 0 where it has none."""
+    steps = np.abs(np.diff(np.unique(positions)))
+    steps = steps[steps > 1e-6]
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def _errors(
+    number: int,
+    simulation: ServoSimulation,
+    servos: Servos,
+    judged: Windows,
+    before: Sequence[Replayed],
+    after: Sequence[Replayed],
+    held_out: Sequence[MotionRun],
+) -> JointError:
+    nominal = simulation.nominal.values[number]
+    known = bool(np.isfinite(nominal).all())
+    commands = np.concatenate(
+        [np.asarray(run.reference_position)[:, number] - run.position[:, number] for run in held_out]
+    )
+    return JointError(
+        joint=number + 1,
+        before=_rms(joint_errors(judged, nominal)[0]) if known else None,
+        after=_rms(joint_errors(judged, servos.values[number])[0]),
+        replay_before=float(joint_rms(before)[number]) if before else None,
+        replay_after=float(joint_rms(after)[number]),
+        command=_rms(commands),
+        floor=encoder_step(judged.position) / np.sqrt(12),
+    )
+
+
+def _odd_stretches(
+    runs: Sequence[MotionRun], chosen: Sequence[ChosenServo | None]
+) -> list[tuple[int, str, float, float]]:
+    """Joint (from 1), run, first and last instant of the windows that a joint's servo does not explain."""
+    stretches = window_stretches(runs)
+    found: list[tuple[int, str, float, float]] = []
+    for number, each in enumerate(chosen):
+        odd: NDArray[np.intp] = each.odd if each is not None else np.zeros(0, dtype=np.intp)
+        found += [(number + 1, *stretches[window]) for window in odd.tolist()]
+    return found

@@ -1,0 +1,187 @@
+"""Estimates the servo of one joint by output error: the parameters whose replay comes nearest to the measured motion.
+
+A regression in which the controller's torque is the source and a coarse grid find starts; encoder noise is in error and
+regressors alike in a closed loop, so no number of theirs is reported. The intervals take each window as one block: with
+J_w and r_w the Jacobian and the errors of window w (Huber 1967, clustered),
+
+    cov = H^-1 (sum_w J_w^T r_w r_w^T J_w) H^-1,  H = J^T J
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.servo import HIGHEST, INFINITE_LIMIT, KEYS, LOWEST, NEUTRAL, SCALE, place
+from armlab.diagnosis.motion.windows import Windows
+
+LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
+RELATIVE_STEP, SCALE_STEP = 0.01, 0.02  # of finite differences: large, because a joint that sticks is not smooth
+MAX_EVALUATIONS = 15
+FREQUENCIES_HZ = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of a grid of starts: from a soft hobby servo to a stiff drive
+DAMPING_RATIOS = (0.4, 1.5)
+MAX_START_WINDOWS = 24
+MOVING_SPEED = 0.1  # rad/s (m/s): rows of the regression, above the noise of a differentiated encoder
+STARTS, START_EVALUATIONS = 2, 8  # fits on few windows, and evaluations of each
+
+
+@dataclass(frozen=True, eq=False)
+class ServoFit:
+    """Parameters of one joint. values: (parameters,); free: which of them were fitted; covariance: of the coordinates
+    (see `to_coordinates`) that are free, from blocks. rms: of the errors, rad. windows: number of blocks."""
+
+    values: Array
+    free: NDArray[np.bool_]
+    covariance: Array
+    rms: float
+    windows: int
+
+    def standard_errors(self) -> Array:
+        """Of the coordinates, (parameters,); 0 for those that were not fitted."""
+        errors = np.zeros(len(self.values))
+        errors[self.free] = np.sqrt(np.diag(self.covariance))
+        return errors
+
+    def interval(self, level: float = 0.95) -> Array:
+        """Lower and upper ends (2, parameters) of Student intervals within the bounds of each parameter."""
+        half = student.ppf(0.5 + level / 2, max(self.windows - int(self.free.sum()), 1)) * self.standard_errors()
+        centre = to_coordinates(self.values)
+        with np.errstate(over="ignore"):
+            ends = from_coordinates(np.stack([centre - half, centre + half]))
+        return np.clip(ends, LOWEST, HIGHEST)
+
+
+def to_coordinates(values: Array) -> Array:
+    """Coordinates of a fit: logarithms of gain and limit, the other parameters as they are."""
+    return np.where(LOGARITHMIC, np.log(np.maximum(values, 1e-300)), values)
+
+
+def from_coordinates(coordinates: Array) -> Array:
+    """Parameters of coordinates."""
+    return np.where(LOGARITHMIC, np.exp(np.where(LOGARITHMIC, coordinates, 0.0)), coordinates)
+
+
+def jacobian(windows: Windows, values: Array, free: NDArray[np.bool_]) -> Array:
+    """Derivative (samples, free) of the errors by the coordinates, by central differences in one batch."""
+    centre, chosen = to_coordinates(values), np.flatnonzero(free)
+    steps = np.where(LOGARITHMIC, RELATIVE_STEP, RELATIVE_STEP * np.abs(values) + SCALE_STEP * SCALE)[chosen]
+    sets = np.tile(centre, (2 * len(chosen), 1))
+    for number, (column, step) in enumerate(zip(chosen, steps, strict=True)):
+        sets[2 * number, column] += step
+        sets[2 * number + 1, column] -= step
+    moved = np.clip(from_coordinates(sets), LOWEST, HIGHEST)
+    reached = to_coordinates(moved)
+    widths = (reached[0::2] - reached[1::2])[np.arange(len(chosen)), chosen]
+    errors = joint_errors(windows, moved)
+    return np.asarray(((errors[0::2] - errors[1::2]) / widths[:, None]).T)
+
+
+def fit_servo(windows: Windows, start: Array, free: NDArray[np.bool_], evaluations: int = MAX_EVALUATIONS) -> ServoFit:
+    """The fit of the free parameters from a start, (parameters,); the others keep their values."""
+    values = np.clip(start, LOWEST, HIGHEST)
+    chosen = np.flatnonzero(free)
+
+    def whole(part: Array) -> Array:
+        coordinates = to_coordinates(values)
+        coordinates[chosen] = part
+        return from_coordinates(coordinates)
+
+    if len(chosen):
+        low, high = to_coordinates(LOWEST)[chosen], to_coordinates(HIGHEST)[chosen]
+        margin = 1e-9 * (high - low)
+        found = least_squares(
+            lambda part: joint_errors(windows, whole(part))[0],
+            np.clip(to_coordinates(values)[chosen], low + margin, high - margin),
+            jac=lambda part: jacobian(windows, whole(part), free),
+            bounds=(low, high),
+            x_scale=np.where(LOGARITHMIC, 0.2, SCALE)[chosen],
+            max_nfev=evaluations,
+            ftol=1e-5,
+            xtol=1e-5,
+        )
+        values = whole(found.x)
+    errors = joint_errors(windows, values)[0]
+    covariance = _block_covariance(jacobian(windows, values, free), errors, windows.window)
+    return ServoFit(values, free, covariance, float(np.sqrt(np.mean(errors**2))), windows.count)
+
+
+def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+    scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
+    inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
+    blocks = len(scores)
+    return np.asarray(inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1))
+
+
+def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_]) -> ServoFit:
+    """The best of several fits of the free parameters: from the regression, a grid of gains, and the simulation.
+
+    nominal: (parameters,), NaN where the simulation does not know a value.
+    """
+    few = thin_windows(windows, MAX_START_WINDOWS)
+    starts = _starts(few, nominal)
+    errors = joint_errors(few, starts)
+    best = np.argsort(np.mean(errors**2, axis=1))[:STARTS]
+    fits = [fit_servo(few, starts[each], free, START_EVALUATIONS) for each in best]
+    return fit_servo(windows, min(fits, key=lambda fit: fit.rms).values, free)
+
+
+def thin_windows(windows: Windows, most: int) -> Windows:
+    """At most so many windows, spread evenly over all."""
+    chosen = np.unique(np.linspace(0, windows.count - 1, min(most, windows.count)).astype(int))
+    return windows.select(chosen)
+
+
+def fill_unknown(nominal: Array) -> Array:
+    """The nominal parameters with neutral ones where they are unknown."""
+    return np.where(np.isnan(nominal), NEUTRAL, nominal)
+
+
+def _starts(windows: Windows, nominal: Array) -> Array:
+    """Parameter sets (starts, parameters)."""
+    base = fill_unknown(nominal)
+    mass = float(np.median(windows.inertia)) + base[place("armature")]
+    found = [] if np.isnan(nominal).any() else [base]
+    regressed = _regress(windows, base)
+    frictions = {0.0, float(regressed[place("friction")]), *((float(base[place("friction")]),) if len(found) else ())}
+    for frequency in FREQUENCIES_HZ:
+        for ratio in DAMPING_RATIOS:
+            for friction in frictions:
+                one = base.copy()
+                one[place("kp")] = mass * (2 * np.pi * frequency) ** 2
+                one[place("damping")] = 2 * ratio * np.sqrt(one[place("kp")] * mass)
+                one[place("friction")] = friction
+                found.append(one)
+    if regressed[place("kp")] > 0:
+        found.append(regressed)
+    return np.clip(np.stack(found), LOWEST, HIGHEST)
+
+
+def _regress(windows: Windows, base: Array) -> Array:
+    """kp e - damping qd - friction sgn(qd) = inertia qdd + load, on moving rows, by least squares."""
+    steps = windows.measured.shape[1]
+    stride = max(round(0.02 / windows.step_s), 1)
+    velocity = np.gradient(windows.measured[:, ::stride], stride * windows.step_s, axis=1)
+    velocity = 0.5 * velocity + 0.25 * (np.roll(velocity, 1, axis=1) + np.roll(velocity, -1, axis=1))
+    acceleration = np.gradient(velocity, stride * windows.step_s, axis=1)
+    command = windows.command[:, windows.history : windows.history + steps : stride]
+    error = command - windows.measured[:, ::stride]
+    known = (windows.inertia[:, ::stride] + base[place("armature")]) * acceleration + windows.load[:, ::stride]
+    rows = np.abs(velocity) > MOVING_SPEED
+    found = base.copy()
+    if rows.sum() < 10:
+        return found
+    columns = np.stack([error[rows], -velocity[rows], -np.sign(velocity[rows])], axis=1)
+    solution = np.linalg.lstsq(columns, known[rows], rcond=None)[0]
+    found[[place("kp"), place("damping"), place("friction")]] = np.maximum(solution, 0.0)
+    return found
+
+
+def unsaturated_limit(windows: Windows, values: Array) -> float:
+    """Torque that the drive would reach without a limit: where a fit of the limit starts, N m."""
+    steps = windows.measured.shape[1]
+    error = windows.command[:, windows.history : windows.history + steps] - windows.measured
+    return float(min(values[place("kp")] * np.quantile(np.abs(error), 0.995), INFINITE_LIMIT))

@@ -1,0 +1,123 @@
+"""The public recordings of motion only, diagnosed and compared: results/real/motion.md."""
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.diagnosis.motion.compare import MotionComparison, compare_motion
+from armlab.diagnosis.motion.compare_write import comparison_summary
+from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
+from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay, tool_rms
+from armlab.diagnosis.motion.servo import Servos, place
+from armlab.diagnosis.motion.words import finding_phrase, summary_of
+from armlab.recordings.motion import MotionRecording, load_motion_recording
+from armlab.recordings.public_motion import SO101_CONTACT, XL330_GAINS, fetch_motion_recording
+
+ONE_GAIN = 7.8  # N m/rad: duty a rad at P = 16 (2.66, Duclusaud 2025) times the stall torque of an STS3215 (2.94 N m)
+
+
+def bench_real_motion(
+    results: Path, recordings: Path, progress: Callable[[str], None] = lambda message: None
+) -> Iterator[str]:
+    """Diagnoses the SO-101 and compares the XL330 at its four gains; writes motion.md and yields lines to print.
+
+    recordings: folder for the recordings, which are fetched into it. Raises InputError for files that are not at hand.
+    """
+    arm = _open("so101", recordings)
+    diagnosis = diagnose_motion(arm, progress)
+    alone = _replay_one_gain(diagnosis)
+    lines = [summary_of(diagnosis), *(finding_phrase(each) for each in diagnosis.findings)]
+    table = _replay_table(diagnosis, alone)
+    yield from (*lines, table)
+    pairs = []
+    servos = {gain: _open(f"xl330-kp-{gain}", recordings) for gain in XL330_GAINS}
+    for old, new in combinations(XL330_GAINS, 2):
+        progress(f"comparing P = {old} and {new}")
+        comparison = compare_motion(servos[old], servos[new])
+        pairs.append((f"{old} to {new}", f"{new / old:g}", *_pair_cells(comparison)))
+        yield f"XL330: {comparison_summary(comparison)}"
+    page = markdown_page(
+        "Real recordings of motion only",
+        "Made by `armlab real-motion`. Sources and licences: `armlab/recordings/public_motion.py`.",
+        "## SO-101, public MJCF as the simulation",
+        f"Held out: {_held_out(diagnosis)}. Left out before any fit, as contact: {_contact()}. "
+        f"{diagnosis.seconds:.0f} s for the diagnosis.",
+        summary_of(diagnosis),
+        "\n".join(f"- {finding_phrase(each)}" for each in diagnosis.findings),
+        "Root mean square of simulated minus measured position on the held-out runs, mrad; at the tool mm. Whole arm, "
+        f"whole runs. One gain: the simulation with kp {ONE_GAIN} N m/rad and kv 0, nothing else changed.",
+        table,
+        "## XL330 with a pendulum, gain register P = 100, 200, 400, 800",
+        "Nothing but P was changed. Factor: of kp, with its 95 % interval.",
+        markdown_table(("pair", "true factor", "factor found", "other changes named"), pairs),
+    )
+    write_texts({"motion.md": page}, results)
+    yield f"wrote {results / 'motion.md'}"
+
+
+def _open(name: str, folder: Path) -> MotionRecording:
+    place_of = folder / name
+    return load_motion_recording(place_of if place_of.is_dir() else fetch_motion_recording(name, place_of))
+
+
+def _held_out(diagnosis: MotionDiagnosis) -> str:
+    return ", ".join(sorted({run.file for run in diagnosis.recording.with_role("validate")}))
+
+
+def _contact() -> str:
+    return "; ".join(
+        f"{name} {', '.join(f'{first:g} to {last:g} s' for first, last in stretches)}"
+        for name, stretches in SO101_CONTACT.items()
+    )
+
+
+def _replay_one_gain(diagnosis: MotionDiagnosis) -> tuple[Replayed, ...]:
+    """Held-out runs with one gain for all joints in place of the simulation's, and no kv."""
+    values = diagnosis.simulation.nominal.values.copy()
+    values[:, place("kp")], values[:, place("kd")] = ONE_GAIN, 0.0
+    return tuple(replay(diagnosis.simulation, Servos(values), [each.run for each in diagnosis.replayed_after]))
+
+
+def _replay_table(diagnosis: MotionDiagnosis, alone: tuple[Replayed, ...]) -> str:
+    """Errors of the command itself, the simulation, one gain and the numbers found, run by run and pooled."""
+    before, after = diagnosis.replayed_before, diagnosis.replayed_after
+    rows = []
+    for number, run in enumerate([*(each.run.name for each in after), "all"]):
+        chosen = slice(None) if run == "all" else slice(number, number + 1)
+        commands = np.concatenate([_command_error(each) for each in after[chosen]])
+        rows.append((run, "command itself", *_cells(np.sqrt(np.mean(commands**2, axis=0))), ""))
+        for name, part in (("simulation", before[chosen]), ("one gain", alone[chosen]), ("found", after[chosen])):
+            rows.append((run, name, *_cells(joint_rms(part)), f"{1e3 * tool_rms(part):.3g}"))
+    ratio = joint_rms(after) / joint_rms(before)
+    rows.append(
+        ("all", "found / simulation", *(f"{each:.2f}" for each in ratio), f"{tool_rms(after) / tool_rms(before):.2f}")
+    )
+    joints = [f"joint {number + 1}" for number in range(len(diagnosis.errors))]
+    return markdown_table(("run", "prediction", *joints, "tool"), rows)
+
+
+def _command_error(replayed: Replayed) -> Array:
+    return np.asarray(replayed.run.reference_position) - replayed.run.position
+
+
+def _cells(errors: Array) -> tuple[str, ...]:
+    return tuple(f"{1e3 * each:.1f}" for each in errors)
+
+
+def _pair_cells(comparison: MotionComparison) -> tuple[str, str]:
+    """The factor of kp with its interval, and what else is named."""
+    factor = "not named"
+    for each in comparison.changed:
+        if each.parameter.key == "kp" and each.ratio is not None:
+            factor = f"{each.ratio[0]:.2f} ({each.ratio[1]:.2f} to {each.ratio[2]:.2f})"
+    others = [
+        f"{each.parameter.key} {each.old:.3g} to {each.new:.3g}"
+        for each in comparison.changed
+        if each.parameter.key != "kp"
+    ]
+    return factor, ", ".join(others) or "none"

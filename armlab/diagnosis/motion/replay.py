@@ -1,0 +1,170 @@
+"""Closed-loop replay in MuJoCo: the recorded commands through a whole simulated arm, beside the measured motion."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.motion.servo import Servos
+from armlab.diagnosis.motion.simulation import ServoSimulation, actuator_of
+from armlab.diagnosis.motion.windows import held_command, smooth_motion, supply_factor
+from armlab.recordings.recording import MotionRun
+from problem.mjcf import import_mujoco
+
+STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
+
+
+@dataclass(frozen=True, eq=False)
+class Replayed:
+    """One run: position as simulated, (samples, joints), rad, and the distance of the tools, (samples,), m."""
+
+    run: MotionRun
+    position: Array
+    tool_distance: Array
+
+    @property
+    def error(self) -> Array:
+        """Simulated minus measured, (samples, joints), rad."""
+        return np.asarray(self.position - self.run.position)
+
+
+def with_servos(model: Any, simulation: ServoSimulation, servos: Servos) -> Any:
+    """The model with the numbers of servos in its fields: gain and force range of the actuators, fields of the joints.
+
+    Command delay, offset, dead band and load friction have no field; `replay` adds them. The friction loss sticks.
+    """
+    for row, joint in enumerate(simulation.joints):
+        actuator = actuator_of(model, joint)
+        kp, kd, limit = (servos.get(key)[row] for key in ("kp", "kd", "limit"))
+        model.actuator_gainprm[actuator, 0] = kp
+        model.actuator_biasprm[actuator, :3] = 0.0, -kp, -kd
+        model.actuator_forcelimited[actuator] = 1
+        model.actuator_forcerange[actuator] = -limit, limit
+        model.dof_damping[joint] = servos.get("damping")[row]
+        model.dof_frictionloss[joint] = servos.get("friction")[row]
+        model.dof_armature[joint] = servos.get("armature")[row]
+        model.dof_solimp[joint] = STICKING
+    return model
+
+
+def replay(simulation: ServoSimulation, servos: Servos | None, runs: Sequence[MotionRun]) -> list[Replayed]:
+    """The runs sent through the simulation, each from its first measured state.
+
+    servos: in place of the simulation's numbers; None for the simulation as it is given. Contact, joint limits and
+    limits of the command are off: only drives and inertias are compared. Joints that were not recorded are held at
+    zero.
+    """
+    mujoco = import_mujoco()
+    model = simulation.model()
+    if servos is None and not simulation.as_given:
+        servos = simulation.nominal
+    if servos is not None:
+        model = with_servos(model, simulation, servos)
+    flags = mujoco.mjtDisableBit
+    model.opt.disableflags |= int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_CONTACT) | int(flags.mjDSBL_CLAMPCTRL)
+    _hold_others(model, simulation)
+    return [_replay_run(model, simulation, servos, run) for run in runs]
+
+
+def _hold_others(model: Any, simulation: ServoSimulation) -> None:
+    """Joints that were not recorded get a friction that nothing overcomes: they stay where they start."""
+    for joint in set(range(model.nv)) - set(simulation.joints):
+        model.dof_frictionloss[joint] = 1e3
+        model.dof_solimp[joint] = STICKING
+
+
+def _replay_run(model: Any, simulation: ServoSimulation, servos: Servos | None, run: MotionRun) -> Replayed:
+    mujoco = import_mujoco()
+    data = mujoco.MjData(model)
+    joints = list(simulation.joints)
+    steps = int(np.ceil((run.time[-1] - run.time[0]) / model.opt.timestep)) + 1
+    time = run.time[0] + model.opt.timestep * np.arange(steps)
+    data.qpos[joints] = run.position[0]
+    data.qvel[joints] = smooth_motion(run).velocity[0]
+    mujoco.mj_forward(model, data)
+    control = np.zeros((steps, model.nu))
+    for row, joint in enumerate(joints):
+        delay = 0.0 if servos is None else float(servos.get("delay")[row])
+        offset = 0.0 if servos is None else float(servos.get("offset")[row])
+        control[:, actuator_of(model, joint)] = held_command(run, row, time - delay, simulation.rate_hz) + offset
+    if servos is not None and _needs_steps(simulation, servos, run):
+        path = _step_through(model, data, simulation, servos, run, control)
+    else:
+        path = _roll_out(model, data, control)
+    position = np.stack([np.interp(run.time, time, path[:, joint]) for joint in joints], axis=1)
+    distance = np.linalg.norm(
+        tool_positions(model, joints, position) - tool_positions(model, joints, run.position), axis=1
+    )
+    return Replayed(run, position, distance)
+
+
+def _needs_steps(simulation: ServoSimulation, servos: Servos, run: MotionRun) -> bool:
+    """Whether the law has parts that no field of MuJoCo holds."""
+    parts = (servos.get("dead_band"), servos.get("load_friction"))
+    return any(part.any() for part in parts) or (simulation.supply is not None and run.voltage is not None)
+
+
+def _roll_out(model: Any, data: Any, control: Array) -> Array:
+    """Positions (steps, joints) of all joints at the beginning of each step, by MuJoCo's own loop."""
+    from mujoco import rollout
+
+    mujoco = import_mujoco()
+    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    state = np.empty(mujoco.mj_stateSize(model, kind))
+    mujoco.mj_getState(model, data, state, kind)
+    states, _ = rollout.rollout(model, data, state[None], control[None, :-1])
+    return np.concatenate([state[None, 1 : 1 + model.nq], states[0, :, 1 : 1 + model.nq]])
+
+
+def _step_through(
+    model: Any, data: Any, simulation: ServoSimulation, servos: Servos, run: MotionRun, control: Array
+) -> Array:
+    """The same step by step, with dead band, load friction and supply voltage."""
+    mujoco = import_mujoco()
+    joints = list(simulation.joints)
+    actuators = [actuator_of(model, joint) for joint in joints]
+    half, share, level = servos.get("dead_band") / 2, servos.get("load_friction"), servos.get("friction")
+    limit, kp, kd = servos.get("limit"), servos.get("kp"), servos.get("kd")
+    time = run.time[0] + model.opt.timestep * np.arange(len(control))
+    factors = [supply_factor(run, row, time, simulation.supply) for row in range(len(joints))]
+    path = np.empty((len(control), model.nq))
+    for number, command in enumerate(control):
+        path[number] = now = data.qpos
+        error = command[actuators] - now[joints]
+        error -= np.clip(error, -half, half)
+        data.ctrl[actuators] = now[joints] + error
+        if share.any():
+            model.dof_frictionloss[joints] = level + share * np.abs(data.qfrc_bias[joints])
+        for row, factor in enumerate(factors):
+            if factor is not None:
+                scaled = factor[number] * np.array([-kp[row], -kd[row]])
+                model.actuator_gainprm[actuators[row], 0] = -scaled[0]
+                model.actuator_biasprm[actuators[row], 1:3] = scaled
+                model.actuator_forcerange[actuators[row]] = factor[number] * limit[row] * np.array([-1.0, 1.0])
+        mujoco.mj_step(model, data)
+    return path
+
+
+def tool_positions(model: Any, joints: Sequence[int], position: Array) -> Array:
+    """Place (samples, 3) of the tool, m: the model's last site, or the frame of its last body without sites."""
+    mujoco = import_mujoco()
+    data = mujoco.MjData(model)
+    places = np.empty((len(position), 3))
+    for number, row in enumerate(position):
+        data.qpos[list(joints)] = row
+        mujoco.mj_kinematics(model, data)
+        places[number] = data.site_xpos[-1] if model.nsite else data.xpos[-1]
+    return places
+
+
+def joint_rms(replayed: Sequence[Replayed]) -> Array:
+    """Error of each joint over all runs, (joints,), rad."""
+    errors = np.concatenate([each.error for each in replayed])
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=0)))
+
+
+def tool_rms(replayed: Sequence[Replayed]) -> float:
+    """Distance of the tools over all runs, root mean square, m."""
+    return float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in replayed]) ** 2)))

@@ -1,0 +1,57 @@
+"""Which parameters of a servo the data cannot tell apart: what a fit would lose if another parameter were free, too.
+
+The covariance with one more free parameter comes from the same Jacobian, without another fit. Where the standard error
+of a parameter grows by a factor that matters, the two are a class.
+"""
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.motion.estimate import ServoFit, jacobian
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, USUAL, place
+from armlab.diagnosis.motion.windows import Windows
+
+CLASS_FACTOR = 3.0  # of a standard error (chosen by eye)
+CLASS_CORRELATION = 0.95  # of two parameters that are both fitted
+MIN_LOAD_SHARE = 0.1  # of the drive's torque: below it gravity does not set the scale of torques (chosen by eye)
+TORQUE_SCALED = ("kp", "kd", "damping", "friction", "limit", "armature")  # one factor for all, and for the inertia
+
+
+def confused_parameters(windows: Windows, fit: ServoFit) -> dict[int, tuple[int, ...]]:
+    """For each fitted parameter, the places of the parameters that these data do not separate from it."""
+    every = np.array(USUAL) | np.array(OPTIONAL)
+    every[place("limit")] = fit.values[place("limit")] < INFINITE_LIMIT
+    slopes = jacobian(windows, fit.values, every)
+    columns = dict(zip(np.flatnonzero(every).tolist(), slopes.T, strict=True))
+    fitted = np.flatnonzero(fit.free).tolist()
+    alone = _inverse([columns[number] for number in fitted])
+    found: dict[int, list[int]] = {number: [] for number in fitted}
+    for first in range(len(fitted)):
+        for second in range(len(fitted)):
+            size = np.sqrt(alone[first, first] * alone[second, second])
+            if first != second and abs(alone[first, second]) > CLASS_CORRELATION * size:
+                found[fitted[first]].append(fitted[second])
+    for other in set(columns) - set(fitted):
+        if not np.any(columns[other]):
+            continue
+        wider = _inverse([columns[number] for number in (*fitted, other)])
+        for position, number in enumerate(fitted):
+            if np.sqrt(wider[position, position] / alone[position, position]) > CLASS_FACTOR:
+                found[number].append(other)
+    return {number: tuple(sorted(others)) for number, others in found.items()}
+
+
+def has_weak_load(windows: Windows, values: Array) -> bool:
+    """Whether gravity is too weak at a joint to set the scale of torques, so that the simulation's inertia alone does."""
+    command = windows.command[:, windows.history : windows.history + windows.measured.shape[1]]
+    drive = values[place("kp")] * (command - windows.measured)
+    return bool(np.sqrt(np.mean(windows.load**2)) < MIN_LOAD_SHARE * np.sqrt(np.mean(drive**2)))
+
+
+def _inverse(columns: list[Array]) -> Array:
+    """Inverse of the Gram matrix, scaled so that its units do not matter."""
+    stacked = np.stack(columns, axis=1)
+    sizes = np.linalg.norm(stacked, axis=0)
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    scaled = stacked / sizes
+    return np.asarray(np.linalg.pinv(scaled.T @ scaled, hermitian=True) / np.outer(sizes, sizes))

@@ -1,0 +1,222 @@
+"""The law of a position servo at one joint, its parameters, and the effects that name them.
+
+    torque  = s clip(kp d(c(t - delay) + offset - q) - kd qd, -limit, limit)
+    d(e)    = sgn(e) max(|e| - dead_band / 2, 0)
+    torque  = (inertia + armature) qdd + load + damping qd + (friction + load_friction |load|) f
+
+f is the sign of the velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load
+is the torque of gravity and of the other joints. s is 1, or the supply voltage over its nominal value. Where nothing
+saturates, kd and damping are one column; damping also holds back-EMF, with which the torque limit of a drive that is
+limited by its voltage falls with speed. So kd is either that of the simulation or none, and damping is fitted.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from armlab.common.arrays import Array
+
+
+@dataclass(frozen=True)
+class ServoParameter:
+    """One parameter of the law. effect, name: in a verdict. neutral: the value without effect.
+
+    lowest, highest: bounds of a fit; scale: a step that matters. role: a `usual` one is part of every fit, an
+    `optional` one has to earn its place, a `given` one is never fitted. equation: for the verdict, with {value} and
+    {joint}. rivals: effects that fit these data as well, or nearly. mjcf: the field of MJCF that holds it.
+    """
+
+    key: str
+    effect: str
+    name: str
+    unit: str
+    neutral: float
+    lowest: float
+    highest: float
+    scale: float
+    role: Literal["usual", "optional", "given"]
+    equation: str
+    rivals: tuple[str, ...] = ()
+    mjcf: str = ""
+    experiment: str = ""
+
+
+INFINITE_LIMIT = 1e3  # N m: no servo of this law has more
+PARAMETERS: tuple[ServoParameter, ...] = (
+    ServoParameter(
+        "kp",
+        "controller_gain_error",
+        "kp",
+        "N.m/rad",
+        np.nan,
+        1e-3,
+        1e5,
+        1.0,
+        "usual",
+        "tau_{joint} = {value} (command_{joint} - q_{joint})",
+        (),
+        "kp",
+        "record the same motion with a load of known mass, or with another gain",
+    ),
+    ServoParameter(
+        "damping",
+        "viscous_friction",
+        "coefficient",
+        "N.m.s/rad",
+        0.0,
+        0.0,
+        1e3,
+        0.1,
+        "usual",
+        "tau_{joint} += {value} qd_{joint}",
+        ("controller_gain_error",),
+        "damping (kv and damping are one column)",
+        "record the motion with another gain kd, or with a reference velocity",
+    ),
+    ServoParameter(
+        "friction",
+        "coulomb_friction",
+        "level",
+        "N.m",
+        0.0,
+        0.0,
+        1e3,
+        0.02,
+        "usual",
+        "tau_{joint} += {value} sgn(qd_{joint})",
+        (),
+        "frictionloss",
+    ),
+    ServoParameter(
+        "kd",
+        "controller_gain_error",
+        "kd",
+        "N.m.s/rad",
+        0.0,
+        0.0,
+        1e3,
+        0.1,
+        "given",
+        "tau_{joint} = kp (command_{joint} - q_{joint}) - {value} qd_{joint}",
+        ("viscous_friction",),
+        "kv",
+        "record the motion with another gain kd, or with a reference velocity",
+    ),
+    ServoParameter(
+        "armature",
+        "rotor_inertia",
+        "inertia",
+        "kg.m2",
+        0.0,
+        0.0,
+        1e2,
+        0.01,
+        "optional",
+        "tau_{joint} += {value} qdd_{joint}",
+        ("inertial_parameter_error",),
+        "armature",
+        "compare with the motor's data sheet, or record faster motion",
+    ),
+    ServoParameter(
+        "limit",
+        "torque_saturation",
+        "limit",
+        "N.m",
+        INFINITE_LIMIT,
+        1e-2,
+        INFINITE_LIMIT,
+        0.5,
+        "optional",
+        "|tau_{joint}| <= {value}",
+        (),
+        "forcerange",
+    ),
+    ServoParameter(
+        "delay",
+        "command_delay",
+        "seconds",
+        "s",
+        0.0,
+        -0.05,
+        0.3,
+        0.005,
+        "optional",
+        "command_{joint}(t - {value})",
+        ("channel_skew",),
+        "",
+        "log the time at which each joint is read; record steps and fast motion",
+    ),
+    ServoParameter(
+        "offset",
+        "command_offset",
+        "offset",
+        "rad",
+        0.0,
+        -1.0,
+        1.0,
+        0.005,
+        "optional",
+        "command_{joint} + {value}",
+        ("torque_offset", "encoder_offset"),
+        "",
+        "hold a variety of poses, each reached from both directions",
+    ),
+    ServoParameter(
+        "dead_band",
+        "controller_dead_band",
+        "width",
+        "rad",
+        0.0,
+        0.0,
+        0.5,
+        0.005,
+        "optional",
+        "tau_{joint} = 0 where |command_{joint} - q_{joint}| < {value} / 2",
+        ("coulomb_friction", "backlash"),
+        "",
+        "record slow ramps in both directions with two gains",
+    ),
+    ServoParameter(
+        "load_friction",
+        "load_dependent_friction",
+        "coefficient",
+        "1",
+        0.0,
+        0.0,
+        2.0,
+        0.05,
+        "optional",
+        "tau_{joint} += {value} |tau_rigid_{joint}| sgn(qd_{joint})",
+        (),
+        "",
+        "repeat one motion with two payloads",
+    ),
+)
+KEYS = tuple(parameter.key for parameter in PARAMETERS)
+USUAL = tuple(parameter.role == "usual" for parameter in PARAMETERS)
+OPTIONAL = tuple(parameter.role == "optional" for parameter in PARAMETERS)
+Key = Literal["kp", "damping", "friction", "kd", "armature", "limit", "delay", "offset", "dead_band", "load_friction"]
+NEUTRAL = np.array([parameter.neutral for parameter in PARAMETERS])
+LOWEST = np.array([parameter.lowest for parameter in PARAMETERS])
+HIGHEST = np.array([parameter.highest for parameter in PARAMETERS])
+SCALE = np.array([parameter.scale for parameter in PARAMETERS])
+
+
+def place(key: Key) -> int:
+    """Place of a parameter in an array of them."""
+    return KEYS.index(key)
+
+
+@dataclass(frozen=True, eq=False)
+class Servos:
+    """Parameters of the servos of an arm: values (joints, parameters) in the order of PARAMETERS, SI units.
+
+    NaN where the simulation does not know a value.
+    """
+
+    values: Array
+
+    def get(self, key: Key) -> Array:
+        """One parameter of all joints, (joints,)."""
+        return np.asarray(self.values[:, place(key)])

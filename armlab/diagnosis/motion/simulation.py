@@ -1,0 +1,170 @@
+"""The simulation that a recording of motion only is compared with: a MuJoCo model and the numbers of its servos."""
+
+import xml.etree.ElementTree as ElementTree
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, NEUTRAL, Servos, place
+from armlab.identification.export import SimulatorModel, mjcf_document
+from armlab.identification.structure import Structure
+from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.motion import MotionRecording
+from armlab.recordings.recording_file import FILE_NAME, ControllerEntry
+from problem.arm import Arm
+from problem.mjcf import compile_mjcf, import_mujoco
+
+UNSUPPORTED = {
+    "ki": "an integral gain",
+    "integral_limit": "an integral gain",
+    "velocity_filter_hz": "a filtered velocity",
+    "kt": "a motor constant (give torque_limit and kp in N m)",
+    "resistance": "a winding resistance (give torque_limit and kp in N m)",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ServoSimulation:
+    """The simulation.
+
+    path: of the robot's file; document: its MJCF where the file is another format. nominal: of the recorded joints, NaN
+    where unknown. joints: places of the recorded joints in the arm. as_given: the MJCF alone is the simulation.
+    rate_hz: how often the command is taken over. supply: nominal supply voltage, V, of drives that command a voltage;
+    None for others.
+    """
+
+    arm: Arm
+    path: Path
+    document: str | None
+    joints: tuple[int, ...]
+    nominal: Servos
+    as_given: bool
+    rate_hz: float | None = None
+    supply: float | None = None
+
+    def spec(self) -> Any:
+        """The simulation as mujoco.MjSpec, with a position actuator at each joint; their gain is 1 where none was."""
+        mujoco = import_mujoco()
+        if self.document is not None:
+            spec = mujoco.MjSpec.from_string(self.document)
+        else:
+            spec = mujoco.MjSpec.from_file(str(self.path))
+        driven = {actuator.target for actuator in spec.actuators}
+        for joint in self.arm.joints:
+            if joint.name not in driven:
+                kind = mujoco.mjtTrn.mjTRN_JOINT
+                spec.add_actuator(name=f"servo-{joint.name}", target=joint.name, trntype=kind).set_to_position(kp=1.0)
+        return spec
+
+    def model(self) -> Any:
+        """The same, compiled: mujoco.MjModel."""
+        return self.spec().compile()
+
+
+def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
+    """The simulation of a recording: its MJCF, or its robot file, with the controller of `recording.yaml`.
+
+    Raises InputError for a robot without inertias, and for a controller that the replay does not have.
+    """
+    controller = recording.controller
+    where = str(recording.folder / FILE_NAME)
+    if controller is not None:
+        _check_supported(controller, where)
+    if recording.arm.links is None:
+        raise InputError(f"robot of {where} has no links: without inertias a motion says nothing of its drives")
+    path = recording.folder / recording.robot
+    from_mjcf = path.suffix == ".xml"
+    if from_mjcf:
+        nominal = _servos_of_mjcf(recording, path)
+    else:
+        nominal = np.tile(NEUTRAL, (len(recording.joints), 1))
+        nominal[:, place("armature")] = _rotors(recording)
+    if controller is not None:
+        nominal = _with_controller(nominal, controller)
+    return ServoSimulation(
+        arm=recording.arm,
+        path=path,
+        document=None if from_mjcf else _mjcf_of_arm(recording),
+        joints=recording.joints,
+        nominal=Servos(nominal),
+        as_given=from_mjcf and controller is None,
+        rate_hz=controller.rate_hz if controller is not None else None,
+        supply=controller.supply if controller is not None else None,
+    )
+
+
+def _check_supported(controller: ControllerEntry, where: str) -> None:
+    for key, words in UNSUPPORTED.items():
+        if getattr(controller, key) is not None:
+            raise InputError(f"controller.{key} in {where}: the replay has no law with {words}")
+    if controller.reference_velocity != "zero" or controller.feedforward != "none":
+        raise InputError(f"controller in {where}: the replay has no reference velocity and no feedforward")
+
+
+def _rotors(recording: MotionRecording) -> Array:
+    rotors = recording.arm.rotor_inertia or (0.0,) * len(recording.arm)
+    return np.array([rotors[joint] for joint in recording.joints])
+
+
+def _servos_of_mjcf(recording: MotionRecording, path: Path) -> Array:
+    """Parameters (joints, parameters) of the recorded joints and their position actuators."""
+    model = compile_mjcf(path)
+    values = np.tile(NEUTRAL, (len(recording.joints), 1))
+    for row, joint in enumerate(recording.joints):
+        values[row, place("damping")] = model.dof_damping[joint]
+        values[row, place("armature")] = model.dof_armature[joint]
+        values[row, place("friction")] = model.dof_frictionloss[joint]
+        actuator = _actuator_of(model, joint)
+        if actuator is None:
+            continue
+        gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
+        if bias[1] != -gain[0] or gain[0] <= 0 or model.actuator_gear[actuator, 0] != 1:
+            name = recording.arm.joints[joint].name
+            raise InputError(f"{path}: the actuator of joint '{name}' is no position servo with gear 1")
+        values[row, place("kp")], values[row, place("kd")] = gain[0], -bias[2]
+        if model.actuator_forcelimited[actuator]:
+            values[row, place("limit")] = min(model.actuator_forcerange[actuator, 1], INFINITE_LIMIT)
+    return values
+
+
+def _actuator_of(model: Any, joint: int) -> int | None:
+    found = np.flatnonzero((model.actuator_trnid[:, 0] == joint) & (model.actuator_trntype == 0))
+    return int(found[0]) if len(found) else None
+
+
+def actuator_of(model: Any, joint: int) -> int:
+    """The actuator of a joint, from 0."""
+    found = _actuator_of(model, joint)
+    if found is None:
+        raise InputError(f"joint '{model.joint(joint).name}' has no actuator")
+    return found
+
+
+def _with_controller(nominal: Array, controller: ControllerEntry) -> Array:
+    """The numbers of `recording.yaml` in place of those of the robot's file, where it gives any."""
+    values, joints = nominal.copy(), len(nominal)
+    given = {"kp": controller.kp, "kd": controller.kd, "limit": controller.torque_limit, "offset": controller.offset}
+    for key, numbers in {**given, "dead_band": controller.dead_band}.items():
+        for row, value in enumerate(numbers or ()):
+            if value is not None:
+                values[row, KEYS.index(key)] = value
+    late = np.broadcast_to(np.asarray(controller.delay), (joints,))
+    read = np.zeros(joints) if controller.read_delay is None else np.asarray(controller.read_delay)
+    values[:, place("delay")] = late - read
+    return values
+
+
+def _mjcf_of_arm(recording: MotionRecording) -> str:
+    """The arm of a robot file or URDF as MJCF, with a position actuator of gain 1 at each joint."""
+    arm = recording.arm
+    structure = Structure(arm)
+    rigid = TorqueModel(recording.robot, structure, structure.base.values(arm.parameters), inertial=arm.parameters)
+    root = ElementTree.fromstring(mjcf_document(SimulatorModel(rigid, {}, ())))
+    actuators = ElementTree.SubElement(root, "actuator")
+    for joint in arm.joints:
+        ElementTree.SubElement(actuators, "position", name=joint.name, joint=joint.name, kp="1")
+    return ElementTree.tostring(root, encoding="unicode")

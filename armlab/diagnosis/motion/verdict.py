@@ -1,0 +1,194 @@
+"""The files of a motion-only verdict: verdict.json, model.yaml and the simulation with the found numbers."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from armlab.diagnosis.formats import (
+    VERDICT_SCHEMA,
+    FindingEntry,
+    FitEntry,
+    LocatedEntry,
+    ParameterEntry,
+    RivalEntry,
+    StoryEntry,
+    UnexplainedEntry,
+    VerdictFile,
+    WhereEntry,
+    kind_of_effect,
+)
+from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
+from armlab.diagnosis.motion.export import isaac_lab_text, missing_in_mjcf, mjcf_text, mjlab_text
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
+from armlab.diagnosis.motion.words import summary_of
+from armlab.effects.library import effect_named
+from problem.robot_file import built_in_arms
+
+MODEL, SIMULATION = "model.yaml", "simulation.xml"
+IN_COMPONENTS = ("viscous_friction", "coulomb_friction", "rotor_inertia", "load_dependent_friction")
+
+
+def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
+    """All files of the verdict but the report, as they are to stand in a folder."""
+    texts = {"verdict.json": make_motion_verdict(diagnosis).to_json()}
+    if diagnosis.servos is not None:
+        simulation, servos = diagnosis.simulation, diagnosis.servos
+        step = float(simulation.model().opt.timestep)
+        texts[MODEL] = model_text(diagnosis, folder)
+        texts[SIMULATION] = mjcf_text(simulation, servos)
+        texts["actuators.isaaclab.txt"] = isaac_lab_text(simulation, servos, step)
+        texts["actuators.mjlab.txt"] = mjlab_text(simulation, servos, step)
+        missing = list(missing_in_mjcf(simulation, servos))
+        texts["not-in-simulation.txt"] = "\n".join([*missing, ""]) if missing else "everything is in the file\n"
+    return texts
+
+
+def make_motion_verdict(diagnosis: MotionDiagnosis) -> VerdictFile:
+    """The content of `verdict.json`. Errors are of positions, rad (m): there is no torque to compare with."""
+    return VerdictFile(
+        schema=VERDICT_SCHEMA,
+        status=diagnosis.status,
+        summary=summary_of(diagnosis),
+        story=_story(diagnosis),
+        located=_located(diagnosis),
+        findings=tuple(map(_finding, diagnosis.findings, _shares(diagnosis))),
+        unexplained=_unexplained(diagnosis),
+        fit=tuple(_fit(each) for each in diagnosis.errors),
+    )
+
+
+def _shares(diagnosis: MotionDiagnosis) -> list[float]:
+    """Of each finding: its part in the squared error that all findings take away on held-out data."""
+    gains = np.array([max(each.before**2 - each.after**2, 0.0) for each in diagnosis.findings])
+    return [float(each) for each in gains / max(gains.sum(), 1e-300)]
+
+
+def _story(diagnosis: MotionDiagnosis) -> tuple[StoryEntry, ...]:
+    shares, causes = _shares(diagnosis), dict[str, list[int]]()
+    for number, each in enumerate(diagnosis.findings):
+        causes.setdefault(effect_named(each.effect).cause, []).append(number)
+    entries = [
+        StoryEntry(
+            cause=cause,
+            joints=tuple(sorted({diagnosis.findings[number].joint for number in numbers})),
+            share_of_gap=sum(shares[number] for number in numbers),
+            findings=tuple(numbers),
+        )
+        for cause, numbers in causes.items()
+    ]
+    return tuple(sorted(entries, key=lambda entry: -entry.share_of_gap))
+
+
+def _located(diagnosis: MotionDiagnosis) -> tuple[LocatedEntry, ...]:
+    gaps = {
+        each.joint: max((each.before if each.before is not None else each.command) ** 2 - each.after**2, 0.0)
+        for each in diagnosis.errors
+        if any(finding.joint == each.joint for finding in diagnosis.findings)
+    }
+    whole = max(sum(gaps.values()), 1e-300)
+    where = WhereEntry(variable="reference_position", regime="wherever the joint is driven")
+    located = [LocatedEntry(joint=joint, share=min(gap / whole, 1.0), where=where) for joint, gap in gaps.items()]
+    return tuple(sorted(located, key=lambda entry: -entry.share))
+
+
+def _finding(each: ServoFinding, share: float) -> FindingEntry:
+    parameter = ParameterEntry(
+        value=each.value, ci95=(float(each.interval[0]), float(each.interval[1])), unit=each.parameter.unit
+    )
+    return FindingEntry(
+        effect=each.effect,
+        kind=kind_of_effect(effect_named(each.effect)),
+        joint=each.joint,
+        joints=(each.joint,),
+        form=each.name if each.effect == "controller_gain_error" else None,
+        parameters={each.name: parameter},
+        equation=each.equation,
+        heldout_rms_before=each.before,
+        heldout_rms_after=each.after,
+        p_value=each.p_value,
+        share_of_gap=share,
+        rivals=tuple(RivalEntry(effect=rival, joint=each.joint) for rival in each.rivals),
+        next_experiment=(each.parameter.experiment or effect_named(each.effect).experiment) if each.rivals else None,
+    )
+
+
+def _unexplained(diagnosis: MotionDiagnosis) -> tuple[UnexplainedEntry, ...]:
+    """Joints with stretches that their servo does not explain; share: of their windows."""
+    entries = []
+    for number, chosen in enumerate(diagnosis.chosen):
+        if chosen is not None and len(chosen.odd):
+            share = len(chosen.odd) / (len(chosen.odd) + chosen.fit.windows)
+            entries.append(UnexplainedEntry(joint=number + 1, share=share, depends_on=("time",)))
+    return tuple(entries)
+
+
+def _fit(each: JointError) -> FitEntry:
+    before = each.before if each.before is not None else each.command
+    gap = before - each.floor
+    return FitEntry(
+        joint=each.joint,
+        heldout_rms_before=before,
+        heldout_rms_after=each.after,
+        noise_floor=float(each.floor),
+        gap_closed=float((before - each.after) / gap) if gap > 0 else None,
+        replay_rms_before=each.replay_before,
+        replay_rms_after=each.replay_after,
+    )
+
+
+def model_text(diagnosis: MotionDiagnosis, folder: Path) -> str:
+    """`model.yaml`: the links of the robot, friction and rotors as components, and the controller."""
+    recording, servos = diagnosis.recording, diagnosis.servos
+    assert servos is not None
+    robot = recording.robot
+    if robot not in built_in_arms():
+        robot = Path(os.path.relpath(recording.folder / robot, folder)).as_posix()
+    ten = recording.arm.parameters.reshape(-1, 10)
+    content: dict[str, Any] = {
+        "schema": "model/1",
+        "robot": robot,
+        "links": [
+            {"mass": float(row[0]), "first_moment": row[1:4].tolist(), "inertia": row[4:].tolist()} for row in ten
+        ],
+        "components": _components(diagnosis),
+        "controller": controller_entry(diagnosis),
+        "provenance": {"recording": recording.name, "runs": sorted({run.file for run in recording.runs})},
+    }
+    return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
+
+
+def _components(diagnosis: MotionDiagnosis) -> list[dict[str, Any]]:
+    claimed = {(each.effect, each.joint) for each in diagnosis.findings}
+    entries = []
+    for row, chosen in enumerate(diagnosis.chosen):
+        joint = diagnosis.simulation.joints[row] + 1
+        ends = chosen.fit.interval() if chosen is not None else None
+        for place, parameter in enumerate(PARAMETERS):
+            assert diagnosis.servos is not None
+            value = float(diagnosis.servos.values[row, place])
+            if parameter.effect not in IN_COMPONENTS or value == 0:
+                continue
+            fitted = chosen is not None and bool(chosen.fit.free[place])
+            interval = [float(ends[0, place]), float(ends[1, place])] if fitted and ends is not None else None
+            unit = {"value": value, "ci95": interval, "unit": parameter.unit}
+            entry = {"effect": parameter.effect, "joint": joint, "joints": [joint]}
+            entry |= {"claimed": (parameter.effect, row + 1) in claimed, "parameters": {parameter.name: unit}}
+            entries.append(entry)
+    return entries
+
+
+def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:
+    """The controller as `recording.yaml` takes it, one entry a joint; damping stands in components."""
+    servos = diagnosis.servos
+    assert servos is not None
+    limits = [float(each) if each < INFINITE_LIMIT else None for each in servos.get("limit")]
+    delays = servos.get("delay")
+    entry: dict[str, Any] = {"type": "pd", "kp": servos.get("kp").tolist(), "kd": servos.get("kd").tolist()}
+    entry |= {"reference_velocity": "zero", "feedforward": "none", "torque_limit": limits}
+    entry |= {"delay": np.maximum(delays, 0.0).tolist()}
+    others = {"offset": servos.get("offset"), "dead_band": servos.get("dead_band")}
+    others["read_delay"] = np.maximum(-delays, 0.0)
+    return entry | {name: values.tolist() for name, values in others.items() if values.any()}

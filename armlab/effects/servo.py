@@ -1,0 +1,42 @@
+"""Effects of a position servo: they act on its command, not on the torque of a joint.
+
+They have no columns and no candidates. Recordings of motion only show them; their law stands in
+`armlab/diagnosis/motion/servo.py`.
+"""
+
+from armlab.effects.contract import ANGLE, TORQUE, Effect, Parameter
+
+CONTROLLER_GAIN = Effect(
+    "controller_gain_error",
+    "gain of a position servo that differs from the simulation's",
+    parameters=(
+        Parameter("kp", f"{TORQUE}/{ANGLE}", positive=True),
+        Parameter("kd", f"{TORQUE}.s/{ANGLE}"),
+    ),
+    title="controller gain",
+    origin="drive",
+    experiment="record the same motion with a load of known mass, or with another gain",
+)
+COMMAND_DELAY = Effect(
+    "command_delay",
+    "command that takes effect late",
+    parameters=(Parameter("seconds", "s", sampled=True),),
+    origin="timing",
+    experiment="log the time at which each joint is read; record steps and fast motion",
+)
+DEAD_BAND = Effect(
+    "controller_dead_band",
+    "position servo that ignores small errors",
+    parameters=(Parameter("width", ANGLE, positive=True),),
+    title="dead band",
+    origin="drive",
+    experiment="record slow ramps in both directions with two gains",
+)
+COMMAND_OFFSET = Effect(
+    "command_offset",
+    "command that is off by a constant",
+    parameters=(Parameter("offset", ANGLE),),
+    origin="drive",
+    experiment="hold a variety of poses, each reached from both directions",
+)
+SERVO_EFFECTS = (CONTROLLER_GAIN, COMMAND_DELAY, DEAD_BAND, COMMAND_OFFSET)

@@ -1,0 +1,83 @@
+"""Reads a LeRobot dataset (versions 2 and 3): a folder with meta/info.json and Parquet files of episodes.
+
+Vectors become a column an entry, `action.NAME` (the command) and `observation.state.NAME` (the position), with the
+names of meta/info.json. Videos and tasks are left out.
+"""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.recordings.table import HEADER_LINES, Table
+
+INFO = Path("meta/info.json")
+COMMAND, STATE, STAMP, EPISODE = "action", "observation.state", "timestamp", "episode_index"
+
+
+def is_lerobot(path: Path) -> bool:
+    """Whether a path is the folder of a LeRobot dataset."""
+    return path.is_dir() and (path / INFO).is_file()
+
+
+def read_lerobot(folder: Path) -> dict[str, Table]:
+    """The episodes of a dataset by their names, like `episode-000003`; InputError, in one line, for a broken one."""
+    names = {vector: _entry_names(_features(folder), vector, folder) for vector in (COMMAND, STATE)}
+    files = sorted((folder / "data").rglob("*.parquet"))
+    if not files:
+        raise InputError(f"{folder} has no Parquet file below data/: is the dataset complete?")
+    episodes: dict[str, Table] = {}
+    for path in files:
+        frame = _read_columns(path)
+        vectors = [_check_width(frame[key], names[key], key, path) for key in names]
+        values = np.column_stack([frame[STAMP][:, None], *vectors])
+        columns = ("timestamp", *(f"{key}.{name}" for key in names for name in names[key]))
+        for episode in np.unique(frame[EPISODE]):
+            rows = values[frame[EPISODE] == episode]
+            name = f"episode-{int(episode):06d}"
+            episodes[name] = Table(name, columns, rows, HEADER_LINES + 1 + np.arange(len(rows)))
+    return episodes
+
+
+def _features(folder: Path) -> dict[str, Any]:
+    try:
+        content = json.loads((folder / INFO).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot read {folder / INFO}: {' '.join(str(error).split())}") from None
+    features = content.get("features") if isinstance(content, dict) else None
+    if not isinstance(features, dict):
+        raise InputError(f"{folder / INFO} has no 'features': it is no LeRobot dataset of version 2 or 3")
+    return features
+
+
+def _entry_names(features: dict[str, Any], vector: str, folder: Path) -> tuple[str, ...]:
+    """Names of the entries of a vector; versions before 2.1 hold them below a word such as `motors`."""
+    given = features.get(vector, {}).get("names")
+    if isinstance(given, dict):
+        given = next(iter(given.values()), None)
+    if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
+        raise InputError(f"{folder / INFO}: features.{vector}.names should be a list of names, one a joint")
+    return tuple(name.removesuffix(".pos") for name in given)
+
+
+def _read_columns(path: Path) -> dict[str, Array]:
+    """Command, state, stamp and episode of each row."""
+    try:
+        from pyarrow import ArrowException, parquet
+    except ImportError:
+        raise InputError(f"{path}: to read Parquet install pyarrow: pip install 'armlab[recordings]'") from None
+    try:
+        table = parquet.read_table(path, columns=[COMMAND, STATE, STAMP, EPISODE])
+        return {name: np.array(table[name].to_pylist(), dtype=np.float64) for name in table.column_names}
+    except (ArrowException, OSError, KeyError, ValueError, TypeError) as error:
+        raise InputError(f"cannot read {path}: {' '.join(str(error).split())[:200]}") from None
+
+
+def _check_width(values: Array, names: tuple[str, ...], vector: str, path: Path) -> Array:
+    if values.ndim != 2 or values.shape[1] != len(names):
+        width = values.shape[1] if values.ndim == 2 else 1
+        raise InputError(f"{path}: {vector} has {width} entries, meta/info.json names {len(names)}")
+    return values

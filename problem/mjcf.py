@@ -1,0 +1,99 @@
+"""Reads MJCF, the format of MuJoCo, as an arm. MuJoCo compiles the file: defaults and includes count as it has them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from problem.arm import Arm, Joint, Limits, Link
+from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
+from problem.transforms import inverse, translation, turn_z_to
+
+MOVING_KINDS = {2: "prismatic", 3: "revolute"}  # mjJNT_SLIDE, mjJNT_HINGE
+
+
+def import_mujoco() -> Any:
+    """The package mujoco; InputError, with the command that installs it, where it is missing."""
+    try:
+        import mujoco
+    except ImportError:
+        raise InputError("MuJoCo is missing, which MJCF files and replay need: pip install 'armlab[motion]'") from None
+    return mujoco
+
+
+def compile_mjcf(path: Path) -> Any:
+    """The mujoco.MjModel of a file; InputError, in one line, where it is missing or MuJoCo refuses it."""
+    mujoco = import_mujoco()
+    if not path.is_file():
+        raise InputError(f"cannot read {path}: no such file")
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        hint = "; remove visual meshes that are not at hand" if "mesh" in reason.lower() else ""
+        raise InputError(f"{path}: MuJoCo cannot compile it: {reason}{hint}") from None
+
+
+def read_mjcf(path: Path) -> Arm:
+    """The arm of an MJCF file: a chain of hinges and slides on a fixed base.
+
+    Raises InputError, in one line, for a branch, a free or ball joint, two joints on a body, and a file that MuJoCo
+    refuses. Actuators, damping and friction are no part of an arm.
+    """
+    return arm_of(compile_mjcf(path), path)
+
+
+def arm_of(model: Any, path: Path) -> Arm:
+    """The arm of a mujoco.MjModel; path: of its file, for messages. Raises InputError as `read_mjcf`."""
+    if model.njnt == 0:
+        raise InputError(f"{path} has no joint")
+    if model.neq:
+        raise InputError(f"{path}: equality constraints (closed chains, mimic joints) are not supported; remove them")
+    carried: dict[int, tuple[int, Array]] = {0: (0, np.eye(4))}  # body: moving link that carries it, pose in its frame
+    joints: list[Joint] = []
+    pseudos: list[Array] = []
+    for body in range(1, model.nbody):
+        carrier, pose = carried[int(model.body_parentid[body])]
+        pose = pose @ _pose(model.body_pos[body], model.body_quat[body])
+        if model.body_jntnum[body]:
+            if carrier != len(joints):
+                name = model.joint(int(model.body_jntadr[body])).name
+                raise InputError(f"{path}, joint '{name}': a second branch of moving joints; cut the file to one arm")
+            joints.append(_joint(model, body, pose, path))
+            pseudos.append(np.zeros((4, 4)))
+            carrier, pose = len(joints), np.eye(4)
+        carried[body] = carrier, pose
+        if carrier:
+            pseudos[carrier - 1] = pseudos[carrier - 1] + transform_pseudo_inertia(_pseudo_inertia(model, body), pose)
+    gravity = tuple(model.opt.gravity.tolist())
+    rotors = tuple(float(model.dof_armature[joint]) for joint in range(model.njnt))
+    return Arm(path.stem, tuple(joints), tuple(link_from_pseudo_inertia(each) for each in pseudos), gravity, rotors)
+
+
+def _pose(position: Array, quaternion: Array) -> Array:
+    pose = translation(*position)
+    pose[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return pose
+
+
+def _joint(model: Any, body: int, pose: Array, path: Path) -> Joint:
+    """The joint of a body whose pose in the frame of the link before is given."""
+    number = int(model.body_jntadr[body])
+    name, kind = model.joint(number).name, int(model.jnt_type[number])
+    if kind not in MOVING_KINDS:
+        raise InputError(f"{path}, joint '{name}': only hinge and slide joints on a fixed base are supported")
+    if model.body_jntnum[body] > 1:
+        raise InputError(f"{path}, body '{model.body(body).name}': more than one joint on a body is not supported")
+    frame = translation(*model.jnt_pos[number]) @ turn_z_to(model.jnt_axis[number])
+    bounds = tuple(model.jnt_range[number].tolist()) if model.jnt_limited[number] else (-np.inf, np.inf)
+    return Joint(name, MOVING_KINDS[kind], pose @ frame, inverse(frame), Limits(position=bounds))  # type: ignore[arg-type]
+
+
+def _pseudo_inertia(model: Any, body: int) -> Array:
+    """Pseudo-inertia (4, 4) of a body about its own frame."""
+    xx, yy, zz = model.body_inertia[body].tolist()
+    link = Link(float(model.body_mass[body]), (0.0, 0.0, 0.0), (xx, yy, zz, 0.0, 0.0, 0.0))
+    return transform_pseudo_inertia(pseudo_inertia_of(link), _pose(model.body_ipos[body], model.body_iquat[body]))

@@ -1,0 +1,230 @@
+"""Diagnoses of recordings of motion only: named servos, honest nulls, files that reproduce the replay, bad input."""
+
+import json
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pandas as pd
+import pytest
+from click.testing import CliRunner
+from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
+
+from armlab.cli.main import main
+from armlab.common.files import write_texts
+from armlab.diagnosis.formats import read_verdict_file
+from armlab.diagnosis.motion.compare import compare_motion
+from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
+from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
+from armlab.diagnosis.motion.export import mjcf_text
+from armlab.diagnosis.motion.joint_replay import replay_joint
+from armlab.diagnosis.motion.replay import joint_rms, replay
+from armlab.diagnosis.motion.report import motion_page
+from armlab.diagnosis.motion.servo import NEUTRAL, Servos, place
+from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
+from armlab.diagnosis.motion.windows import make_windows
+from armlab.diagnosis.motion.words import motion_lines
+from armlab.identification.model_file import read_model
+from armlab.recordings.motion import load_motion_recording
+
+SECONDS = 20.0
+TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1}
+
+
+@pytest.fixture(scope="module")
+def soft(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording whose servos are softer than the simulation's, with friction and a late command."""
+    return write_recording(tmp_path_factory.mktemp("soft") / "servo", {**TRUTH, "delay": 0.02}, seconds=SECONDS)
+
+
+@pytest.fixture(scope="module")
+def diagnosis(soft: Path) -> MotionDiagnosis:
+    return diagnose_motion(load_motion_recording(soft))
+
+
+def found(diagnosis: MotionDiagnosis) -> dict[tuple[str, int], float]:
+    return {(each.effect, each.joint): each.value for each in diagnosis.findings}
+
+
+def test_gain_friction_and_delay_are_named_with_their_numbers(diagnosis: MotionDiagnosis) -> None:
+    numbers = found(diagnosis)
+    assert diagnosis.status == "mismatch"
+    for joint in (1, 2):
+        assert numbers["controller_gain_error", joint] == pytest.approx(8.0, rel=0.05)
+        assert numbers["coulomb_friction", joint] == pytest.approx(0.1, rel=0.15)
+        assert numbers["command_delay", joint] == pytest.approx(0.02, abs=0.003)
+    assert not {effect for effect, _ in numbers} & {"torque_saturation", "controller_dead_band", "rotor_inertia"}
+
+
+def test_held_out_replay_comes_near_the_encoder(diagnosis: MotionDiagnosis) -> None:
+    for each in diagnosis.errors:
+        assert each.replay_before is not None
+        assert each.replay_after < 0.1 * each.replay_before
+    assert diagnosis.tool[0] is not None
+    assert diagnosis.tool[1] < 0.1 * diagnosis.tool[0]
+
+
+def test_intervals_are_narrow_and_near_the_truth(diagnosis: MotionDiagnosis) -> None:
+    for each in diagnosis.findings:
+        if each.effect == "controller_gain_error":
+            low, high = each.interval
+            assert low - 0.3 < 8.0 < high + 0.3
+            assert high - low < 1.0
+
+
+def test_a_simulation_that_is_right_has_nothing_missing(tmp_path: Path) -> None:
+    result = diagnose_motion(load_motion_recording(write_recording(tmp_path / "right", {}, seconds=SECONDS)))
+    assert (result.status, result.findings) == ("none", ())
+    assert result.servos is not None
+    np.testing.assert_array_equal(result.servos.values, result.simulation.nominal.values)
+
+
+def test_without_a_controller_and_with_dropped_rows_the_gain_is_found_all_the_same(soft: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "unknown"
+    folder.mkdir()
+    for path in soft.iterdir():
+        (folder / path.name).write_bytes(path.read_bytes())
+    text = (folder / "arm.xml").read_text()
+    (folder / "arm.xml").write_text(text[: text.index("<actuator>")] + "</mujoco>")
+    for number, path in enumerate(sorted(folder.glob("*.csv"))):
+        table = pd.read_csv(path)
+        gone = np.random.default_rng(number).choice(np.arange(5, len(table) - 5), 20, replace=False)
+        table.drop(index=gone).to_csv(path, index=False)
+    result = diagnose_motion(load_motion_recording(folder))
+    assert found(result)["controller_gain_error", 1] == pytest.approx(8.0, rel=0.06)
+    assert all(np.isnan(each.nominal) for each in result.findings if each.effect == "controller_gain_error")
+    assert all(each.replay_before is None for each in result.errors)
+
+
+def test_replay_of_one_joint_agrees_with_mujoco(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    simulation = read_servo_simulation(recording)
+    true = NEUTRAL.copy()
+    true[[place("kp"), place("damping"), place("friction"), place("armature")]] = 8.0, 0.5, 0.1, 0.01
+    true[[place("limit"), place("delay")]] = 3.0, 0.02
+    for windows in make_windows(recording.with_role("identify"), simulation):
+        errors = replay_joint(windows, true)[0] - windows.position
+        assert np.sqrt(np.mean(errors**2)) < 0.03 * np.std(windows.position)
+
+
+def test_mujoco_replays_its_own_recording_down_to_the_encoder(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    simulation = read_servo_simulation(recording)
+    true = np.tile(NEUTRAL, (2, 1))
+    true[:, [place("kp"), place("damping"), place("friction"), place("armature")]] = 8.0, 0.5, 0.1, 0.01
+    true[:, [place("limit"), place("delay")]] = 3.0, 0.02
+    replayed = replay(simulation, Servos(true), recording.with_role("validate"))
+    assert joint_rms(replayed).max() < 2e-3
+    banded = true.copy()
+    banded[:, place("dead_band")] = 1e-12  # the same law, step by step
+    again = replay(simulation, Servos(banded), recording.with_role("validate"))
+    np.testing.assert_allclose(again[0].position, replayed[0].position, atol=1e-8)
+
+
+def test_the_exported_mjcf_replays_as_the_found_servos(diagnosis: MotionDiagnosis, tmp_path: Path) -> None:
+    assert diagnosis.servos is not None
+    values = diagnosis.servos.values.copy()
+    values[:, place("delay")] = 0.0
+    path = tmp_path / "found.xml"
+    path.write_text(mjcf_text(diagnosis.simulation, Servos(values)))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    command = commands(7, 8.0)
+    ours = simulate(path.read_text(), command)
+    recording = load_motion_recording(diagnosis.recording.folder)
+    run = recording.runs[0]
+    time = np.arange(len(command)) / RATE_HZ
+    again = replay(
+        diagnosis.simulation,
+        Servos(values),
+        [run.with_signals(time, {"position": ours, "reference_position": command, **rest(run, len(command))})],
+    )
+    assert np.abs(again[0].error[50:]).max() < 1e-3  # both start apart by the speed that an encoder gives
+    assert model.actuator_gainprm[0, 0] == pytest.approx(float(diagnosis.servos.get("kp")[0]), rel=1e-5)
+    delayed = mujoco.MjModel.from_xml_string(mjcf_text(diagnosis.simulation, diagnosis.servos))
+    np.testing.assert_allclose(delayed.actuator_delay, diagnosis.servos.get("delay"), rtol=1e-5)
+
+
+def rest(run: object, count: int) -> dict[str, np.ndarray]:
+    """The other signals of a run, cut to a length."""
+    signals = getattr(run, "signals")  # noqa: B009
+    return {name: each[:count] for name, each in signals.items() if name not in ("position", "reference_position")}
+
+
+def test_verdict_model_simulation_and_page_are_written(diagnosis: MotionDiagnosis, tmp_path: Path) -> None:
+    texts = motion_texts(diagnosis, tmp_path) | {"report.html": motion_page(diagnosis, "armlab diagnose")}
+    write_texts(texts, tmp_path)
+    verdict = read_verdict_file(tmp_path / "verdict.json")
+    assert verdict.status == "mismatch"
+    assert verdict.fit[0].replay_rms_after is not None
+    assert len(verdict.summary.split(". ")[0].split()) <= 30
+    assert verdict.story is not None
+    assert sum(each.share_of_gap for each in verdict.story) == pytest.approx(1.0)
+    assert len(read_model(tmp_path / "model.yaml").effects) >= 4
+    assert "<svg" in texts["report.html"]
+    assert "DelayedPDActuatorCfg" in texts["actuators.isaaclab.txt"]
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "simulation.xml")).nu == 2
+    assert any("mrad" in line for line in motion_lines(diagnosis))
+
+
+def test_the_command_says_why_nothing_can_be_said(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path / "still", {"kp": 40.0}, seconds=4.0)
+    for path in folder.glob("*.csv"):
+        pd.read_csv(path).assign(q1=0.1, q2=0.1, c1=0.1, c2=0.1).to_csv(path, index=False)
+    result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert "INCONCLUSIVE: Nothing can be said: no joint moves" in result.output
+    assert json.loads((tmp_path / "out" / "verdict.json").read_text())["status"] == "inconclusive"
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda table: table.assign(c1=np.degrees(table["c1"]), c2=np.degrees(table["c2"])), "degrees for radians"),
+        (lambda table: table.rename(columns={"c1": "c2", "c2": "c1"}), "exchanged columns"),
+        (lambda table: table.assign(q1=np.sin(table["t"] * 1.7), q2=np.cos(table["t"] * 2.9)), "no joint follows"),
+    ],
+)
+def test_bad_input_is_inconclusive_with_a_reason_in_one_line(tmp_path: Path, damage: object, reason: str) -> None:
+    folder = write_recording(tmp_path / "bad", {"kp": 40.0}, seconds=6.0)
+    for path in folder.glob("*.csv"):
+        damage(pd.read_csv(path)).to_csv(path, index=False)  # type: ignore[operator]
+    result = diagnose_motion(load_motion_recording(folder))
+    assert result.status == "inconclusive"
+    assert reason in make_motion_verdict(result).summary
+    assert "\n" not in result.reason
+
+
+def test_a_controller_that_the_replay_lacks_is_refused(tmp_path: Path) -> None:
+    controller = {"type": "pd", "kp": [8.0, 8.0], "kd": [0.0, 0.0], "ki": [1.0, 1.0]}
+    folder = write_recording(tmp_path / "pid", {}, seconds=4.0, controller=controller)
+    result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert "controller.ki" in result.output
+
+
+def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:
+    model = mujoco.MjModel.from_xml_string(arm_text(kp=7.0))
+    assert model.actuator_gainprm[0, 0] == 7.0
+
+
+def test_a_comparison_names_the_gain_that_was_raised_and_nothing_else(tmp_path: Path) -> None:
+    old = write_recording(tmp_path / "old", TRUTH, seconds=10.0)
+    new = write_recording(tmp_path / "new", {**TRUTH, "kp": 16.0}, seconds=10.0)
+    comparison = compare_motion(load_motion_recording(old), load_motion_recording(new))
+    assert {(each.parameter.key, each.joint) for each in comparison.changed} == {("kp", 1), ("kp", 2)}
+    for each in comparison.changed:
+        assert each.ratio is not None
+        assert each.ratio[0] == pytest.approx(2.0, rel=0.06)
+    file = make_motion_comparison(comparison)
+    assert file.status == "changed"
+    assert "a factor of" in file.summary
+    assert "controller gain" in comparison_page(comparison, "armlab diagnose --compare")
+
+
+def test_recordings_of_other_kinds_are_not_compared(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path / "one", {}, seconds=4.0)
+    command = ["diagnose", "--compare", str(folder), str(folder), str(folder), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(main, command)
+    assert result.exit_code == 2
+    assert "two at a time" in result.output
