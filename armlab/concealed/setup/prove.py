@@ -5,7 +5,6 @@ An interrupted proof continues in its folder.
 
 import json
 import shutil
-import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,8 +15,7 @@ from joblib import Parallel, delayed
 from armlab.common.errors import InputError
 from armlab.concealed.case_files import write_observation
 from armlab.concealed.pairs.prove import SETTINGS_FILE, digest_of_answers
-from armlab.concealed.prove import report_progress, run_command
-from armlab.concealed.score.cases import FAILURE_FILE, TIME_FILE
+from armlab.concealed.prove import answer, is_answered, report_progress
 from armlab.concealed.setup.mistakes import Injected, inject
 from armlab.concealed.setup.oracle import can_be_seen
 from armlab.concealed.setup.plan import SetupCase, draw_cases, draw_mistakes
@@ -51,7 +49,7 @@ def prove_setup(settings: SetupSet, work: Path, results: Path, jobs: int) -> Ite
     yield from report_progress("made", made, max(len(missing), 1))
     yield f"answers SHA-256 {digest_of_answers(work / 'truth')}"
     names = [case.name for case in cases]
-    waiting = [name for name in names if not _is_done(work / "verdicts" / name)]
+    waiting = [name for name in names if not is_answered(work / "verdicts" / name)]
     tasks = (delayed(_diagnose)(work, name, settings.only_setup) for name in waiting)
     done = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(tasks)
     yield from report_progress("diagnosed", done, max(len(waiting), 1))
@@ -90,11 +88,11 @@ def _make(case: SetupCase, work: Path) -> str:
     if mistakes:
         inject(wrong, mistakes, true_arm)
         seen = [_is_seen(right, draft, mistakes, place) for place in range(len(mistakes))]
-    answer = {**asdict(case), "mistakes": [asdict(each) for each in mistakes], "seen": seen, "physics": physics}
-    answer["arm_joints"] = len(arm)
+    truth = {**asdict(case), "mistakes": [asdict(each) for each in mistakes], "seen": seen, "physics": physics}
+    truth["arm_joints"] = len(arm)
     for part in ("truth", "observations"):
         (work / part).mkdir(parents=True, exist_ok=True)
-    (work / "truth" / f"{case.name}.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+    (work / "truth" / f"{case.name}.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
     wrong.replace(work / "observations" / case.name)
     shutil.rmtree(draft)
     return case.name
@@ -113,21 +111,7 @@ def _is_seen(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: in
         shutil.rmtree(alone)
 
 
-def _is_done(out: Path) -> bool:
-    return (out / TIME_FILE).is_file() or (out / FAILURE_FILE).is_file()
-
-
 def _diagnose(work: Path, name: str, only_setup: bool) -> str:
-    """Diagnoses one case through the command line. The time is written last and marks the verdict as complete."""
-    out = work / "verdicts" / name
-    out.mkdir(parents=True, exist_ok=True)
-    folder = (work / "observations" / name).resolve()
-    start = time.monotonic()
-    options: list[str] = ["--only-setup"] if only_setup else []
-    complaint = run_command(["diagnose", str(folder), "--out", str(out.resolve()), *options])
-    if complaint is not None:
-        (out / FAILURE_FILE).write_text(complaint, encoding="utf-8")
-    else:
-        seconds: dict[str, Any] = {"seconds": round(time.monotonic() - start, 2)}
-        (out / TIME_FILE).write_text(json.dumps(seconds) + "\n", encoding="utf-8")
+    folder, options = (work / "observations" / name).resolve(), ["--only-setup"] if only_setup else []
+    answer(["diagnose", str(folder), *options], work / "verdicts" / name)
     return name
