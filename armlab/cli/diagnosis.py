@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from armlab.cli.options import FiniteNumber, OutputPath
+
 _FILE = click.Path(path_type=Path)
 
 
@@ -18,15 +20,15 @@ _FILE = click.Path(path_type=Path)
 )
 @click.option("--algorithm", default="l-shade", show_default=True, help="Any registered one.")
 @click.option("--evaluations", type=click.IntRange(min=50), default=1000, show_default=True)
-@click.option("--duration", type=click.FloatRange(min=1), default=10.0, show_default=True, help="Of the motion, s.")
+@click.option("--duration", type=FiniteNumber(min=1), default=10.0, show_default=True, help="Of the motion, s.")
 @click.option("--harmonics", type=click.IntRange(min=2), default=8, show_default=True)
 @click.option(
     "--links",
     type=click.Choice(["exact", "near", "free"]),
     help="How well links are known [default: exact where the diagnosis left them, else near; free without].",
 )
-@click.option("--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Hz.")
-@click.option("--out", type=_FILE, default=Path("next"), show_default=True)
+@click.option("--rate", "rate_hz", type=FiniteNumber(min=1), default=250.0, show_default=True, help="Hz.")
+@click.option("--out", type=OutputPath(), default=Path("next"), show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 def next_experiment(
     verdict: Path,
@@ -57,7 +59,7 @@ def next_experiment(
 
 @click.command()
 @click.argument("recordings", type=click.Path(path_type=Path), nargs=-1, required=True, metavar="RECORDING...")
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="Folder for verdict, report and model.")
+@click.option("--out", type=OutputPath(), required=True, help="Folder for verdict, report and model.")
 @click.option(
     "--baseline",
     type=click.Choice(["nominal", "refit", "simulated"]),
@@ -125,7 +127,7 @@ def diagnose(
 
 
 @click.command()
-@click.option("--out", type=_FILE, help="File for the page [default: the terminal].")
+@click.option("--out", type=OutputPath(), help="File for the page [default: the terminal].")
 def tuning(out: Path | None) -> None:
     """List the tuning numbers of the diagnosis.
 
@@ -157,8 +159,8 @@ def export_model(model: Path, out: Path) -> None:
 
 
 @click.command()
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
-@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
 @click.option(
     "--peers", type=click.Path(path_type=Path), help="Python that has figaroh and mujoco[sysid]: adds peers.md."
@@ -207,8 +209,8 @@ def real_motion(results: Path, recordings: Path) -> None:
 
 @click.command()
 @click.argument("folders", nargs=-1, type=click.Path(path_type=Path), metavar="[RECORDING]...")
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results/relations"), show_default=True)
-@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/relations"), show_default=True)
+@click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a recording [default: all at hand].")
 @click.option("--quick", is_flag=True, help="The short relations alone.")
 def relations(folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], quick: bool) -> None:
@@ -226,8 +228,8 @@ def relations(folders: tuple[Path, ...], results: Path, recordings: Path, only: 
 
 
 @click.command("real-concealed")
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
-@click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
 def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> None:
     """Judge diagnoses of effects concealed in real recordings.
@@ -246,9 +248,11 @@ def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> No
 @click.command()
 @click.argument("robot")
 @click.argument("trajectory")
-@click.option("--noise", multiple=True, type=float, help="Of the torque, N m: once, or once a joint [default: 1 %].")
+@click.option(
+    "--noise", multiple=True, type=FiniteNumber(), help="Of the torque, N m: once, or once a joint [default: 1 %]."
+)
 @click.option("--joints", type=click.IntRange(min=1), help="How many of its first joints move [default: all].")
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the card as page, tables and pictures.")
+@click.option("--out", type=OutputPath(), help="Folder for the card as page, tables and pictures.")
 def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints: int | None, out: Path | None) -> None:
     """List the effects that TRAJECTORY cannot tell apart.
 

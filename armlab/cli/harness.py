@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from armlab.cli.options import FiniteNumber, OutputPath
+
 
 def trial_bar(total: int, done: int) -> Any:
     """A bar over trials with the time left; silent where no one watches."""
@@ -30,7 +32,7 @@ def _run_options(command: Callable[..., None], results: str = "results") -> Call
         ),
         click.option(
             "--results",
-            type=click.Path(path_type=Path),
+            type=OutputPath(),
             default=Path(results),
             show_default=True,
             help="Folder for tables and figures.",
@@ -197,7 +199,7 @@ _STORE_OPTION = click.option(
 @click.command()
 @click.argument("results", type=_PATH)
 @_STORE_OPTION
-@click.option("--out", type=_PATH, help="HTML file [default: results/NAME_report.html].")
+@click.option("--out", type=OutputPath(), help="HTML file [default: results/NAME_report.html].")
 def report(results: Path, store: Path, out: Path | None) -> None:
     """Write one HTML page about RESULTS.
 
@@ -213,7 +215,7 @@ def report(results: Path, store: Path, out: Path | None) -> None:
 @click.argument("first", type=_PATH)
 @click.argument("second", type=_PATH)
 @_STORE_OPTION
-@click.option("--out", type=_PATH, help="Folder for comparison.md and .csv [default: print only].")
+@click.option("--out", type=OutputPath(), help="Folder for comparison.md and .csv [default: print only].")
 def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
     """Show what changed between two sets of results.
 
@@ -229,7 +231,7 @@ def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
 @click.argument("results", type=_PATH)
 @_STORE_OPTION
 @click.option("--as", "form", type=click.Choice(["csv", "parquet", "ioh"]), default="csv", show_default=True)
-@click.option("--out", type=_PATH, required=True, help="Folder to write into.")
+@click.option("--out", type=OutputPath(), required=True, help="Folder to write into.")
 def share(results: Path, store: Path, form: str, out: Path) -> None:
     """Write RESULTS as tables or in IOHprofiler's format.
 
@@ -267,7 +269,7 @@ def draw(results: Path, store: Path, out: Path, records: Path) -> None:
 
 @click.command()
 @click.argument("damaged", type=_PATH)
-@click.option("--out", type=_PATH, required=True, help="File of the new store.")
+@click.option("--out", type=OutputPath(), required=True, help="File of the new store.")
 def salvage(damaged: Path, out: Path) -> None:
     """Copy what is readable of a DAMAGED run store.
 
@@ -280,7 +282,7 @@ def salvage(damaged: Path, out: Path) -> None:
 
 @click.command()
 @click.argument("algorithms", nargs=-1)
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
 def properties(algorithms: tuple[str, ...], results: Path) -> None:
     """Measure general properties of ALGORITHMS [default: all].
 
@@ -293,11 +295,11 @@ def properties(algorithms: tuple[str, ...], results: Path) -> None:
         click.echo(path)
 
 
-_RESULTS_OPTION = click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+_RESULTS_OPTION = click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
 
 
 @click.command("best-known")
-@click.option("--minutes", type=click.FloatRange(min=0), default=10.0, show_default=True)
+@click.option("--minutes", type=FiniteNumber(min=0), default=10.0, show_default=True)
 @click.option("--problem", help="Name of a problem in configs/best_known.yaml [default: all in turn].")
 @_RESULTS_OPTION
 def best_known(minutes: float, problem: str | None, results: Path) -> None:
@@ -357,9 +359,9 @@ def does_it_help(workers: int | None, results: Path) -> None:
 @click.option("--record", required=True, help="Name of a record in best_known.json.")
 @click.option("--format", "form", type=click.Choice(["csv", "ros2", "rapid"]), default="csv", show_default=True)
 @click.option(
-    "--rate", "rate_hz", type=click.FloatRange(min=1), default=250.0, show_default=True, help="Sampling rate, Hz."
+    "--rate", "rate_hz", type=FiniteNumber(min=1), default=250.0, show_default=True, help="Sampling rate, Hz."
 )
-@click.option("--out", type=click.Path(path_type=Path), required=True)
+@click.option("--out", type=OutputPath(), required=True)
 @_RESULTS_OPTION
 def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> None:
     """Write a best known trajectory for a robot controller.

@@ -5,21 +5,21 @@ from pathlib import Path
 
 import click
 
+from armlab.cli.options import FiniteNumber, OutputPath
+
 METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likelihood", "instrumental", "physical")
 
 
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path))
-@click.option(
-    "--out", type=click.Path(path_type=Path), help="Folder for model.yaml and report.html [default: RECORDING]."
-)
+@click.option("--out", type=OutputPath(), help="Folder for model.yaml and report.html [default: RECORDING].")
 @click.option("--method", type=click.Choice(METHODS), default="weighted", show_default=True, help="Estimator.")
 @click.option(
-    "--cutoff-hz", type=click.FloatRange(min=0, min_open=True), help="Cut-off of the low-pass [default: from the data]."
+    "--cutoff-hz", type=FiniteNumber(min=0, min_open=True), help="Cut-off of the low-pass [default: from the data]."
 )
 @click.option(
     "--tolerance",
-    type=click.FloatRange(min=0, min_open=True),
+    type=FiniteNumber(min=0, min_open=True),
     help="Relative width of a prior about the robot's links.",
 )
 @click.option("--select", "choose", is_flag=True, help="Choose cut-off, components and prior by cross-validation.")
@@ -48,7 +48,7 @@ def identify(
 @click.command()
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("recording", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="Folder for the predicted torques, a CSV a run.")
+@click.option("--out", type=OutputPath(), help="Folder for the predicted torques, a CSV a run.")
 def predict(model: Path, recording: Path, out: Path | None) -> None:
     """Compare the torque of MODEL with that of RECORDING.
 
@@ -63,7 +63,7 @@ def predict(model: Path, recording: Path, out: Path | None) -> None:
 @click.command()
 @click.option("--experiments", type=click.IntRange(min=10), default=1000, show_default=True)
 @click.option("--seed", type=int, default=0, show_default=True)
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
 def coverage(experiments: int, seed: int, results: Path) -> None:
     """Measure how often 95 % intervals contain the truth.
 
@@ -84,7 +84,7 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
         ),
         click.option(
             "--cutoff-hz",
-            type=click.FloatRange(min=0, min_open=True),
+            type=FiniteNumber(min=0, min_open=True),
             help="Cut-off of the low-pass [default: from the data].",
         ),
     )
@@ -98,7 +98,7 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--without", type=click.Path(path_type=Path), help="Recording without the load [default: the CAD links].")
 @click.option(
     "--centre",
-    type=float,
+    type=FiniteNumber(),
     nargs=3,
     help="Known place of the load in the link's frame, m.",
 )
@@ -124,8 +124,10 @@ def payload(
 @click.command()
 @click.argument("loaded", type=click.Path(path_type=Path))
 @click.option("--without", type=click.Path(path_type=Path), required=True, help="Recording without the load.")
-@click.option("--mass", type=click.FloatRange(min=0, min_open=True), required=True, help="Of the load, kg.")
-@click.option("--centre", type=float, nargs=3, required=True, help="Its centre of mass in the link's frame, m.")
+@click.option("--mass", type=FiniteNumber(min=0, min_open=True), required=True, help="Of the load, kg.")
+@click.option(
+    "--centre", type=FiniteNumber(), nargs=3, required=True, help="Its centre of mass in the link's frame, m."
+)
 @_add_load_options
 def gains(
     loaded: Path,

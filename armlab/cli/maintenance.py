@@ -5,10 +5,11 @@ from pathlib import Path
 import click
 
 from armlab.cli.harness import trial_bar
+from armlab.cli.options import OutputPath
 
 
 @click.command()
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
 def speed(results: Path) -> None:
     """Measure speed beside that of other packages.
 
@@ -26,7 +27,7 @@ _PATH = click.Path(path_type=Path)
 @click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")
-@click.option("--results", type=_PATH, default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
 @click.pass_context
 def scale(context: click.Context, trials: int, kills: int | None, results: Path) -> None:
     """Measure memory, overhead and efficiency of large sweeps.
@@ -57,7 +58,7 @@ def _print_progress(text: str) -> None:
 @click.option("--calibrate", "task", flag_value="calibrate", help="Compute false-alarm rate and power (minutes).")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @click.option("--config", type=click.Path(path_type=Path), default=Path("configs/regression.yaml"), show_default=True)
-@click.option("--results", type=click.Path(path_type=Path), default=Path("results"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
 @click.pass_context
 def regression(context: click.Context, task: str | None, workers: int | None, config: Path, results: Path) -> None:
     """Compare a short fixed sweep with the committed baseline.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import get_args
 
 from armlab.common.errors import InputError
-from armlab.common.files import write_whole
+from armlab.common.files import write_texts
 from armlab.diagnosis.next.card import card_content, card_lines, draw_card
 from armlab.diagnosis.next.experiment import Experiment, design_experiment
 from armlab.diagnosis.next.motion import Budget
@@ -36,30 +36,23 @@ def write_next_experiment(
     known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
     experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links)
     yield from card_lines(experiment)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot write into {out}: {error.strerror}") from None
-    write_whole(out / "next.json", json.dumps(card_content(experiment), indent=1, allow_nan=False) + "\n")
-    yield f"wrote {out / 'next.json'}"
-    yield from _write_motion(experiment, rate_hz, out)
+    files: dict[str, str | bytes] = {
+        "next.json": json.dumps(card_content(experiment), indent=1, allow_nan=False) + "\n"
+    }
+    motion, left_out = _motion_files(experiment, rate_hz)
+    yield from (f"wrote {path}" for path in write_texts(files | motion, out))
+    yield from (f"left out {out / name}: {reason}" for name, reason in left_out.items())
 
 
-def _write_motion(experiment: Experiment, rate_hz: float, out: Path) -> Iterator[str]:
-    """Writes the files of the motion, if there is one, and yields a line for each.
-
-    A format that cannot hold the motion of this arm is left out, and its line says why.
-    """
+def _motion_files(experiment: Experiment, rate_hz: float) -> tuple[dict[str, str | bytes], dict[str, str]]:
+    """Files of the motion by name, none without a motion, and why a format cannot hold the motion of this arm."""
     if experiment.problem is None or experiment.point is None:
-        return
+        return {}, {}
     trajectory = sample_trajectory(experiment.excitation, experiment.point, rate_hz, "next")
+    files, left_out = dict[str, str | bytes](), dict[str, str]()
     for form, name in MOTION_FILES.items():
         try:
-            text = TRAJECTORY_FORMATS[form](trajectory)
+            files[name] = TRAJECTORY_FORMATS[form](trajectory)
         except InputError as error:
-            yield f"left out {out / name}: {error}"
-            continue
-        write_whole(out / name, text)
-        yield f"wrote {out / name}"
-    write_whole(out / "next.png", draw_card(experiment))
-    yield f"wrote {out / 'next.png'}"
+            left_out[name] = str(error)
+    return {**files, "next.png": draw_card(experiment)}, left_out

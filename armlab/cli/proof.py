@@ -5,6 +5,8 @@ from typing import Literal
 
 import click
 
+from armlab.cli.options import OutputPath
+
 _FOLDER = click.Path(path_type=Path)
 
 
@@ -13,7 +15,7 @@ _FOLDER = click.Path(path_type=Path)
 @click.option("--cases", type=click.IntRange(min=1), default=50, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=1), default=50, show_default=True, help="Cases with nothing hidden.")
 @click.option("--work", type=_FOLDER, default=Path(".armlab/ablation"), show_default=True)
-@click.option("--results", type=_FOLDER, default=Path("results/proof"), show_default=True)
+@click.option("--results", type=OutputPath(), default=Path("results/proof"), show_default=True)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 @click.option(
     "--vary",
@@ -49,11 +51,11 @@ def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: i
 @click.option("--seed", type=int, required=True, help="1000-1999 are for development.")
 @click.option(
     "--out",
-    type=_FOLDER,
+    type=OutputPath(),
     required=True,
     help="Folder for recordings, answers and verdicts; an interrupted loop continues.",
 )
-@click.option("--results", type=_FOLDER, help="Folder for table and picture [default: OUT/score].")
+@click.option("--results", type=OutputPath(), help="Folder for table and picture [default: OUT/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> None:
     """Measure how well a second motion decides between rivals.
@@ -87,7 +89,7 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
 @click.option("--kind", type=click.Choice(["mixed", "nulls"]), default="mixed", show_default=True)
 @click.option("--development", is_flag=True, help="Leave out the kinds of noise of judged sets.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
-@click.option("--out", type=_FOLDER, required=True, help="Folder for observations, truth and manifest.")
+@click.option("--out", type=OutputPath(), required=True, help="Folder for observations, truth and manifest.")
 def conceal(
     cases: int,
     seed: int,
@@ -116,7 +118,7 @@ def conceal(
 @click.argument("folder", type=_FOLDER)
 @click.option("--verdicts", type=_FOLDER, required=True, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
-@click.option("--out", type=_FOLDER, help="Folder for the score [default: VERDICTS/score].")
+@click.option("--out", type=OutputPath(), help="Folder for the score [default: VERDICTS/score].")
 def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> None:
     """Score verdicts against the sealed answers of FOLDER.
 
@@ -134,7 +136,7 @@ def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) 
 @click.option("--cases", type=click.IntRange(min=0), default=400, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=0), default=600, show_default=True, help="Cases with nothing hidden.")
 @click.option("--work", type=_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
-@click.option("--results", type=_FOLDER, help="Folder for scores [default: results/proof].")
+@click.option("--results", type=OutputPath(), help="Folder for scores [default: results/proof].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def prove(
     quick: bool, development: int | None, cases: int, nulls: int, work: Path | None, results: Path | None, jobs: int
@@ -158,7 +160,7 @@ def prove(
 @click.option("--changed", type=click.IntRange(min=0), default=120, show_default=True, help="Pairs, one thing changed.")
 @click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
 @click.option("--work", type=_FOLDER, help="Folder for pairs and verdicts [default: .armlab/changes/SEED].")
-@click.option("--results", type=_FOLDER, help="Folder for changes.md and changes.json [default: WORK/score].")
+@click.option("--results", type=OutputPath(), help="Folder for changes.md and changes.json [default: WORK/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 def prove_changes(
     nulls: int, changed: int, seed: int | None, work: Path | None, results: Path | None, jobs: int

@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from armlab.cli.options import OutputPath
 from armlab.common.errors import InputError
 
 PUBLIC_RECORDING_NAMES = (
@@ -41,7 +42,7 @@ def recording() -> None:
 
 @recording.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--out", type=click.Path(path_type=Path), help="HTML file to write [default: NAME-check.html].")
+@click.option("--out", type=OutputPath(), help="HTML file to write [default: NAME-check.html].")
 def check(folder: Path, out: Path | None) -> None:
     """Check and draw a recording.
 
@@ -61,7 +62,7 @@ def check(folder: Path, out: Path | None) -> None:
 
 @recording.command()
 @click.argument("name", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
-@click.option("--out", type=click.Path(path_type=Path), help="New folder for the recording [default: NAME].")
+@click.option("--out", type=OutputPath(), help="New folder for the recording [default: NAME].")
 def fetch(name: str, out: Path | None) -> None:
     """Fetch a public recording of a real arm.
 
@@ -89,7 +90,7 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @recording.command("import")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--robot", help="Built-in robot, or path of a robot file.")
-@click.option("--out", type=click.Path(path_type=Path), required=True, help="New folder for the recording.")
+@click.option("--out", type=OutputPath(), required=True, help="New folder for the recording.")
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
 @click.option("--gains", metavar="NUMBERS", help="Gain of each channel, N.m per A or V.")

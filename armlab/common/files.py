@@ -26,8 +26,8 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
         draft.unlink(missing_ok=True)
 
 
-def write_texts(texts: Mapping[str, str], folder: Path) -> tuple[Path, ...]:
-    """Write all texts under their names into a folder, or none of them; returns their paths.
+def write_texts(texts: Mapping[str, str | bytes], folder: Path) -> tuple[Path, ...]:
+    """Write all texts (or bytes) under their names into a folder, or none of them; returns their paths.
 
     They are written into a draft folder first and then moved by renames. Other files of the folder stay.
     Raises InputError if a file cannot be written.
@@ -38,7 +38,7 @@ def write_texts(texts: Mapping[str, str], folder: Path) -> tuple[Path, ...]:
     try:
         for name, text in texts.items():
             (draft / name).parent.mkdir(parents=True, exist_ok=True)
-            (draft / name).write_text(text, encoding="utf-8")
+            (draft / name).write_bytes(text.encode() if isinstance(text, str) else text)
         if not exists:
             draft.replace(folder)
         else:

@@ -9,7 +9,7 @@ fixed first joint turns the arm into it. MJCF, the format of MuJoCo, holds armat
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.effects.contract import Candidate
 from armlab.identification.model_file import read_model
 from armlab.identification.structure import Structure
@@ -287,24 +288,29 @@ def export_model(path: Path, out: Path) -> Iterator[str]:
     """Writes the file and says what it does not hold; InputError where the ending or the model does not fit."""
     if out.suffix not in WRITERS:
         raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
-    simulated = build_simulator_model(read_model(path))
-    yield from _write_text(out, WRITERS[out.suffix](simulated))
-    missing = list(simulated.missing)
+    model = read_model(path)
+    simulated = build_simulator_model(model)
+    texts = {out.name: WRITERS[out.suffix](simulated)}
+    missing, notes = list(simulated.missing), list[str]()
     if out.suffix == ".urdf":
         stiffness = simulated.fields.get("stiffness", np.zeros(0))
         missing = [f"spring of joint {number}" for number, each in enumerate(stiffness, 1) if each] + missing
         if "armature" in simulated.fields and simulated.fields["armature"].any():
-            yield from _write_text(out.with_suffix(".srdf"), srdf_document(simulated))
-            yield "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
+            texts[out.with_suffix(".srdf").name] = srdf_document(simulated)
+            notes.append(
+                "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
+            )
+    _refuse_input_files((path, Path(model.robot)), texts, out)
+    yield from map(str, write_texts(texts, out.parent))
+    yield from notes
     if missing:
         yield "not in the file: " + "; ".join(missing)
     if simulated.thickened_links:
         yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
 
 
-def _write_text(path: Path, text: str) -> Iterator[str]:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    yield str(path)
+def _refuse_input_files(inputs: Iterable[Path], names: Iterable[str], out: Path) -> None:
+    for name in names:
+        place = out.parent / name
+        if place.exists() and any(each.exists() and place.samefile(each) for each in inputs):
+            raise InputError(f"{place} is a file that the model is made from: choose another name")

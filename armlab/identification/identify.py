@@ -12,6 +12,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
+from armlab.identification.model_file import model_text
 from armlab.identification.pictures import png_data_url
 from armlab.identification.priors import NO_PULL, Pull
 from armlab.identification.selection import (
@@ -31,10 +32,8 @@ from armlab.recordings.recording import Recording, Run
 PAGE_STYLE = "body{font:15px/1.45 system-ui,sans-serif;max-width:1060px;margin:2em auto;color:#222}img{max-width:100%}"
 
 
-def write_identification_page(
-    recording: Recording, identifier: Identifier, errors: tuple[RunError, ...], path: Path
-) -> Path:
-    """Writes the page and returns its path; InputError where it cannot be written."""
+def identification_page(recording: Recording, identifier: Identifier, errors: tuple[RunError, ...]) -> str:
+    """The page, as HTML."""
     model = identifier.model_
     parts = [
         f"<h1>{escape(recording.name)}</h1><p>Cut-off {model.cutoff_hz:.4g} Hz; condition number "
@@ -44,13 +43,7 @@ def write_identification_page(
         *(f'<img alt="{escape(run.name)}" src="{png_data_url(model.plot(run))}">' for run in recording.runs),
     ]
     head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(recording.name)}</title>'
-    try:
-        path.write_text(
-            f"{head}<style>{PAGE_STYLE}</style></head><body>{''.join(parts)}</body></html>\n", encoding="utf-8"
-        )
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    return path
+    return f"{head}<style>{PAGE_STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
 
 
 NO_VALIDATION_WARNING = (
@@ -101,9 +94,10 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
     yield error_table(errors)
     if not recording.with_role("validate"):
         yield NO_VALIDATION_WARNING
-    out.mkdir(parents=True, exist_ok=True)
-    yield f"model: {model.save(out / 'model.yaml')}"
-    yield f"page: {write_identification_page(recording, identifier, errors, out / 'report.html')}"
+    page = identification_page(recording, identifier, errors)
+    file, report = write_texts({"model.yaml": model_text(model, out), "report.html": page}, out)
+    yield f"model: {file}"
+    yield f"page: {report}"
 
 
 def wrong_reading(recording: Recording) -> tuple[str, Answer] | None:
@@ -157,16 +151,14 @@ def predict_recording(path: Path, folder: Path, out: Path | None) -> Iterator[st
         raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
     yield error_table(tuple(run_error(model, model.signals(run)) for run in recording.runs))
     if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        yield from (str(_write_torque(model, run, out)) for run in recording.runs)
+        texts = {f"{run.name.replace('/', '-')}.predicted.csv": _torque_text(model, run) for run in recording.runs}
+        yield from map(str, write_texts(texts, out))
 
 
-def _write_torque(model: Model, run: Run, out: Path) -> Path:
-    """Writes the predicted torque of a run with its times as a CSV file."""
+def _torque_text(model: Model, run: Run) -> str:
+    """The predicted torque of a run with its times, as CSV."""
     signals = model.signals(run)
     names = [f"tau{joint + 1}" for joint in range(len(model.arm))]
-    file = out / f"{run.name.replace('/', '-')}.predicted.csv"
     table = pd.DataFrame(model.torque(signals.motion, signals.run), columns=names)
     table.insert(0, "t", signals.run.time)
-    table.to_csv(file, index=False)
-    return file
+    return str(table.to_csv(index=False))

@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.common.settings import Settings, read_yaml, validate
 from armlab.effects.contract import Candidate
 from armlab.effects.library import family_named
@@ -84,10 +85,7 @@ NUMBER_KEYS = tuple(Numbers.model_fields)
 
 def write_model(model: TorqueModel, path: Path) -> Path:
     """Writes a model and returns the path; InputError where it cannot be written."""
-    try:
-        path.write_text(model_text(model, path.parent), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(path, model_text(model, path.parent))
     return path
 
 

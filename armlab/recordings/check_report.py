@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 from armlab.recordings.check import CheckResult
 from armlab.recordings.cutoff import CutoffChoice
 from armlab.recordings.differentiate import Signals, differentiate
@@ -153,10 +153,7 @@ def write_check_page(check: CheckResult, path: Path) -> Path:
     head = (
         f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name}</title><style>{STYLE}</style></head>'
     )
-    try:
-        path.write_text(f"{head}<body>{body}</body></html>\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    write_whole(path, f"{head}<body>{body}</body></html>\n")
     return path
 
 

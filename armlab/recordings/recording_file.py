@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.common.settings import Settings, read_yaml, to_plain_data, validate
 from armlab.recordings.recording import Role
 
@@ -244,15 +245,14 @@ def write_recording(draft: Draft, folder: Path) -> Path:
     settings = draft.settings()
     file = validate(RecordingFile, settings, str(folder / FILE_NAME))
     wanted = [name for names in file.columns.signals().values() for name in names]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for run in draft.runs:
-            table = pd.DataFrame(run.values, columns=list(run.names))
-            table[wanted].to_csv(folder / run.file, index=False, lineterminator="\n")
-        (folder / FILE_NAME).write_text(_to_yaml(settings, draft.source), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {folder}: {error.strerror}") from None
+    texts = {run.file: _to_csv(run, wanted) for run in draft.runs}
+    write_texts({**texts, FILE_NAME: _to_yaml(settings, draft.source)}, folder)
     return folder
+
+
+def _to_csv(run: DraftRun, wanted: list[str]) -> str:
+    table = pd.DataFrame(run.values, columns=list(run.names))
+    return str(table[wanted].to_csv(index=False, lineterminator="\n"))
 
 
 def _to_yaml(settings: dict[str, Any], source: tuple[str, ...]) -> str:
