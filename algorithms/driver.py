@@ -165,7 +165,7 @@ def iterate(
             state = algorithm.tell_derivatives(state, source.differentiate(X[0], question))
             cost = source.price
         if len(X) == len(asked):
-            state = algorithm.tell(state, X, fitness)
+            state = algorithm.tell(state, X.copy(), fitness.copy())  # it may write into what it is told
         evaluations -= cost
         yield Batch(X, fitness, cost, algorithm.incumbent(state)[1], state)
 

@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 
 from algorithms.contract import AnyAlgorithm
+from armlab.common.errors import describe_failure
 
 ENTRY_POINT_GROUP = "armlab.algorithms"
 
@@ -111,10 +112,12 @@ def _load_entry(entry: EntryPoint) -> AnyAlgorithm:
             raise _import_failure(entry, error) from error
         missing = f"algorithm {entry.name!r} needs the package {error.name!r}"
         raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[{_EXTRAS[entry.name]}]'") from error
-    except (ImportError, AttributeError, SyntaxError) as error:
+    except (Exception, SystemExit) as error:  # whatever a third party's module does when it is imported
         raise _import_failure(entry, error) from error
     return algorithm
 
 
-def _import_failure(entry: EntryPoint, error: Exception) -> BrokenAlgorithmError:
-    return BrokenAlgorithmError(f"algorithm {entry.name!r} ({entry.value}) cannot be imported: {error}")
+def _import_failure(entry: EntryPoint, error: BaseException) -> BrokenAlgorithmError:
+    return BrokenAlgorithmError(
+        f"algorithm {entry.name!r} ({entry.value}) cannot be imported: {describe_failure(error)}"
+    )

@@ -11,7 +11,7 @@ import pandas as pd
 from joblib import cpu_count
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import Candidate
 from armlab.identification.identifier import METHODS, Identifier
@@ -131,7 +131,7 @@ def identify(
     identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot_path(recording))
     try:
         model = identifier.fit(runs).model_
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{recording.name}: {error}") from None
     model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
     return model

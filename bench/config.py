@@ -3,7 +3,7 @@
 Types, hyper-parameters and names of algorithms are checked; every mistake is reported in one line.
 """
 
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, get_type_hints
 
@@ -166,9 +166,17 @@ def _field_default(field: Any) -> Any:
     return ... if field.default is MISSING else field.default
 
 
+ALGORITHM_PARTS = ("Params", "name", "init", "ask", "tell", "incumbent", "finished")
+
+
 def find_algorithm(name: str, where: str) -> AnyAlgorithm:
     """The algorithm of that name; raises InputError, in one line, if there is none or it cannot be used."""
     try:
-        return load(name)
+        algorithm = load(name)
     except (UnknownAlgorithmError, BrokenAlgorithmError) as error:
         raise InputError(f"{where}: {error}") from None
+    lacking = [part for part in ALGORITHM_PARTS if not hasattr(algorithm, part)]
+    if lacking or not is_dataclass(algorithm.Params):
+        lack = f"no {lacking[0]}" if lacking else "no dataclass Params"
+        raise InputError(f"{where}: algorithm '{name}' has {lack}: see algorithms/contract.py")
+    return algorithm

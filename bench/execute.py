@@ -158,7 +158,10 @@ def run_batch(work: Sequence[tuple[str, Trial]]) -> list[tuple[str, Outcome | Fa
 def _run_guarded(trial: Trial) -> Outcome | Failure:
     try:
         return run_trial(trial)
-    except Exception:  # whatever an algorithm of a third party raises: the runner reports it with its trial
+    except (
+        Exception,
+        SystemExit,
+    ):  # whatever a third party raises: the runner reports it
         return Failure(trial, traceback.format_exc())
 
 

@@ -13,6 +13,7 @@ from armlab.common.errors import InputError
 from bench.config import AlgorithmChoice, Experiment, ProblemChoice, find_algorithm, parse_params
 from bench.execute import Trial, build_problem
 from bench.fingerprint import fingerprint
+from bench.memory import check_counts, check_memory
 from problem.contract import why_not_differentiable
 from problem.registry import ProblemSettings, parse_problem
 
@@ -94,7 +95,7 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
     Raises InputError, in one line, for a problem, an algorithm or a hyper-parameter that is not right, and for output
     'rivals' without a pair to compare.
     """
-    problems = [(choice.label, _parse_problem(choice, where)) for choice in experiment.problem]
+    problems = [(choice.label, _parse_problem(choice, experiment, where)) for choice in experiment.problem]
     contestants = [_make_contestant(choice, where) for choice in experiment.algorithms]
     for (label, problem), contestant in product(problems, contestants):
         _check_derivatives(label, problem, contestant, where)
@@ -122,14 +123,17 @@ def plan_trials(experiment: Experiment, where: str) -> Plan:
     return plan
 
 
-def _parse_problem(choice: ProblemChoice, where: str) -> ProblemSettings:
+def _parse_problem(choice: ProblemChoice, experiment: Experiment, where: str) -> ProblemSettings:
     """The problem's settings. The problem is built once, because some mistakes show only then."""
     place = f"problem of {where}"
     settings = parse_problem(choice.settings, place)
+    check_counts(settings, place)
     try:
-        build_problem(settings)
+        problem = build_problem(settings)
     except InputError as error:
         raise InputError(f"{place}: {error}") from None
+    for swarm_size in experiment.swarm_size:
+        check_memory(problem, swarm_size, max(experiment.budgets(swarm_size)), where)
     return settings
 
 

@@ -16,6 +16,7 @@ from problem.limits import Constraints, peaks
 from problem.motion import Motion
 from problem.trajectories import sample_instants
 
+MAX_SAMPLES = 10_000_000  # of a file for a controller
 MAX_RATE_AT_REST = 1e-9  # rad/s and rad/s2 (m): what rounding leaves
 
 
@@ -44,6 +45,8 @@ def sample_trajectory(problem: ExcitationProblem, point: Array, rate_hz: float, 
     steps = problem.duration * rate_hz
     if rate_hz <= 0 or abs(steps - round(steps)) > 1e-6:
         raise InputError(f"{name}: {problem.duration:g} s is not a whole number of periods of {rate_hz:g} Hz")
+    if steps > MAX_SAMPLES:
+        raise InputError(f"{name}: {problem.duration:g} s at {rate_hz:g} Hz are more than {MAX_SAMPLES} samples")
     excitation = problem.trajectory.motions(point[None], sample_instants(problem.duration, round(steps) + 1))
     motion = excitation.motion.select(np.intp(0))
     _check_rest_at_ends(motion, name)

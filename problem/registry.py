@@ -8,7 +8,7 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, describe_failure
 from armlab.common.settings import Settings, suggest_name, validate
 from problem.functions import FUNCTIONS
 from problem.presets import (
@@ -74,8 +74,8 @@ def _load_settings(entry: EntryPoint, where: str) -> type[ProblemSettings]:
     place = f"{where}: problem '{entry.name}' ({entry.value})"
     try:
         settings: type[ProblemSettings] = entry.load()
-    except (ImportError, AttributeError, SyntaxError) as error:
-        raise InputError(f"{place} cannot be imported: {error}") from error
+    except (Exception, SystemExit) as error:  # whatever a third party's module does when it is imported
+        raise InputError(f"{place} cannot be imported: {describe_failure(error)}") from error
     if not (isinstance(settings, type) and issubclass(settings, Settings) and hasattr(settings, "build")):
         raise InputError(f"{place} should be a class of armlab.common.settings.Settings with a method `build`")
     return settings

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from annotated_types import Gt, Len
 from pydantic import Field, model_validator
 
@@ -10,6 +11,7 @@ from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from problem.arm import Arm, Joint, Limits, Link
 from problem.mjcf import read_mjcf
+from problem.regressor import MAX_JOINTS
 from problem.transforms import rotation_x, rotation_z, translation
 from problem.urdf import read_urdf
 
@@ -65,6 +67,10 @@ class LinkEntry(Settings):
     first_moment: Vector
     inertia: tuple[float, float, float, float, float, float]
 
+    def build(self) -> Link:
+        """The link."""
+        return Link(self.mass, self.first_moment, self.inertia)
+
 
 class RobotFile(Settings):
     """`robot.yaml`; links and rotor inertias are optional."""
@@ -89,7 +95,7 @@ class RobotFile(Settings):
         joints = tuple(entry.build(self.dh_convention) for entry in self.joints)
         links = None
         if self.links is not None:
-            links = tuple(Link(entry.mass, entry.first_moment, entry.inertia) for entry in self.links)
+            links = tuple(entry.build() for entry in self.links)
         return Arm(self.name, joints, links, self.gravity, self.rotor_inertia or ())
 
 
@@ -108,15 +114,40 @@ def load_arm(robot: str, beside: Path | None = None) -> Arm:
         return _read_yaml_arm(BUILT_IN_FOLDER / f"{robot}.yaml", robot)
     path = (beside or Path()) / robot
     if path.suffix == ".urdf":
-        return read_urdf(path)
+        return check_arm(read_urdf(path), str(path))
     if path.suffix == ".xml":
-        return read_mjcf(path)
+        return check_arm(read_mjcf(path), str(path))
     if path.suffix in (".yaml", ".yml"):
-        return _read_yaml_arm(path, str(path))
+        return check_arm(_read_yaml_arm(path, str(path)), str(path))
     raise InputError(
         f"unknown robot '{robot}', neither a .yaml, .urdf or .xml (MJCF) file nor a built-in arm: "
         f"{suggest_name(robot, built_in_arms())}"
     )
+
+
+MAX_LINK_PARAMETER = 1e6  # kg, kg m, kg m2: no link of an arm is heavier
+MAX_LENGTH = 1e3  # m, from joint to joint
+
+
+def check_arm(arm: Arm, where: str) -> Arm:
+    """The arm; InputError for more joints than can be computed, joints of one name, and numbers that no arm has."""
+    if len(arm) > MAX_JOINTS:
+        raise InputError(f"{where} has {len(arm)} moving joints; at most {MAX_JOINTS} are supported")
+    names = [joint.name for joint in arm.joints]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(f"{where}: two joints are called '{twice[0]}'; give each a name of its own")
+    for number, link in enumerate(arm.links or (), 1):
+        if np.abs(link.parameters).max() > MAX_LINK_PARAMETER:
+            raise InputError(f"{where}: link {number} has {_largest(link):g}; at most {MAX_LINK_PARAMETER:g} kg, kg.m2")
+    for joint in arm.joints:
+        if max(np.abs(joint.before[:3, 3]).max(), np.abs(joint.after[:3, 3]).max()) > MAX_LENGTH:
+            raise InputError(f"{where}: joint '{joint.name}' is more than {MAX_LENGTH:g} m from the one before")
+    return arm
+
+
+def _largest(link: Link) -> float:
+    return float(np.abs(link.parameters).max())
 
 
 def _read_yaml_arm(path: Path, where: str) -> Arm:

@@ -180,5 +180,7 @@ def _inertia(link: _Element) -> Array:
         float(link.numbers("inertial/inertia", f"i{pair}", "", 1)[0]) for pair in ("xx", "yy", "zz", "xy", "xz", "yz")
     ]
     mass = float(link.numbers("inertial/mass", "value", "", 1)[0])
+    if mass < 0:
+        raise InputError(f"{link.where}: mass {mass:g} should not be negative")
     body = Link(mass, (0.0, 0.0, 0.0), tuple(entries))  # type: ignore[arg-type]
     return transform_pseudo_inertia(pseudo_inertia_of(body), link.origin("inertial/origin"))

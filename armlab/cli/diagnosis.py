@@ -19,15 +19,17 @@ _FILE = click.Path(path_type=Path)
     "--rivals", help="Like viscous_friction@2,time_delay; or library: all that come near [default: of VERDICT]"
 )
 @click.option("--algorithm", default="l-shade", show_default=True, help="Any registered one.")
-@click.option("--evaluations", type=click.IntRange(min=50), default=1000, show_default=True)
-@click.option("--duration", type=FiniteNumber(min=1), default=10.0, show_default=True, help="Of the motion, s.")
-@click.option("--harmonics", type=click.IntRange(min=2), default=8, show_default=True)
+@click.option("--evaluations", type=click.IntRange(min=50, max=10_000_000), default=1000, show_default=True)
+@click.option(
+    "--duration", type=FiniteNumber(min=1, max=600), default=10.0, show_default=True, help="Of the motion, s."
+)
+@click.option("--harmonics", type=click.IntRange(min=2, max=200), default=8, show_default=True)
 @click.option(
     "--links",
     type=click.Choice(["exact", "near", "free"]),
     help="How well links are known [default: exact where the diagnosis left them, else near; free without].",
 )
-@click.option("--rate", "rate_hz", type=FiniteNumber(min=1), default=250.0, show_default=True, help="Hz.")
+@click.option("--rate", "rate_hz", type=FiniteNumber(min=1, max=100_000), default=250.0, show_default=True, help="Hz.")
 @click.option("--out", type=OutputPath(), default=Path("next"), show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 def next_experiment(

@@ -359,7 +359,12 @@ def does_it_help(workers: int | None, results: Path) -> None:
 @click.option("--record", required=True, help="Name of a record in best_known.json.")
 @click.option("--format", "form", type=click.Choice(["csv", "ros2", "rapid"]), default="csv", show_default=True)
 @click.option(
-    "--rate", "rate_hz", type=FiniteNumber(min=1), default=250.0, show_default=True, help="Sampling rate, Hz."
+    "--rate",
+    "rate_hz",
+    type=FiniteNumber(min=1, max=100_000),
+    default=250.0,
+    show_default=True,
+    help="Sampling rate, Hz.",
 )
 @click.option("--out", type=OutputPath(), required=True)
 @_RESULTS_OPTION

@@ -98,7 +98,7 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--without", type=click.Path(path_type=Path), help="Recording without the load [default: the CAD links].")
 @click.option(
     "--centre",
-    type=FiniteNumber(),
+    type=FiniteNumber(min=-100, max=100),
     nargs=3,
     help="Known place of the load in the link's frame, m.",
 )
@@ -124,9 +124,13 @@ def payload(
 @click.command()
 @click.argument("loaded", type=click.Path(path_type=Path))
 @click.option("--without", type=click.Path(path_type=Path), required=True, help="Recording without the load.")
-@click.option("--mass", type=FiniteNumber(min=0, min_open=True), required=True, help="Of the load, kg.")
+@click.option("--mass", type=FiniteNumber(min=0, max=1e5, min_open=True), required=True, help="Of the load, kg.")
 @click.option(
-    "--centre", type=FiniteNumber(), nargs=3, required=True, help="Its centre of mass in the link's frame, m."
+    "--centre",
+    type=FiniteNumber(min=-100, max=100),
+    nargs=3,
+    required=True,
+    help="Its centre of mass in the link's frame, m.",
 )
 @_add_load_options
 def gains(

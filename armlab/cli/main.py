@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from bench.errors import StoppedError, TrialsFailedError
 
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -81,7 +81,7 @@ class _CommandGroup(click.Group):
         os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))  # read when numpy is imported, which comes later
         try:
             return super().invoke(ctx)
-        except InputError as error:
+        except (InputError, DataError) as error:
             click.echo(f"armlab: {error}", err=True)
             ctx.exit(2)
         except StoppedError as error:

@@ -1,5 +1,16 @@
-"""The error that a user sees: a mistake in their input, explained in one line."""
+"""Errors that a user can cause, explained in one line; any other exception is a mistake in the program."""
 
 
 class InputError(Exception):
     """A user's mistake; the message is one line that says what was wrong, where, and what would be right."""
+
+
+class DataError(ValueError):
+    """Data or settings that a computation cannot use; the message says why, without the place that the caller knows."""
+
+
+def describe_failure(error: BaseException) -> str:
+    """What went wrong in code of a third party, in one line."""
+    kind = "it ends the program (sys.exit)" if isinstance(error, SystemExit) else type(error).__name__
+    text = " ".join(str(error).split())
+    return f"{kind}: {text}" if text else kind

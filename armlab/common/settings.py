@@ -5,9 +5,10 @@ no objects, no duplicate keys, no NaN, a limited size.
 """
 
 import difflib
+import json
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -85,7 +86,18 @@ def _error_reason(detail: ErrorDetails) -> str:
         return "should hold keys"
     if detail["type"] == "tuple_type":
         return "should be a list"
+    return _PYDANTIC_WORDS.get(detail["type"], _translate)(detail)
+
+
+def _translate(detail: ErrorDetails) -> str:
     return detail["msg"].replace("Input should", "should").replace("tuple", "list")
+
+
+_PYDANTIC_WORDS: dict[str, Callable[[ErrorDetails], str]] = {
+    "too_short": lambda detail: f"should hold {detail['ctx']['min_length']} or more entries",
+    "too_long": lambda detail: f"should hold {detail['ctx']['max_length']} entries or fewer",
+    "string_pattern_mismatch": lambda detail: f"should have the form {detail['ctx']['pattern']}",
+}
 
 
 def _key_path(location: tuple[int | str, ...]) -> str:
@@ -99,6 +111,23 @@ def _shorten(value: Any) -> str:
     shown = list(value) if isinstance(value, tuple) else value
     text = " ".join(repr(shown).split())
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+MAX_JSON_BYTES = 100_000_000
+
+
+def read_json(path: str | Path) -> Any:
+    """The content of a JSON file.
+
+    Raises InputError, in one line, for a file that is missing, unreadable, too big, nested too deeply or not JSON.
+    """
+    text = _read_text(Path(path), MAX_JSON_BYTES)
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InputError(f"{path}: not valid JSON: {error}") from None
+    except RecursionError:
+        raise InputError(f"{path}: nested too deeply") from None
 
 
 MAX_YAML_BYTES = 1_000_000
@@ -120,7 +149,7 @@ def read_yaml(path: str | Path) -> Any:
     Raises InputError, in one line, for a file that is missing, unreadable, empty, too big, not YAML, or
     that holds a key twice, a NaN or aliases that unfold without end.
     """
-    text = _read_text(Path(path))
+    text = _read_text(Path(path), MAX_YAML_BYTES)
     try:
         return _parse_yaml(text, str(path))
     except yaml.MarkedYAMLError as error:
@@ -133,18 +162,18 @@ def read_yaml(path: str | Path) -> Any:
         raise InputError(f"{path}: nested too deeply to be a settings file") from None
 
 
-def _read_text(path: Path) -> str:
+def _read_text(path: Path, max_bytes: int) -> str:
     try:
         with path.open("rb") as file:
-            content = file.read(MAX_YAML_BYTES + 1)
+            content = file.read(max_bytes + 1)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
-    if len(content) > MAX_YAML_BYTES:
-        raise InputError(f"{path} is larger than {MAX_YAML_BYTES} bytes: too big for a settings file")
+    if len(content) > max_bytes:
+        raise InputError(f"{path} is larger than {max_bytes} bytes: too big for a settings file")
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError:
-        raise InputError(f"{path} is not UTF-8 text: is it a YAML file?") from None
+        raise InputError(f"{path} is not UTF-8 text") from None
 
 
 def _parse_yaml(text: str, where: str) -> Any:

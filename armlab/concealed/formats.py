@@ -9,8 +9,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import Field
 
-from armlab.common.errors import InputError
-from armlab.common.settings import Settings, validate
+from armlab.common.settings import Settings, read_json, validate
 
 TRUTH_SCHEMA_FILE = Path(__file__).parent / "schemas" / "truth.schema.json"
 Tier = Literal["clean", "realistic"]
@@ -134,13 +133,7 @@ FileModel = TypeVar("FileModel", Truth, SetManifest, LoopManifest)
 
 def read_model(model: type[FileModel], path: Path) -> FileModel:
     """The checked content of a JSON file; InputError, in one line, for a file that is missing or not of the model."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from None
-    except ValueError as error:
-        raise InputError(f"{path} is not JSON: {error}") from None
-    return validate(model, content, str(path))
+    return validate(model, read_json(path), str(path))
 
 
 def write_model(content: Truth | SetManifest | LoopManifest, path: Path) -> None:

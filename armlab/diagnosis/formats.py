@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from pydantic import BaseModel, ConfigDict, Field
 
 from armlab.common.errors import InputError
-from armlab.common.settings import validate
+from armlab.common.settings import read_json, validate
 from armlab.effects.contract import Effect
 from armlab.effects.library import EFFECT_IDS
 
@@ -269,12 +269,7 @@ class ComparisonFile(Entry):
 
 def read_verdict_file(path: Path) -> VerdictFile:
     """The checked content of a `verdict.json`; InputError, in one line, where it is wrong."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read the verdict {path}: {error.strerror}") from None
-    except ValueError as error:
-        raise InputError(f"cannot read the verdict {path}: it is not valid JSON: {error}") from None
+    content = read_json(path)
     if not isinstance(content, dict) or content.get("schema") != VERDICT_SCHEMA:
         raise InputError(f"{path} is no verdict: its key 'schema' should be {VERDICT_SCHEMA}")
     return validate(VerdictFile, content, str(path))

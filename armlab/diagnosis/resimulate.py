@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.result import Diagnosis
 from armlab.identification.torque_model import joint_fields
@@ -20,7 +21,7 @@ from problem.motion import Motion
 from problem.regressor import observation_matrix, rigid_body_torque
 
 
-class NoInertiaError(ValueError):
+class NoInertiaError(DataError):
     """Inertial parameters that give no positive definite inertia matrix somewhere: nothing can be simulated."""
 
 
@@ -121,7 +122,7 @@ def resimulate(diagnosis: Diagnosis) -> Resimulation:
     refitted = diagnosis.simulation.kind == "refit"
     before = diagnosis.refit if refitted else diagnosis.nominal
     if observed is None or final is None or before is None or diagnosis.inertial is None:
-        raise ValueError("nothing was fitted that could be simulated")
+        raise DataError("nothing was fitted that could be simulated")
     rows, run = _window_rows(observed)
     new = _simulate_windows(_new_body(diagnosis), observed, final, rows)
     try:
@@ -139,7 +140,7 @@ def _window_rows(observed: Observed) -> tuple[NDArray[np.intp], str]:
     segment = max(observed.of_role("validate"), key=lambda each: each.stop - each.start)
     starts = np.arange(segment.start, segment.stop - count, count)
     if not len(starts):
-        raise ValueError("the held-out data are shorter than a window")
+        raise DataError("the held-out data are shorter than a window")
     chosen = starts[np.unique(np.linspace(0, len(starts) - 1, min(MAX_WINDOWS, len(starts))).astype(int))]
     return chosen[:, None] + np.arange(count), observed.names[segment.run]
 

@@ -1,8 +1,9 @@
 """All effects: the built-in families, and users' own of the entry-point group `armlab.effects`."""
 
+import warnings
 from importlib.metadata import EntryPoint, entry_points
 
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, describe_failure
 from armlab.common.settings import suggest_name
 from armlab.effects.contact import EXTERNAL_CONTACT
 from armlab.effects.contract import UNKNOWN, Effect, Family
@@ -64,15 +65,25 @@ class BrokenEffectError(InputError):
     """An effect of a plug-in that cannot be used."""
 
 
+class BrokenEffectWarning(UserWarning):
+    """An effect of a plug-in is left out of the library."""
+
+
 def library() -> tuple[Family, ...]:
     """Built-in families in the order of the documentation, then those of plug-ins by name.
 
-    A plug-in's entry point is a Family, a class of one that takes no arguments, or a tuple of families. Raises
-    BrokenEffectError, in one line, where one cannot be imported, is something else, or has the id of another.
+    A plug-in's entry point is a Family, a class of one that takes no arguments, or a tuple of families. One that
+    cannot be imported or is something else is left out with a warning; `family_named` says why to who asks for it.
+    Raises BrokenEffectError, in one line, where one has the id of another.
     """
     families, origins = list(BUILT_IN), {family.effect: "armlab" for family in BUILT_IN}
     for entry in sorted(entry_points(group=ENTRY_POINT_GROUP), key=lambda entry: entry.name):
-        for family in _load_families(entry):
+        try:
+            found = _load_families(entry)
+        except BrokenEffectError as error:
+            warnings.warn(f"{error}; left out", BrokenEffectWarning, stacklevel=2)
+            continue
+        for family in found:
             if family.effect in origins:
                 both = f"{origins[family.effect]} and by {entry.value}"
                 raise BrokenEffectError(f"effect {family.effect!r} is registered by {both}")
@@ -84,9 +95,10 @@ def library() -> tuple[Family, ...]:
 def _load_families(entry: EntryPoint) -> tuple[Family, ...]:
     try:
         found = entry.load()
-    except (ImportError, AttributeError, SyntaxError) as error:
-        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) cannot be imported: {error}") from error
-    found = found() if isinstance(found, type) else found
+        found = found() if isinstance(found, type) else found
+    except (Exception, SystemExit) as error:  # whatever a third party's module does when it is imported
+        reason = describe_failure(error)
+        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) cannot be imported: {reason}") from error
     families = found if isinstance(found, tuple) else (found,)
     if not all(isinstance(each, Family) for each in families):
         raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) is no armlab.effects.contract.Family")
@@ -102,6 +114,8 @@ def family_named(name: str) -> Family:
         return _BUILT_IN_BY_NAME[name]
     known = {family.effect: family for family in library()}
     if name not in known:
+        for entry in entry_points(group=ENTRY_POINT_GROUP, name=name):
+            _load_families(entry)  # raises why the library lacks it
         raise ValueError(f"unknown effect '{name}': {suggest_name(name, list(known))}")
     return known[name]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
@@ -82,7 +82,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
     identifier, how = _build_identifier(recording, options)
     try:
         identifier.fit(runs)
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{folder}: {error}") from None
     model = identifier.model_
     model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))

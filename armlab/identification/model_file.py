@@ -23,7 +23,7 @@ from armlab.identification.torque_model import TorqueModel, joint_fields
 from armlab.recordings.recording_file import ControllerEntry
 from problem.arm import Arm
 from problem.pseudo_inertia import links_of
-from problem.robot_file import LinkEntry, built_in_arms, load_arm
+from problem.robot_file import LinkEntry, built_in_arms, check_arm, load_arm
 
 SCHEMA = "model/1"
 NORMAL_QUANTILE = float(norm.ppf(0.975))
@@ -180,6 +180,8 @@ def model_of(file: ModelFile, path: Path) -> TorqueModel:
 
 def _read_component(entry: ComponentEntry, where: str, arm: Arm) -> tuple[Candidate, Array]:
     joints = entry.joints or (() if entry.joint is None else (entry.joint,))
+    if entry.joint is not None and not 1 <= entry.joint <= len(arm):
+        raise InputError(f"{where}: joint {entry.joint} should be from 1 to {len(arm)}")
     if any(not 1 <= each <= len(arm) for each in joints):
         raise InputError(f"{where}: joints {list(joints)} should be from 1 to {len(arm)}")
     parameters = {name: each.value for name, each in entry.parameters.items()}
@@ -209,6 +211,7 @@ def _read_inertial(file: ModelFile, arm: Arm, path: Path) -> Array | None:
         return None
     if len(file.links) != len(arm):
         raise InputError(f"{path}: links should have {len(arm)} entries, one a joint, has {len(file.links)}")
+    check_arm(replace(arm, links=tuple(each.build() for each in file.links)), str(path))
     return np.concatenate([[each.mass, *each.first_moment, *each.inertia] for each in file.links])
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.effects.drive import RotorInertia, TorqueOffset
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
@@ -140,7 +140,7 @@ def identify_payload(
     """
     place = place or Place()
     if not loaded:
-        raise ValueError("runs with the load are needed")
+        raise DataError("runs with the load are needed")
     columns = np.vstack([place.columns(structure, each) for each in loaded])
     data = _append_columns(_unloaded_regression(structure, without, loaded), columns)
     _check_load_columns(data.matrix, columns.shape[1])
@@ -158,7 +158,7 @@ def torque_gains(
     """Gains from a load that is known, such as a weighed disc; ValueError as for `identify_payload`."""
     joints = len(structure.arm)
     if not without or not loaded:
-        raise ValueError("runs with the load and runs without it are needed")
+        raise DataError("runs with the load and runs without it are needed")
     blocks = []
     for each in loaded:
         torque = (Place(link).columns(structure, each) @ payload.parameters).reshape(-1, joints)
@@ -205,7 +205,7 @@ def _check_load_columns(matrix: Array, count: int) -> None:
         np.linalg.qr(matrix / np.where(lengths > 0, lengths, 1))[1][-count:, -count:], compute_uv=False
     )
     if values[-1] < MIN_SINGULAR_VALUE_SHARE:
-        raise ValueError("these motions do not determine the parameters of the load: move more joints, and faster")
+        raise DataError("these motions do not determine the parameters of the load: move more joints, and faster")
 
 
 CENTRE_NAMES = ("centre x", "centre y", "centre z")
@@ -271,7 +271,7 @@ def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -
     task = _PayloadTask.of(loaded, without, setting)
     try:
         payload = identify_payload(task.structure, task.without, task.loaded, setting.place)
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
     yield from _payload_table(payload, mass_alone=setting.place.centre is not None)
 
@@ -294,7 +294,7 @@ def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSettin
     load = link_from_centre_of_mass(mass, np.array(setting.place.centre or (0.0, 0.0, 0.0)), np.zeros((3, 3)))
     try:
         gains = torque_gains(task.structure, task.without, task.loaded, load, setting.place.link)
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
     yield from _gains_table(gains)
 

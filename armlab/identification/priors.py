@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.effects.drive import RotorInertia
 from armlab.identification.estimators.least_squares import Prior
 from armlab.identification.regression import Regression
@@ -57,7 +58,7 @@ def nominal_prior(structure: Structure, tolerance: float, payload: tuple[float, 
     for an arm without links or a tolerance that is not positive.
     """
     if tolerance <= 0:
-        raise ValueError(f"a prior's tolerance should be positive, not {tolerance:g}")
+        raise DataError(f"a prior's tolerance should be positive, not {tolerance:g}")
     pseudos = regular_nominal(structure.arm)
     grouping, base = structure.base.grouping, len(structure.base)
     spread = tolerance**2 * grouping @ np.linalg.inv(entropic_information(pseudos)) @ grouping.T

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.identification.structure import Structure
 from armlab.recordings.cutoff import choose_cutoff
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
@@ -84,14 +85,14 @@ def refilter(signals: Signals, run: Run) -> Signals:
     """
     shared = signals.filter
     if not isinstance(shared, LowPass):
-        raise ValueError(f"{signals.run.name} did not pass a low-pass")
+        raise DataError(f"{signals.run.name} did not pass a low-pass")
     return differentiate(run, type(shared), signals.position_cutoff_hz, shared.cutoff_hz, shared.step)
 
 
 def cutoff_of(signals: Signals) -> float:
     """The cut-off of the filter that the signals passed, Hz; ValueError for another filter than a low-pass."""
     if not isinstance(signals.filter, LowPass):
-        raise ValueError(f"{signals.run.name} did not pass a low-pass: it has no cut-off")
+        raise DataError(f"{signals.run.name} did not pass a low-pass: it has no cut-off")
     return signals.filter.cutoff_hz
 
 
@@ -106,7 +107,7 @@ def regression(structure: Structure, signals: Sequence[Signals]) -> Regression:
     joints = len(structure.arm)
     wrong = [each.run.name for each in signals if each.motion.joints != joints]
     if wrong or not signals:
-        raise ValueError(f"{wrong[0]} does not have the {joints} joints of {structure.arm.name}" if wrong else "no run")
+        raise DataError(f"{wrong[0]} does not have the {joints} joints of {structure.arm.name}" if wrong else "no run")
     matrix = np.vstack([structure.filtered(each) for each in signals])
     torque = np.concatenate([each.torque.ravel() for each in signals])
     first = signals[0]

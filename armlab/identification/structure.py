@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.scene import instants, scene_of
 from armlab.recordings.differentiate import Signals
@@ -120,7 +121,7 @@ class Structure:
             return scene
         if self.load is None:
             followers = ", ".join(part.label for part in self.components if part.follows_model)
-            raise ValueError(f"{followers}: needs inertial parameters; fit the rigid model first")
+            raise DataError(f"{followers}: needs inertial parameters; fit the rigid model first")
         return replace(scene, inertial=self.load)
 
     def full(self, base_values: Array) -> Array:

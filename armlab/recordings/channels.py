@@ -14,6 +14,7 @@ from armlab.recordings.table import Table
 from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES, TIME_UNITS, Unit, resolve_units
 from problem.arm import Arm
 
+MAX_GAIN = 1e6  # N.m per A or V: no drive has more
 DRIVE_SIGNALS = ("torque", "current")
 MOTOR_SIDE_SIGNALS = ("position", "velocity", "reference_position", "reference_velocity")
 
@@ -125,6 +126,8 @@ def make_transmission(file: RecordingFile, arm: Arm, folder: Path) -> Transmissi
     torque = _make_matrix(given.torque, len(arm), torques, "torque", where)
     offset = _make_vector(given.offset, 0.0, len(arm), f"transmission.offset in {where}")
     gains = _make_vector(file.gains, 1.0, torques, f"gains in {where}")
+    if not np.all((np.abs(gains) > 0) & (np.abs(gains) <= MAX_GAIN)):
+        raise InputError(f"gains in {where} should be numbers from -{MAX_GAIN:g} to {MAX_GAIN:g} that are not zero")
     return Transmission(position, offset, torque, gains)
 
 

@@ -14,6 +14,7 @@ from scipy.linalg import solveh_banded
 from scipy.signal import butter, sosfilt, sosfilt_zi
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 
 BUTTERWORTH_ORDER = 4  # of the Butterworth filter each way
 
@@ -48,7 +49,7 @@ class LowPass(Filter):
         """Raises ValueError for a cut-off that the sampling rate cannot carry."""
         if not 0 < self.cutoff_hz < self.rate_hz / 2:
             limit = self.rate_hz / 2
-            raise ValueError(f"cut-off {self.cutoff_hz:g} Hz should lie between 0 and half the rate, {limit:g} Hz")
+            raise DataError(f"cut-off {self.cutoff_hz:g} Hz should lie between 0 and half the rate, {limit:g} Hz")
 
     @property
     def trim(self) -> int:

@@ -49,6 +49,8 @@ def repair_stamps(run: AnyRun) -> AnyRun:
 
     Raises InputError where stamps repeat and no even grid fits.
     """
+    if not np.ptp(run.time) > 0:
+        raise InputError(f"{run.file}: the time stands still at {run.time[0]:g} s: which column holds the time?")
     if run.even:
         return run
     grid = fit_even_grid(run.time)

@@ -15,6 +15,8 @@ from armlab.common.settings import suggest_name
 from armlab.recordings.recording import Finding
 
 HEADER_LINES = 1
+MAX_TEXT_BYTES = 2 * 10**9  # a text of this size needs about 20 GB of memory
+MAX_COLUMNS = 5_000  # of a table: a header of more is no log of an arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +66,26 @@ def _read_csv(path: Path) -> Table:
     if not rows:
         raise InputError(f"{path} is empty: it should start with a row of column names")
     names = tuple(name.strip() for name in rows[0][1])
+    check_column_count(len(names), path)
     body = rows[HEADER_LINES:]
     body, findings = drop_broken_last_row(body, len(names), text, str(path))
     values = np.array([parse_numbers(cells) for _, cells in body]).reshape(len(body), len(names))
     return Table(path.name, names, values, np.array([line for line, _ in body], dtype=np.intp), findings)
 
 
+def check_column_count(columns: int, path: Path) -> None:
+    """Raises InputError for more columns than the log of an arm has."""
+    if columns > MAX_COLUMNS:
+        raise InputError(f"{path} has {columns} columns; at most {MAX_COLUMNS} can be read: is it transposed?")
+
+
 def read_text(path: Path) -> str:
     """The text of a file with its own line ends; InputError if it is missing or not UTF-8 text."""
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"cannot read {path}: it is no regular file")
+        if path.stat().st_size > MAX_TEXT_BYTES:
+            raise InputError(f"{path} is larger than {MAX_TEXT_BYTES // 10**9} GB: give Parquet or shorter runs")
         return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None

@@ -199,4 +199,4 @@ def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
     path.write_text('{"schema": "other/1", "problems": {}}')
     assert f"'schema' in {path}: should be 'best-known/1', not 'other/1'" == refusal(read_records, path)
     path.write_text("{")
-    assert f"cannot read the records {path}" in refusal(read_records, path)
+    assert f"{path}: not valid JSON" in refusal(read_records, path)

@@ -11,7 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
@@ -441,7 +441,7 @@ def compare_recordings(
     check_output_folder(out, second)
     try:
         comparison = compare(first, second, *more, baseline=chosen, seed=seed, dates=dates, progress=progress)
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{' and '.join(map(str, folders))}: {error}") from None
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += ["--dates", ",".join(each.isoformat() for each in dates)] if dates else []

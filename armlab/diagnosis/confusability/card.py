@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Candidate, Family, Scene
@@ -23,6 +23,7 @@ from armlab.effects.separability import Confusion, base_rows, candidate_rows, co
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.filters import Butterworth, Filter
 from armlab.recordings.load import load_recording
+from armlab.recordings.repair import MAX_PLAUSIBLE_VALUE
 from armlab.recordings.table import read_table
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -74,6 +75,9 @@ def _motions_of_recording(folder: Path) -> tuple[PlannedMotion, ...]:
     return tuple(PlannedMotion(each.run.name, each.run.time - each.run.time[0], each.motion) for each in signals)
 
 
+MAX_PLANNED_SAMPLES = 2_000_000
+
+
 def _motion_from_csv(path: Path, joints: int) -> PlannedMotion:
     """Positions of a file at even stamps; velocities and accelerations from their quintic spline."""
     table = read_table(path)
@@ -81,8 +85,12 @@ def _motion_from_csv(path: Path, joints: int) -> PlannedMotion:
     values = table.columns(names, "time and position, in s and rad or m")
     if len(values) < 10 or not np.isfinite(values).all() or np.any(np.diff(values[:, 0]) <= 0):
         raise InputError(f"{path}: should have ten rows or more of finite numbers, with t increasing")
+    if np.abs(values).max() > MAX_PLAUSIBLE_VALUE:
+        raise InputError(f"{path}: no arm moves as far as {np.abs(values).max():g}; t in s, q1 .. in rad or m")
     time, position = values[:, 0] - values[0, 0], values[:, 1:]
     rate = max(MOTION_RATE_HZ, 1 / float(np.median(np.diff(time))))
+    if time[-1] * rate > MAX_PLANNED_SAMPLES:
+        raise InputError(f"{path}: {time[-1]:g} s at {rate:g} Hz are more than {MAX_PLANNED_SAMPLES} samples")
     even = np.linspace(0.0, time[-1], round(time[-1] * rate) + 1)
     spline = make_interp_spline(time, position, k=5)
     return PlannedMotion(path.name, even, Motion(spline(even), spline(even, 1), spline(even, 2)))
@@ -175,7 +183,7 @@ def confusability_card(
     scatter = _default_noise(scenes) if noise is None else np.asarray(noise, dtype=float)
     candidates = visible_candidates(arm, scenes, filters, families)
     if not candidates:
-        raise ValueError("no effect has a column on this motion")
+        raise DataError("no effect has a column on this motion")
     free = {"nominal": None, "refit": base_rows(base_parameters(arm), scenes, filters)}
     views = {name: compute_confusion(candidates, scenes, filters, free[name], scatter) for name in VIEWS}
     seconds = sum(float(each.time[-1] - each.time[0]) for each in motions)

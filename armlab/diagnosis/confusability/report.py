@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.confusability.card import (
     CERTAIN_STANDARD_ERRORS,
@@ -255,7 +255,7 @@ def write_card(
     motions = read_planned_motions(trajectory, arm)
     try:
         card = confusability_card(arm, motions, library(), _noise_by_joint(noise, arm))
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{trajectory}: {error}") from None
     yield from card_lines(card)
     if out is not None:

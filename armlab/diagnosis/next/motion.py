@@ -12,7 +12,7 @@ from algorithms.contract import Box, uniform_points
 from algorithms.driver import minimise
 from algorithms.registry import BrokenAlgorithmError, UnknownAlgorithmError, load
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.recordings.differentiate import differentiate
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm, Limits
@@ -108,7 +108,7 @@ def fourier_within_limits(limits: tuple[Limits, ...], duration: float, harmonics
     low, high = np.array([each.position for each in limits]).T
     speed = np.array([each.velocity for each in limits])
     if not np.all(np.isfinite([low, high, speed])):
-        raise ValueError("a motion can only be designed for joints with limits of position and speed")
+        raise DataError("a motion can only be designed for joints with limits of position and speed")
     coefficients = speed / np.sqrt(harmonics)
     return WithinLimits(
         JointFourier(duration, harmonics, (low + high) / 2, (high - low) / 2, coefficients, True), limits

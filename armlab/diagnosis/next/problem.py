@@ -11,7 +11,7 @@ from annotated_types import Ge, Gt
 from pydantic import AfterValidator, Field
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.settings import Settings
 from armlab.diagnosis.next.decision import decision_strength
 from armlab.diagnosis.next.moments import Moments
@@ -74,7 +74,7 @@ def tell_apart_problem(
 ) -> TellApartProblem:
     """The problem for the trajectories and limits of another one; ValueError where no motion separates anything."""
     if not any(question.pairs for question in prepared.questions):
-        raise ValueError("no motion separates these rivals")
+        raise DataError("no motion separates these rivals")
     samples = len(prepared.sampling.times(excitation.duration))
     return TellApartProblem(
         name=name,
@@ -150,7 +150,7 @@ class TellApartSettings(Settings):
             groups = (tuple(Name(each.effect, each.joint) for each in self.rivals),)
             prepared = prepare_questions(verdict, groups, arm, excitation.trajectory, self.duration, None, self.links)
             problem = tell_apart_problem(prepared, excitation)
-        except ValueError as error:
+        except DataError as error:
             raise InputError(f"tell-apart: {error}") from None
         return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import get_args
 
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report import sections
@@ -90,7 +90,7 @@ def diagnose_recording(
     check_output_folder(out, recording)
     try:
         diagnosis = diagnose(recording, chosen, seed, settings, progress, as_read, only_setup)
-    except ValueError as error:
+    except DataError as error:
         raise InputError(f"{folder}: {error}") from None
     progress("writing the report")
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]

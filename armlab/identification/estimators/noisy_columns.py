@@ -12,6 +12,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.identification.estimators.least_squares import Estimate, column_lengths, least_squares, pseudo_inverse
 from armlab.identification.regression import Regression, refilter
 from armlab.identification.structure import Structure
@@ -27,7 +28,7 @@ def reference_instruments(structure: Structure, signals: Signals) -> Array:
     """
     run = signals.run
     if run.reference_position is None:
-        raise ValueError(f"{run.name} has no reference_position: instruments need a motion that noise did not touch")
+        raise DataError(f"{run.name} has no reference_position: instruments need a motion without noise")
     return structure.filtered(refilter(signals, replace(run, position=run.reference_position)))
 
 

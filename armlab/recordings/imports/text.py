@@ -10,7 +10,14 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.table import Table, drop_broken_last_row, parse_numbers, read_text, split_rows
+from armlab.recordings.table import (
+    Table,
+    check_column_count,
+    drop_broken_last_row,
+    parse_numbers,
+    read_text,
+    split_rows,
+)
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}
 DECIMALS = (".", ",")
@@ -47,6 +54,9 @@ def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None =
     separator, decimal: found in the file if left out. Raises InputError for a file without rows of numbers, and
     for rows of different length before the last.
     """
+    if separator is not None and (len(separator) != 1 or separator in '\r\n"'):
+        words = ", ".join(SEPARATORS.values())
+        raise InputError(f"--separator {separator!r} should be one character, or one of the words {words}")
     text = read_text(path)
     layout = find_layout(text, separator, decimal, path)
     rows = _split_lines(text, layout, str(path))
@@ -55,6 +65,7 @@ def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None =
     if len(body) < MIN_DATA_ROWS:
         raise InputError(f"{path} holds no rows of numbers with {layout}; give --separator and --decimal")
     width = len(body[0][1])
+    check_column_count(width, path)
     names, units = _parse_header([cells for _, cells in rows[:first] if len(cells) == width], width)
     body, findings = drop_broken_last_row(body, width, text, str(path))
     values = np.array([_parse_cells(cells, layout) for _, cells in body]).reshape(len(body), width)

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_whole
-from armlab.common.settings import Settings, read_yaml, suggest_name, validate
+from armlab.common.settings import Settings, read_json, read_yaml, suggest_name, validate
 from bench.execute import canonical
 from bench.plan import Entry
 from problem.excitation import ExcitationProblem
@@ -104,11 +104,7 @@ def read_records(path: Path) -> dict[str, Record]:
     """Records by name, none if there is no file. Raises InputError, in one line, if it is not as written."""
     if not path.exists():
         return {}
-    try:
-        content = json.loads(path.read_text())
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot read the records {path}: {error}") from None
-    return dict(validate(RecordFile, content, str(path)).problems)
+    return dict(validate(RecordFile, read_json(path), str(path)).problems)
 
 
 def write_records(path: Path, records: Mapping[str, Record]) -> None:
