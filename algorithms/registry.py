@@ -77,6 +77,11 @@ def names_with_derivatives() -> list[str]:
     return list(_WITH_DERIVATIVES)
 
 
+def is_plug_in(name: str) -> bool:
+    """Whether a name is neither built in nor a peer, with or without derivatives."""
+    return name not in _BUILT_IN | _PEERS | _WITH_DERIVATIVES
+
+
 def load(name: str) -> AnyAlgorithm:
     """The algorithm class registered under a name.
 

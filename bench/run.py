@@ -10,6 +10,7 @@ from typing import Protocol
 
 import yaml
 
+from algorithms.registry import is_plug_in
 from bench.config import Experiment, read_experiment
 from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing
 from bench.errors import StoppedError, TrialsFailedError
@@ -121,10 +122,11 @@ def run_missing(
     Raises StoppedError on Ctrl-C, and TrialsFailedError at the end if trials failed.
     """
     missing, batches = count_missing_work(entries, store)
+    isolated = any(is_plug_in(name) for name in {entry.trial.algorithm for entry in entries})  # it may end its process
     failures = _Failures()
     try:
         with (
-            open_executor(executor or ExecutorSettings(), min(workers, max(batches, 1)), timeout_s) as opened,
+            open_executor(executor or ExecutorSettings(), min(workers, max(batches, 1)), timeout_s, isolated) as opened,
             claim_order(entries, store.path) as ordered,
         ):
             for report in execute_missing(ordered, store, opened, timeout_s):

@@ -263,7 +263,8 @@ def _payload_structure(arm: Arm, setting: PayloadSetting, nominal: bool) -> Stru
     spring = counterbalance_groups(arm, setting.counterbalanced)["spring"] if setting.counterbalanced else ()
     sprung = [part.joint for part in spring]  # the spring's rest angle takes the offset in
     taken = tuple(part for part in usual if not isinstance(part, TorqueOffset) or part.joint not in sprung)
-    return Structure(arm, (*taken, *spring)).separable()[0]
+    structure = Structure(arm, (*taken, *spring))
+    return structure if nominal else structure.separable()[0]  # beside links that are held, nothing is absorbed by them
 
 
 def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -> Iterator[str]:

@@ -15,13 +15,17 @@ _CLUSTER_EXECUTORS = {
 
 
 @contextmanager
-def open_executor(settings: ExecutorSettings, workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
+def open_executor(
+    settings: ExecutorSettings, workers: int, timeout_s: float | None, isolated: bool = False
+) -> Iterator[BatchExecutor]:
     """The executor of these settings for the time of a run. workers: processes, where no cluster is named.
+
+    isolated: a single worker is a process of its own, too.
 
     Raises InputError, in one line, for a missing package and for a cluster that does not answer.
     """
     if settings.backend == "loky":
-        with local_executor(workers, timeout_s) as executor:
+        with local_executor(workers, timeout_s, isolated) as executor:
             yield executor
         return
     module, name = _CLUSTER_EXECUTORS[settings.backend]

@@ -74,9 +74,9 @@ class LokyExecutor:
 
 
 @contextmanager
-def local_executor(workers: int, timeout_s: float | None) -> Iterator[BatchExecutor]:
-    """Processes on this machine; a single worker without a time limit is this process itself."""
-    if workers == 1 and timeout_s is None:
+def local_executor(workers: int, timeout_s: float | None, isolated: bool = False) -> Iterator[BatchExecutor]:
+    """Processes on this machine; a single worker without a time limit is this process itself, unless isolated."""
+    if workers == 1 and timeout_s is None and not isolated:
         yield InProcessExecutor()
         return
     executor = LokyExecutor(workers, timeout_s)

@@ -80,6 +80,19 @@ def test_nominal_links_stand_for_runs_without_the_load(pair: tuple[Path, Path]) 
     assert high - low < 0.2
 
 
+def test_rotors_that_the_robot_file_leaves_out_do_not_shift_the_load_beside_held_links(tmp_path: Path) -> None:
+    time, moved = motion(1)
+    rotors = np.array([1.1, 0.9, 0.3])
+    torque = torque_of(arm(), moved, MASS * point_mass(1, CENTRE), 2, 0.05, 1) + rotors * moved.acceleration
+    names = ("t", "q1", "q2", "q3", "tau1", "tau2", "tau3")
+    runs = (DraftRun("run.csv", "identify", names, np.column_stack([time, moved.position, torque])),)
+    columns = {"time": "t", "position": names[1:4], "torque": names[4:]}
+    units = {"time": "s", "position": "rad", "torque": "N.m"}
+    write_recording(Draft("irb120-arm", columns, units, runs), tmp_path / "with")
+    mass = next(payload_lines(tmp_path / "with", None, PayloadSetting(ON_LINK_2))).split()
+    assert float(mass[2]) == pytest.approx(MASS, rel=0.02)
+
+
 def test_a_known_load_shows_the_gain_of_the_joints_that_it_loads(tmp_path: Path) -> None:
     factors = (1.0, 1.09, 0.95)
     load = 5 * point_mass(1, CENTRE)
