@@ -1,6 +1,7 @@
 """From the columns of a table to joint signals: SI units, gains, gear ratios, couplings between motors, and offsets."""
 
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +23,9 @@ MOTOR_SIDE_SIGNALS = ("position", "velocity", "reference_position", "reference_v
 def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]) -> Run:
     """The run of a table; values may still be NaN, stamps in any order."""
     signals = _read_signals(table, file, units)
-    time = signals.pop("time")[:, 0]
+    time, notes = _from_first_stamp(signals.pop("time")[:, 0])
     torque = signals.pop("torque" if file.columns.torque else "current")
-    findings = (*table.findings, *report_assumed_units(file))
+    findings = (*table.findings, *notes, *report_assumed_units(file))
     run = Run(entry.file, entry.role, time, signals.pop("position"), torque, findings=findings)
     return run.with_signals(time, signals)
 
@@ -34,8 +35,9 @@ def make_raw_motion_run(
 ) -> MotionRun:
     """The run of a table without torque; values may still be NaN, stamps in any order."""
     signals = _read_signals(table, file, units)
-    time, position = signals.pop("time")[:, 0], signals.pop("position")
-    findings = (*table.findings, *report_assumed_units(file))
+    time, notes = _from_first_stamp(signals.pop("time")[:, 0])
+    position = signals.pop("position")
+    findings = (*table.findings, *notes, *report_assumed_units(file))
     return MotionRun(entry.file, entry.role, time, position, findings=findings).with_signals(time, signals)
 
 
@@ -49,6 +51,21 @@ def _read_signals(table: Table, file: RecordingFile, units: dict[str, tuple[Unit
             values = table.columns(columns, name) * factors + shifts
         signals[name] = values
     return signals
+
+
+MAX_EPOCH_S = 1e10  # the year 2286
+MIN_EPOCH_S = 1e8  # three years: larger stamps count from another start than that of the recording
+
+
+def _from_first_stamp(time: Array) -> tuple[Array, tuple[Finding, ...]]:
+    """Stamps, s, from the first one where they count from 1970, and a note that says so."""
+    usual = float(np.median(time[np.isfinite(time)])) if np.isfinite(time).any() else 0.0
+    if not MIN_EPOCH_S < usual < MAX_EPOCH_S:
+        return time, ()
+    first = float(time[np.abs(time - usual) < MIN_EPOCH_S][0])
+    day = datetime.fromtimestamp(first, UTC).isoformat(sep=" ", timespec="seconds").removesuffix("+00:00")
+    text = f"stamps count from 1970; taken from the first one, {day} UTC"
+    return time - first, (Finding("epoch_stamps", "note", text),)
 
 
 def channel_units(file: RecordingFile, arm: Arm, folder: Path) -> dict[str, tuple[Unit, ...]]:

@@ -76,7 +76,7 @@ def test_the_mass_of_a_load_is_found_with_an_interval_that_holds_it(pair: tuple[
 def test_nominal_links_stand_for_runs_without_the_load(pair: tuple[Path, Path]) -> None:
     (line,) = payload_lines(pair[0], None, PayloadSetting(ON_LINK_2))
     low, high = interval(line)
-    assert low < MASS < high
+    assert low <= MASS <= high  # printed to four digits
     assert high - low < 0.2
 
 

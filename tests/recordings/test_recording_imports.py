@@ -135,7 +135,6 @@ def test_a_truncated_mcap_file_is_refused_in_one_line(tmp_path: Path) -> None:
     [
         ({"robot": None}, "the robot is missing: give --robot"),
         ({"robot": "irb130"}, "unknown robot"),
-        ({"position": None}, "the columns of position are missing: give --position; the file holds t, q1"),
         ({"position": "q1,q2,q4"}, "no column 'q4' for position: known: t, q1, q2"),
         ({"units": ("time=s", "torque=Nm")}, "no unit is known for position: give --unit position=UNIT"),
         ({"units": ("position=degre",)}, "unknown unit 'degre' of position: did you mean 'deg'?"),
@@ -163,7 +162,7 @@ def test_what_is_missing_is_asked_for_with_a_guess_from_the_names(tmp_path: Path
 
     nothing = {**dict.fromkeys(OPTIONS), "units": (), "validate": ()}
     import_files([path], tmp_path / "new", nothing, ask)
-    assert [offer for _, offer in asked] == [None, "t", "q1,q2,q3", "tau1,tau2,tau3", "s", "rad", "N.m"]
+    assert [offer for _, offer in asked] == [None, "rad", "N.m"]
     assert_allclose(load_recording(tmp_path / "new").runs[0].position, frame()[POSITION], rtol=1e-8)
 
 

@@ -1,7 +1,7 @@
 """From files of other formats to a recording folder: read the files, assign columns and units, write the recording."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -11,12 +11,21 @@ from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.lerobot import COMMAND, STATE, is_lerobot, read_lerobot
 from armlab.recordings.imports.matlab import read_mat
+from armlab.recordings.imports.recognition import (
+    Found,
+    check_joint_order,
+    order_by_joint,
+    recognise_signal,
+    recognise_time,
+    unit_by_name,
+)
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 from armlab.recordings.table import Table, read_table
-from armlab.recordings.units import SIGNAL_QUANTITIES
+from armlab.recordings.units import DRIVE_UNITS, SENSOR_SIGNALS, SIGNAL_QUANTITIES
+from problem.arm import Arm
 from problem.robot_file import built_in_arms, load_arm
 
 BAG_SUFFIXES = (".db3", ".mcap", ".bag")
@@ -129,11 +138,19 @@ def assemble_draft(sources: Mapping[str, Source], robot: str, assignment: Assign
             source.table.columns(names, signal)
         role: Role = "validate" if path in validate else "identify"
         values = source.table.columns(wanted, "import")
-        runs.append(DraftRun(f"{Path(path).stem}.csv", role, wanted, values))
+        runs.append(DraftRun(_run_file(path, sources), role, wanted, values))
     units = _choose_units(next(iter(sources.values())).units, assignment)
     others = {"gains": list(assignment.gains)} if assignment.gains else {}
     note = tuple(f"{run.file}: imported from {Path(path).name}" for path, run in zip(sources, runs, strict=True))
     return Draft(robot, columns, units, tuple(runs), others, note)
+
+
+def _run_file(path: str, paths: Iterable[str]) -> str:
+    """The name of a run: that of its file, with its folder's where two files have one name."""
+    own = Path(path)
+    alike = sum(Path(each).stem == own.stem for each in paths)
+    place = list(paths).index(path) + 1
+    return f"{own.stem}.csv" if alike == 1 else f"{own.resolve().parent.name}-{own.stem}-{place}.csv"
 
 
 def _choose_units(found: Mapping[str, str], assignment: Assignment) -> Keys:
@@ -169,21 +186,29 @@ SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semic
 
 
 def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], ask: Ask | None) -> list[str]:
-    """Writes the recording and returns lines that tell how each file was read.
+    """Writes the recording and returns lines that tell how each file was read, and what each signal was taken from.
 
     options: robot, the columns of each signal, units, gains, validate, separator, decimal, topic; None if not given.
     ask: asks the user for a missing option.
-    Raises InputError for a wrong option, and for a missing one if `ask` is None.
+    Raises InputError for a wrong option, and for all missing ones together if `ask` is None.
     """
     separator = options["separator"]
     reading = ReadOptions(SEPARATOR_WORDS.get(separator, separator), options["decimal"], options["topic"])
-    sources = {name: source for path in files for name, source in read_sources(path, reading).items()}
+    sources: dict[str, Source] = {}
+    for path in files:
+        for name, source in read_sources(path, reading).items():
+            if name in sources:
+                raise InputError(f"{name} is given twice: a run cannot both identify and validate")
+            sources[name] = source
     first = next(iter(sources.values()))
-    robot = _choose_robot(options["robot"], ask)
+    missing: list[str] = []
+    robot = _choose_robot(options["robot"], ask, missing)
     if any(is_lerobot(path) for path in files):
         usual = _lerobot_columns(first, options.get("joints"))
         options = {**options, **{name: each for name, each in usual.items() if options.get(name) is None}}
-    assignment = _make_assignment(first, options, ask)
+    assignment = _make_assignment(first, load_arm(robot) if robot else None, options, ask, missing)
+    if missing or robot is None:
+        raise InputError("; ".join(missing))
     validate = [str(path) for path in options["validate"]]
     unknown = sorted(set(validate) - set(sources))
     if unknown:
@@ -194,6 +219,7 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     write_recording(draft, out)
     return [
         *(_describe_source(path, source) for path, source in sources.items()),
+        *(_describe_signal(draft, signal, names) for signal, names in assignment.columns.items()),
         f"{out}: written; `armlab recording check {out}` examines it",
     ]
 
@@ -213,61 +239,126 @@ def _lerobot_columns(source: Source, joints: str | None) -> dict[str, str]:
     }
 
 
+def _describe_signal(draft: Draft, signal: str, names: Sequence[str]) -> str:
+    unit = draft.units[signal]
+    return f"{signal}: {', '.join(names)} [{unit if isinstance(unit, str) else ', '.join(unit)}]"
+
+
 def _describe_source(path: str, source: Source) -> str:
     found = "".join(f"; {finding.text}" for finding in source.table.findings)
     return f"{path}: {len(source.table.values)} rows ({source.note}){found}"
 
 
-def _choose_robot(given: str | None, ask: Ask | None) -> str:
+def _choose_robot(given: str | None, ask: Ask | None, missing: list[str]) -> str | None:
+    """The robot as the recording names it; what is missing is added to the list."""
     robot = given or (ask(f"robot ({', '.join(built_in_arms())}, or a file)", None) if ask else None)
     if robot is None:
         known = ", ".join(built_in_arms())
-        raise InputError(f"the robot is missing: give --robot with one of {known}, or with the path of a robot file")
+        missing.append(f"the robot is missing: give --robot with one of {known}, or with the path of a robot file")
+        return None
     load_arm(robot)
     return robot if robot in built_in_arms() else str(Path(robot).resolve())
 
 
-def _make_assignment(source: Source, options: Mapping[str, Any], ask: Ask | None) -> Assignment:
+def _make_assignment(
+    source: Source, arm: Arm | None, options: Mapping[str, Any], ask: Ask | None, missing: list[str]
+) -> Assignment:
+    """Columns and units as given, else as recognised, else as asked for; what is missing is added to the list."""
     units = dict(_parse_unit_option(text) for text in options["units"])
     columns: dict[str, tuple[str, ...]] = {}
     for signal in SIGNAL_QUANTITIES:
         given = options.get(signal)
-        if given is None and signal in ASKED_SIGNALS and not (signal == "torque" and options.get("reference_position")):
-            given = _ask_columns(source, signal, ask)
+        asked = signal in ASKED_SIGNALS and not (signal == "torque" and options.get("reference_position"))
+        found = _recognise(source, signal, arm) if given is None and asked else None
+        if found is not None:
+            columns[signal] = found.names
+            if found.unit and signal not in units and not all(name in source.units for name in found.names):
+                units[signal] = found.unit
+            continue
+        if given is None and asked:
+            given = _ask_columns(source, signal, ask, missing)
         if given is not None:
-            columns[signal] = _expand_names(given, source.table.names, signal)
+            columns[signal] = _expand_names(given, source.table.names, signal, arm)
+            unit = _unit_by_name(source, signal, columns[signal])
+            if unit and signal not in units and not all(name in source.units for name in columns[signal]):
+                units[signal] = unit
     for signal, names in columns.items():
         if signal not in units and not all(name in source.units for name in names):
-            units[signal] = _ask_unit(signal, ask)
-    return Assignment(columns, units, _parse_gains(options["gains"]))
+            units |= _ask_unit(signal, ask, missing)
+    gains = _parse_gains(options["gains"])
+    drive = [units.get("torque", ""), *(source.units.get(name, "") for name in columns.get("torque", ()))]
+    if gains is None and any(unit in DRIVE_UNITS for unit in drive):
+        wanted = f"gains of {', '.join(columns['torque'])}, N.m per A or V, with commas between them"
+        gains = _parse_gains(ask(wanted, None)) if ask else None
+        if gains is None:
+            missing.append(f"the torque is measured in A or V: give --gains, {wanted}")
+    if gains is not None and "torque" in columns and len(gains) != len(columns["torque"]):
+        raise InputError(f"--gains holds {len(gains)} numbers for {len(columns['torque'])} columns of torque")
+    return Assignment(columns, units, gains)
 
 
-def _ask_columns(source: Source, signal: str, ask: Ask | None) -> str:
+def _unit_by_name(source: Source, signal: str, names: tuple[str, ...]) -> str | None:
+    if signal == "time":
+        found = recognise_time(names, source.table.columns(names, signal))
+        return found.unit if found else None
+    unit = unit_by_name(names, source.table.names)
+    return unit if unit in SIGNAL_QUANTITIES[signal].units else None
+
+
+def _recognise(source: Source, signal: str, arm: Arm | None) -> Found | None:
+    if signal == "time":
+        return recognise_time(source.table.names, source.table.values)
+    return recognise_signal(source.table.names, signal, arm) if arm else None
+
+
+def _ask_columns(source: Source, signal: str, ask: Ask | None, missing: list[str]) -> str | None:
     names = source.table.names
     if ask is None:
         shown = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
         other = ", or --reference-position of a position servo" if signal == "torque" else ""
-        raise InputError(f"the columns of {signal} are missing: give --{signal}{other}; the file holds {shown}")
+        missing.append(f"the columns of {signal} are missing: give --{signal}{other}; the file holds {shown}")
+        return None
     guess = ",".join(guess_columns(names, signal)) or None
     return ask(f"column(s) of {signal}, of {', '.join(names)}", guess)
 
 
-def _ask_unit(signal: str, ask: Ask | None) -> str:
+def _ask_unit(signal: str, ask: Ask | None, missing: list[str]) -> dict[str, str]:
+    """The unit by the signal; none where it is missing."""
     if ask is None:
-        raise _missing_unit(signal)
+        missing.append(str(_missing_unit(signal)))
+        return {}
     quantity = SIGNAL_QUANTITIES[signal]
-    return parse_unit(signal, ask(f"unit of {signal} ({', '.join(quantity.units)})", quantity.si[0]))
+    return {signal: parse_unit(signal, ask(f"unit of {signal} ({', '.join(quantity.units)})", quantity.si[0]))}
 
 
-def _expand_names(given: str, names: Sequence[str], signal: str) -> tuple[str, ...]:
-    """Names and patterns with commas between them as column names, patterns in the order of the file."""
+def _expand_names(given: str, names: Sequence[str], signal: str, arm: Arm | None) -> tuple[str, ...]:
+    """Names and patterns with commas between them as column names, in the order of the robot's joints.
+
+    Raises InputError for a name that is no column, for more or fewer columns than the robot has joints, and for listed
+    joints in another order than the robot's.
+    """
     wanted: list[str] = []
+    listed = True
     for part in (part.strip() for part in given.split(",")):
-        found = [part] if part in names else [name for name in names if fnmatchcase(name, part)]
+        pattern = part.replace("[", "[[]")
+        found = [part] if part in names else [name for name in names if fnmatchcase(name, pattern)]
         if not found:
             raise InputError(f"no column '{part}' for {signal}: {suggest_name(part, names)}")
+        listed = listed and part in names
         wanted += found
-    return tuple(wanted)
+    chosen = tuple(wanted)
+    if signal == "time" and len(chosen) > 1:
+        raise InputError(f"--time {given} names {len(chosen)} columns: {', '.join(chosen)}; give one")
+    if arm is None or signal in ("time", *SENSOR_SIGNALS):
+        return chosen
+    if len(chosen) != len(arm):
+        flag = signal.replace("_", "-")
+        shown = ", ".join(chosen)
+        raise InputError(f"--{flag} {given} names {len(chosen)} columns ({shown}); the robot has {len(arm)} joints")
+    if listed:
+        check_joint_order(chosen, arm, signal)
+        return chosen
+    return order_by_joint(chosen, arm, signal)
 
 
 def _parse_unit_option(text: str) -> tuple[str, str]:

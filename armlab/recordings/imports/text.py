@@ -142,7 +142,8 @@ def _parse_header(lines: list[list[str]], width: int) -> tuple[tuple[str, ...], 
 
 def _split_unit(cell: str) -> tuple[str, str]:
     match = re.fullmatch(r"\s*(.*?)\s*[\[({]([^\[\](){}]*)[\])}]\s*", cell)
-    return (match[1], _strip_brackets(match[2])) if match and match[1] else (cell.strip(), "")
+    is_unit = match is not None and match[1] and not match[2].strip().isdigit()  # q[0]: a joint
+    return (match[1], _strip_brackets(match[2])) if match is not None and is_unit else (cell.strip(), "")
 
 
 def _strip_brackets(cell: str) -> str:

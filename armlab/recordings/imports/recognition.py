@@ -1,0 +1,179 @@
+"""What the columns of a log are, from the names that robot drivers give them: signal, joint, unit.
+
+A column's name is a stem that tells the signal, a key that tells the joint (a number or a joint's name), and perhaps a
+unit: `actual_q_0`, `tau_J[3]`, `position_elbow_joint`, `timestamp_ns`.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.recordings.units import TIME_UNITS
+from problem.arm import Arm
+
+TIME_NAMES = ("__time", "time", "timestamp", "timestamps", "stamp", "t", "robot_time", "header_stamp")
+STEMS: Mapping[str, tuple[str, str | None]] = {
+    "tau_j": ("torque", "N.m"),  # Franka
+    "effort": ("torque", "N.m"),  # ROS joint states
+    "actual_joint_torque": ("torque", "N.m"),
+    "joint_torque": ("torque", None),
+    "torque": ("torque", None),
+    "tau": ("torque", None),
+    "trq": ("torque", None),
+    "actual_current": ("torque", "A"),  # UR RTDE
+    "joint_current": ("torque", None),
+    "motor_current": ("torque", None),
+    "current": ("torque", None),
+    "actual_q": ("position", "rad"),  # UR RTDE
+    "position": ("position", "rad"),  # ROS joint states
+    "joint_position": ("position", None),
+    "joint_pos": ("position", None),
+    "joint_angle": ("position", None),
+    "q": ("position", None),
+    "pos": ("position", None),
+}
+STEMS_BEFORE_JOINT_NAMES = ("position", "effort", "torque", "joint_position", "joint_torque")
+FRANKA_STEM, FRANKA_UNITS = "tau_j", {"q": "rad"}
+UNIT_SUFFIXES = {
+    "ns": "ns",
+    "us": "us",
+    "ms": "ms",
+    "s": "s",
+    "sec": "s",
+    "rad": "rad",
+    "deg": "deg",
+    "mm": "mm",
+    "nm": "N.m",
+    "ma": "mA",
+    "a": "A",
+}
+RATES_HZ = (10.0, 5000.0)  # of logs: narrower than a factor of 1000, so that at most one unit of time fits
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column's name in parts; unit: None where the name does not tell it."""
+
+    name: str
+    stem: str
+    key: str
+    unit: str | None
+
+
+@dataclass(frozen=True)
+class Found:
+    """Columns of a signal in the order of the robot's joints; unit: None where it is not known."""
+
+    names: tuple[str, ...]
+    unit: str | None
+
+
+def recognise_time(names: Sequence[str], values: Array) -> Found | None:
+    """The time column and its unit: by its name, else by its steps, of which at most one unit makes a usual rate."""
+    for column in (_split_unit(name) for name in names):
+        if column.stem in TIME_NAMES:
+            stamps = values[:, list(names).index(column.name)]
+            return Found((column.name,), column.unit or _time_unit(stamps))
+    return None
+
+
+def _time_unit(stamps: Array) -> str | None:
+    steps = np.diff(stamps[np.isfinite(stamps)])
+    steps = steps[steps > 0]
+    if not len(steps):
+        return None
+    rate = 1 / float(np.median(steps))
+    fitting = [name for name, unit in TIME_UNITS.items() if RATES_HZ[0] <= rate / unit.factor <= RATES_HZ[1]]
+    return fitting[0] if fitting else None
+
+
+def recognise_signal(names: Sequence[str], signal: str, arm: Arm) -> Found | None:
+    """The columns of a signal, one a joint, or None.
+
+    Of several stems the first of the table counts that has a column for each joint. Raises InputError where the columns
+    name joints that the robot does not have.
+    """
+    columns = [split_name(name) for name in names]
+    for stem, (meaning, _) in STEMS.items():
+        group = [column for column in columns if column.stem == stem and column.key]
+        if meaning != signal or len(group) != len(arm):
+            continue
+        chosen = order_by_joint(tuple(column.name for column in group), arm, signal)
+        return Found(chosen, unit_by_name(chosen, names))
+    return None
+
+
+def unit_by_name(chosen: Sequence[str], names: Sequence[str]) -> str | None:
+    """The unit that the names of a signal's columns tell, or their driver; names: of all columns of the file."""
+    columns = [split_name(name) for name in chosen]
+    stems, units = {column.stem for column in columns}, {column.unit for column in columns}
+    if len(stems) > 1 or len(units) > 1:
+        return None
+    stem = stems.pop()
+    franka = FRANKA_UNITS.get(stem) if any(split_name(name).stem == FRANKA_STEM for name in names) else None
+    return units.pop() or STEMS.get(stem, ("", None))[1] or franka
+
+
+def split_name(name: str) -> Column:
+    """A column's name as stem, key and unit."""
+    bare = _split_unit(name)
+    numbered = re.fullmatch(r"(.*?)[\[_ .]?(\d+)\]?", bare.stem)
+    if numbered and numbered[1] in STEMS:
+        return Column(name, numbered[1], numbered[2], bare.unit)
+    for stem in STEMS_BEFORE_JOINT_NAMES:
+        if bare.stem.startswith(f"{stem}_"):
+            return Column(name, stem, bare.stem[len(stem) + 1 :], bare.unit)
+    return Column(name, bare.stem, "", bare.unit)
+
+
+def _split_unit(name: str) -> Column:
+    last = name.rsplit("/", 1)[-1].strip().lower()
+    stem, _, suffix = last.rpartition("_")
+    if stem and suffix in UNIT_SUFFIXES:
+        return Column(name, stem, "", UNIT_SUFFIXES[suffix])
+    return Column(name, last, "", None)
+
+
+def order_by_joint(names: tuple[str, ...], arm: Arm, signal: str) -> tuple[str, ...]:
+    """The columns in the order of the robot's joints, whose names or numbers they end with.
+
+    Raises InputError where they name other joints: their order in a file says nothing.
+    """
+    if len(names) == 1:
+        return names
+    joints = [joint.name for joint in arm.joints]
+    owners = _owners(names, joints)
+    if sorted(owners) == sorted(joints):
+        return tuple(names[owners.index(joint)] for joint in joints)
+    numbers = [re.search(r"(\d+)\D*$", name) for name in names]
+    found = [int(number[1]) for number in numbers if number]
+    if len(set(found)) == len(names):
+        return tuple(name for _, name in sorted(zip(found, names, strict=True)))
+    raise InputError(
+        f"the columns of {signal} ({', '.join(names)}) name other joints than the robot ({', '.join(joints)}): "
+        f"list them in the robot's order, --{signal.replace('_', '-')} NAME,NAME,..."
+    )
+
+
+def check_joint_order(names: tuple[str, ...], arm: Arm, signal: str) -> None:
+    """Raises InputError where listed columns carry the names of the robot's joints in another order."""
+    joints = [joint.name for joint in arm.joints]
+    owners = _owners(names, joints)
+    if sorted(owners) == sorted(joints) and owners != joints:
+        raise InputError(
+            f"--{signal.replace('_', '-')} lists the joints {', '.join(owners)}; the robot's order is "
+            f"{', '.join(joints)}"
+        )
+
+
+def _owners(names: tuple[str, ...], joints: Sequence[str]) -> list[str]:
+    """The joint that each column's name ends with, the longest of several; empty where it ends with none."""
+    return [max((joint for joint in joints if _ends_with(name, joint)), key=len, default="") for name in names]
+
+
+def _ends_with(name: str, joint: str) -> bool:
+    return name == joint or name.endswith((f"_{joint}", f"/{joint}", f".{joint}"))

@@ -1,0 +1,144 @@
+"""What drivers write is recognised: names, units, joints, stamps that count from 1970."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from recording_folders import POSITION, TORQUE, folder_with, frame
+from refusals import refusal
+
+from armlab.recordings.imports.files import import_files
+from armlab.recordings.imports.text import read_odd_csv
+from armlab.recordings.load import load_recording
+
+NOTHING = {
+    **dict.fromkeys(("time", "position", "torque", "gains", "separator", "decimal", "topic")),
+    "robot": "irb120-arm",
+    "units": (),
+    "validate": (),
+}
+JOINT_NAMES = ("base_joint", "shoulder_joint", "elbow_joint")
+EPOCH_S = 1763680000
+
+
+def write_log(path: Path, names: tuple[str, ...], seconds: np.ndarray | None = None) -> Path:
+    """The run with other column names, position in rad, torque in N m."""
+    table = frame()
+    if seconds is not None:
+        table["t"] = seconds
+    pd.DataFrame(table.to_numpy(), columns=list(names)).to_csv(path, index=False)
+    return path
+
+
+def write_robot(folder: Path) -> str:
+    """The arm of the recordings with names of joints."""
+    from problem.robot_file import BUILT_IN_FOLDER
+
+    text = (BUILT_IN_FOLDER / "irb120-arm.yaml").read_text()
+    for number, name in enumerate(JOINT_NAMES, 1):
+        text = text.replace(f"name: joint{number}", f"name: {name}")
+    path = folder / "arm.yaml"
+    path.write_text(text)
+    return str(path)
+
+
+def bracketed(stem: str) -> tuple[str, ...]:
+    return tuple(f"{stem}[{joint}]" for joint in range(3))
+
+
+@pytest.mark.parametrize(
+    ("names", "gains"),
+    [
+        (("timestamp", *(f"actual_q_{n}" for n in range(3)), *(f"actual_current_{n}" for n in range(3))), "1,1,1"),
+        (("t", *bracketed("q"), *bracketed("tau_J")), None),
+        (("time_s", *(f"q{n}_rad" for n in range(1, 4)), *(f"tau{n}_Nm" for n in range(1, 4))), None),
+        (("__time", *(f"/arm/position_{n}" for n in range(3)), *(f"/arm/effort_{n}" for n in range(3))), None),
+    ],
+)
+def test_columns_and_units_of_drivers_need_no_flags(tmp_path: Path, names: tuple[str, ...], gains: str | None) -> None:
+    path = write_log(tmp_path / "log.csv", names)
+    import_files([path], tmp_path / "new", {**NOTHING, "gains": gains}, None)
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_allclose(run.position, frame()[POSITION])
+    assert_allclose(run.torque, frame()[TORQUE])
+
+
+@pytest.mark.parametrize(("name", "factor"), [("timestamp_ns", 1e9), ("timestamp", 1.0), ("time", 1e3)])
+def test_stamps_that_count_from_1970_are_taken_from_the_first_one_and_said(
+    tmp_path: Path, name: str, factor: float
+) -> None:
+    stamps = (EPOCH_S + frame()["t"].to_numpy()) * factor
+    path = write_log(tmp_path / "log.csv", (name, *(f"q{n}_rad" for n in range(3)), *bracketed("tau_J")), stamps)
+    import_files([path], tmp_path / "new", NOTHING, None)
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_allclose(run.time, frame()["t"], atol=1e-5)
+    assert "2025-11-20 23:06:40 UTC" in next(each.text for each in run.findings if each.kind == "epoch_stamps")
+
+
+def test_a_single_stamp_of_zero_among_epoch_stamps_is_a_bad_row(tmp_path: Path) -> None:
+    table = frame()
+    table["t"] += EPOCH_S
+    table.loc[5, "t"] = 0.0
+    run = load_recording(folder_with(tmp_path / "arm", table)).runs[0]
+    assert run.samples == len(table) - 1
+
+
+def test_joints_in_columns_are_matched_with_the_robot_whatever_their_order(tmp_path: Path) -> None:
+    table = frame().to_numpy()
+    order = [2, 0, 1]
+    names = [f"{kind}_{JOINT_NAMES[joint]}" for kind in ("position", "effort") for joint in order]
+    shuffled = np.column_stack([table[:, 0], table[:, 1:4][:, order], table[:, 4:][:, order]])
+    pd.DataFrame(shuffled, columns=["t", *names]).to_csv(tmp_path / "log.csv", index=False)
+    options = {**NOTHING, "robot": write_robot(tmp_path)}
+    for folder, change in (("a", {}), ("b", {"position": "position_*", "torque": "effort_*"})):
+        import_files([tmp_path / "log.csv"], tmp_path / folder, {**options, **change}, None)
+        run = load_recording(tmp_path / folder).runs[0]
+        assert_allclose(run.position, frame()[POSITION])
+        assert_allclose(run.torque, frame()[TORQUE])
+    listed = {**options, "position": ",".join(names[:3])}
+    assert "the robot's order is base_joint" in refusal(
+        import_files, [tmp_path / "log.csv"], tmp_path / "c", listed, None
+    )
+
+
+def test_joints_that_the_robot_does_not_have_are_never_taken_in_the_order_of_the_file(tmp_path: Path) -> None:
+    names = tuple(f"{kind}_{joint}" for kind in ("position", "effort") for joint in JOINT_NAMES)
+    path = write_log(tmp_path / "log.csv", ("t", *names))
+    assert "name other joints than the robot" in refusal(import_files, [path], tmp_path / "new", NOTHING, None)
+
+
+def test_a_pattern_of_too_many_columns_is_an_error(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "log.csv", ("t", *bracketed("tau_J"), *bracketed("tau_J_d")))
+    options = {**NOTHING, "torque": "tau_J*", "position": "tau_J[?]"}
+    message = refusal(import_files, [path], tmp_path / "new", options, None)
+    assert "--torque tau_J* names 6 columns (tau_J[0], tau_J[1], " in message
+    assert read_odd_csv(path).table.names[1] == "tau_J[0]"
+
+
+def test_everything_that_is_missing_is_asked_for_at_once(tmp_path: Path) -> None:
+    path = write_log(tmp_path / "log.csv", ("clock", "x1", "x2", "x3", "current_0_mA", "current_1_mA", "current_2_mA"))
+    message = refusal(import_files, [path], tmp_path / "new", NOTHING, None)
+    assert all(text in message for text in ("give --time", "give --position", "give --gains"))
+    assert "give --robot" in refusal(import_files, [path], tmp_path / "new", {**NOTHING, "robot": None}, None)
+
+
+def test_a_folder_that_a_check_would_refuse_for_its_gains_is_not_written(tmp_path: Path) -> None:
+    names = ("timestamp", *(f"actual_q_{n}" for n in range(3)), *(f"actual_current_{n}" for n in range(3)))
+    path = write_log(tmp_path / "log.csv", names)
+    assert "give --gains" in refusal(import_files, [path], tmp_path / "new", NOTHING, None)
+    short = {**NOTHING, "gains": "1,2"}
+    assert "2 numbers for 3 columns" in refusal(import_files, [path], tmp_path / "new", short, None)
+    assert not (tmp_path / "new").exists()
+
+
+def test_two_files_of_one_name_are_two_runs_and_one_file_twice_is_refused(tmp_path: Path) -> None:
+    names = ("timestamp", *(f"q_{n}_rad" for n in range(3)), *bracketed("tau_J"))
+    paths = []
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        paths.append(write_log(tmp_path / folder / "run.csv", names))
+    import_files(paths, tmp_path / "new", {**NOTHING, "validate": (paths[1],)}, None)
+    assert [run.file for run in load_recording(tmp_path / "new").runs] == ["a-run-1.csv", "b-run-2.csv"]
+    assert "given twice" in refusal(import_files, [paths[0], paths[0]], tmp_path / "again", NOTHING, None)
