@@ -1,0 +1,219 @@
+"""Hostile inputs: one clear line with exit status 2, no traceback, nothing written."""
+
+import os
+import random
+import string
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from armlab.cli.main import main
+
+LINK = {"mass": 2.0, "first_moment": [0.01, 0.02, 0.1], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}
+EXPERIMENT = {
+    "name": "h",
+    "problem": ["sphere"],
+    "algorithms": ["spso"],
+    "swarm_size": 10,
+    "iterations": 5,
+    "repetitions": 1,
+    "seed": 1,
+}
+
+
+def run_refused(folder: Path, *words: object) -> str:
+    """The message of a command that refuses its input and writes nothing into a folder."""
+    before = {path: path.lstat().st_mtime_ns for path in folder.rglob("*")}
+    result = CliRunner().invoke(main, [str(word) for word in words])
+    assert result.exception is None or isinstance(result.exception, SystemExit), repr(result.exception)
+    assert result.exit_code == 2, result.output
+    assert {path: path.lstat().st_mtime_ns for path in folder.rglob("*")} == before
+    *_, line = result.stderr.strip().splitlines()
+    return line
+
+
+def write_yaml(path: Path, content: Any) -> Path:
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+def write_model(path: Path, **changes: Any) -> Path:
+    base = {"schema": "model/1", "robot": "irb120-arm", "links": [LINK] * 3, "components": []}
+    return write_yaml(path, base | changes)
+
+
+def urdf(joints: int, mass: float = 1.0, name: str = "") -> str:
+    parts = ['<robot name="r"><link name="l0"/>']
+    for number in range(joints):
+        parts.append(
+            f'<link name="l{number + 1}"><inertial><mass value="{mass}"/>'
+            '<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            f'<joint name="{name or f"j{number}"}" type="revolute"><parent link="l{number}"/>'
+            f'<child link="l{number + 1}"/><axis xyz="0 0 1"/></joint>'
+        )
+    return "".join(parts) + "</robot>"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("identify", "rec", "--tolerance", "nan"), "nan is not a finite number"),
+        (("identify", "rec", "--cutoff-hz", "inf"), "inf is not a finite number"),
+        (("payload", "rec", "--centre", "nan", "0", "0"), "nan is not a finite number"),
+        (("confusability", "irb120-arm", "rec", "--noise", "nan"), "nan is not a finite number"),
+        (("next", "v.json", "--robot", "irb120-arm", "--duration", "nan"), "nan is not a finite number"),
+        (("next", "v.json", "--robot", "irb120-arm", "--duration", "1e9"), "not in the range"),
+        (("next", "v.json", "--robot", "irb120-arm", "--harmonics", "100000000"), "not in the range"),
+        (("next", "v.json", "--robot", "irb120-arm", "--rate", "1e12"), "not in the range"),
+        (("export", "p.yaml", "--record", "r", "--rate", "1e9", "--out", "x"), "not in the range"),
+        (("diagnose", "rec", "--out", ""), "an empty name"),
+    ],
+)
+def test_numbers_and_places_that_cannot_be_meant_are_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert message in run_refused(tmp_path, *words)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (urdf(200), "has 200 moving joints; at most 16 are supported"),
+        (urdf(3, mass=-1.37), "link 'l1': mass -1.37 should not be negative"),
+        (urdf(3, mass=1e307), "link 1 has 1e+307"),
+        (urdf(3, name="j"), "two joints are called 'j'"),
+    ],
+)
+def test_robots_out_of_this_world_are_refused(tmp_path: Path, content: str, message: str) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(content)
+    assert message in run_refused(tmp_path, "base", path)
+
+
+def test_a_model_of_a_joint_or_a_mass_that_cannot_be_is_not_exported(tmp_path: Path) -> None:
+    parameters = {"coefficient": {"value": 1.0, "unit": "N.m.s/rad"}}
+    component = {"effect": "viscous_friction", "joint": 99, "joints": [1], "parameters": parameters}
+    path = write_model(tmp_path / "joint.yaml", components=[component])
+    assert "joint 99 should be from 1 to 3" in run_refused(tmp_path, "export-model", path, tmp_path / "x.xml")
+    path = write_model(tmp_path / "mass.yaml", links=[LINK | {"mass": 1e307}, LINK, LINK])
+    assert "link 1 has 1e+307" in run_refused(tmp_path, "export-model", path, tmp_path / "x.xml")
+
+
+def test_an_export_never_replaces_the_robot_that_the_model_is_made_from(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(urdf(3))
+    path = write_model(tmp_path / "model.yaml", robot="arm.urdf")
+    message = run_refused(tmp_path, "export-model", path, tmp_path / "arm.urdf")
+    assert "arm.urdf is a file that the model is made from" in message
+
+
+def test_a_verdict_that_is_nested_without_end_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "verdict.json"
+    path.write_text("[" * 100_000)
+    words = ("next", path, "--robot", "irb120-arm", "--out", tmp_path / "next")
+    assert f"{path}: nested too deeply" in run_refused(tmp_path, *words)
+
+
+def write_fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (write_fifo, "no regular file"),
+        (lambda path: path.symlink_to("/dev/zero"), "no regular file"),
+        (lambda path: path.write_text((",".join(["1"] * 20_000) + "\n") * 3), "20000 columns"),
+        (lambda path: path.write_bytes(b""), "holds no rows of numbers"),
+    ],
+)
+def test_files_that_never_end_or_are_too_wide_are_refused(
+    tmp_path: Path, make: Callable[[Path], object], message: str
+) -> None:
+    make(tmp_path / "run.csv")
+    words = ("recording", "import", tmp_path / "run.csv", "--robot", "irb120-arm", "--out", tmp_path / "new")
+    assert message in run_refused(tmp_path, *words)
+
+
+def test_a_separator_of_several_characters_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "run.csv").write_text("1,2\n3,4\n")
+    words = ("recording", "import", tmp_path / "run.csv", "--separator", "banana", "--out", tmp_path / "new")
+    assert "'banana' should be one character" in run_refused(tmp_path, *words)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"swarm_size": 10**9}, "of memory"),
+        ({"swarm_size": 10**400}, "of memory"),
+        ({"problem": [{"preset": "paper", "samples": 10**9}]}, "'samples'"),
+        ({"problem": [{"preset": "joint-fourier", "harmonics": 10**7}]}, "'harmonics'"),
+        ({"problem": []}, "should hold 1 or more entries"),
+        ({"name": "a b"}, "should have the form"),
+    ],
+)
+def test_experiments_that_no_machine_can_hold_are_refused_before_they_start(
+    tmp_path: Path, change: dict[str, Any], message: str
+) -> None:
+    path = write_yaml(tmp_path / "mine.yaml", EXPERIMENT | change)
+    assert message in run_refused(tmp_path, "run", path, "--results", tmp_path / "r", "--store", tmp_path / "s.sqlite")
+
+
+HOSTILE_VALUES: tuple[Any, ...] = (
+    *(float("nan"), float("inf"), -1, 0, 1e307, -1e307, 10**400, "", "../..", "/etc/passwd", "\u202e", "<b>", None),
+    *([], {}, [[]], {"a": {}}, True, "1e5", [1, "x"], "x" * 10_000),
+)
+
+
+def mutate(content: Any, rng: random.Random) -> Any:
+    """The content with one key or entry replaced, removed or added."""
+    if isinstance(content, dict) and content and rng.random() < 0.8:
+        key = rng.choice(sorted(content))
+        kind = rng.random()
+        if kind < 0.15:
+            return {each: value for each, value in content.items() if each != key}
+        if kind < 0.25:
+            return content | {"".join(rng.choices(string.ascii_lowercase, k=5)): rng.choice(HOSTILE_VALUES)}
+        return content | {key: mutate(content[key], rng)}
+    if isinstance(content, list) and content and rng.random() < 0.7:
+        place = rng.randrange(len(content))
+        return [*content[:place], mutate(content[place], rng), *content[place + 1 :]]
+    return rng.choice(HOSTILE_VALUES)
+
+
+ROBOT = {
+    "name": "two",
+    "dh_convention": "standard",
+    "joints": [{"name": f"j{n}", "type": "revolute", "a": 0.3, "d": 0.1, "alpha": 1.57} for n in (1, 2)],
+    "links": [LINK, LINK],
+}
+FILES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
+    "robot": (ROBOT, ("base", "{file}")),
+    "model": (
+        {"schema": "model/1", "robot": "irb120-arm", "links": [LINK] * 3, "components": []},
+        ("export-model", "{file}", "{folder}/out.xml"),
+    ),
+    "experiment": (EXPERIMENT, ("run", "{file}", "--dry-run", "--store", "{folder}/s.sqlite")),
+}
+
+
+@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("seed", range(100))
+def test_a_damaged_file_is_used_or_refused_in_one_line(kind: str, seed: int, tmp_path: Path) -> None:
+    """Outcomes of the seeds: exit 0 with finite numbers alone, or exit 2 with one line; never a traceback."""
+    content, words = FILES[kind]
+    damaged = mutate(content, random.Random(f"{kind} {seed}"))
+    file = write_yaml(tmp_path / f"{kind}.yaml", damaged)
+    filled = [word.format(file=file, folder=tmp_path) for word in words]
+    result = CliRunner().invoke(main, filled)
+    assert result.exception is None or isinstance(result.exception, SystemExit), f"{damaged}: {result.exception!r}"
+    assert result.exit_code in (0, 2), result.output
+    if result.exit_code == 2:
+        assert len(result.stderr.strip().splitlines()) == 1
+        assert sorted(path.name for path in tmp_path.iterdir()) == [f"{kind}.yaml"]
+    else:
+        assert "nan" not in result.stdout.lower().split()
