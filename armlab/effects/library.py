@@ -73,7 +73,8 @@ def library() -> tuple[Family, ...]:
     """Built-in families in the order of the documentation, then those of plug-ins by name.
 
     A plug-in's entry point is a Family, a class of one that takes no arguments, or a tuple of families. One that
-    cannot be imported or is something else is left out with a warning; `family_named` says why to who asks for it.
+    cannot be imported or is something else is left out with a warning; `family_named` says why where its effect may
+    be meant.
     Raises BrokenEffectError, in one line, where one has the id of another.
     """
     families, origins = list(BUILT_IN), {family.effect: "armlab" for family in BUILT_IN}
@@ -112,10 +113,12 @@ def family_named(name: str) -> Family:
     """
     if name in _BUILT_IN_BY_NAME:
         return _BUILT_IN_BY_NAME[name]
-    known = {family.effect: family for family in library()}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BrokenEffectWarning)
+        known = {family.effect: family for family in library()}
     if name not in known:
-        for entry in entry_points(group=ENTRY_POINT_GROUP, name=name):
-            _load_families(entry)  # raises why the library lacks it
+        for entry in entry_points(group=ENTRY_POINT_GROUP):
+            _load_families(entry)  # a broken one may be the one that is meant
         raise ValueError(f"unknown effect '{name}': {suggest_name(name, list(known))}")
     return known[name]
 

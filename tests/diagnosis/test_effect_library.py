@@ -12,7 +12,7 @@ from effect_scenes import family, scene, torque_of
 from armlab.effects import library as library_module
 from armlab.effects.contract import Candidate, Effect, Family, Parameter, Scene
 from armlab.effects.friction import CoulombFriction
-from armlab.effects.library import BUILT_IN, EFFECT_IDS, BrokenEffectError, effect_named, library
+from armlab.effects.library import BUILT_IN, EFFECT_IDS, BrokenEffectError, BrokenEffectWarning, effect_named, library
 from armlab.effects.term import EveryJoint, Term
 from problem.arm import PARAMETER_NAMES
 
@@ -168,12 +168,32 @@ def test_an_id_that_is_taken_is_refused_in_one_line(monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.parametrize(
     ("value", "message"),
-    [("no_such_module:X", "cannot be imported"), ("math:pi", "is no armlab.effects.contract.Family")],
+    [
+        ("no_such_module:X", "cannot be imported"),
+        ("math:pi", "is no armlab.effects.contract.Family"),
+        (f"{__name__}:RaisesWhenMade", "cannot be imported: RuntimeError: boom"),
+        (f"{__name__}:ExitsWhenMade", r"it ends the program \(sys.exit\)"),
+    ],
 )
-def test_a_broken_plug_in_is_named(monkeypatch: pytest.MonkeyPatch, value: str, message: str) -> None:
+def test_a_broken_plug_in_is_left_out_and_troubles_only_who_may_mean_it(
+    monkeypatch: pytest.MonkeyPatch, value: str, message: str
+) -> None:
     registered(monkeypatch, value)
+    with pytest.warns(BrokenEffectWarning, match=message):
+        assert library() == BUILT_IN
+    assert effect_named("coulomb_friction").id == "coulomb_friction"
     with pytest.raises(BrokenEffectError, match=message):
-        library()
+        effect_named("own0")
+
+
+class RaisesWhenMade:
+    def __init__(self) -> None:
+        raise RuntimeError("boom")
+
+
+class ExitsWhenMade:
+    def __init__(self) -> None:
+        raise SystemExit(3)
 
 
 def test_a_family_without_restoring_says_so() -> None:

@@ -7,11 +7,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from refusals import refusal
 
+from algorithms.contract import Box
+from algorithms.driver import minimise
+from algorithms.random_search import RandomSearch
 from armlab.cli.main import main
+from armlab.common.files import write_texts
 
 LINK = {"mass": 2.0, "first_moment": [0.01, 0.02, 0.1], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}
 EXPERIMENT = {
@@ -217,3 +223,48 @@ def test_a_damaged_file_is_used_or_refused_in_one_line(kind: str, seed: int, tmp
         assert sorted(path.name for path in tmp_path.iterdir()) == [f"{kind}.yaml"]
     else:
         assert "nan" not in result.stdout.lower().split()
+
+
+def test_a_time_that_stands_still_is_refused_by_the_check(tmp_path: Path) -> None:
+    folder = tmp_path / "arm"
+    folder.mkdir()
+    columns = {"time": "t", "position": ["q1", "q2", "q3"], "torque": ["u1", "u2", "u3"]}
+    settings = {"schema": "recording/1", "robot": "irb120-arm", "columns": columns, "units": {}}
+    write_yaml(folder / "recording.yaml", settings | {"runs": [{"file": "run.csv"}]})
+    rows = "".join(f"1.0,{n % 7},{n % 5},{n % 3},{n % 11},{n % 13},{n % 17}\n" for n in range(200))
+    (folder / "run.csv").write_text("t,q1,q2,q3,u1,u2,u3\n" + rows)
+    message = run_refused(tmp_path, "identify", folder)
+    assert "run.csv: the time stands still at 1 s" in message
+
+
+def test_an_output_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("kept")
+    assert "cannot write into" in str(refusal(write_texts, {"a": "1"}, tmp_path / "file"))
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+class Scribbler(RandomSearch):
+    """Writes into what it is told."""
+
+    @staticmethod
+    def tell(state: Any, X: Any, fitness: Any) -> Any:
+        told = RandomSearch.tell(state, X, fitness)
+        X[:], fitness[:] = 0.0, 0.0
+        return told
+
+
+def test_an_algorithm_that_writes_into_what_it_is_told_changes_no_result() -> None:
+    box = Box(np.full(2, -1.0), np.full(2, 1.0))
+    first = np.random.default_rng(0).uniform(-1, 1, (5, 2))
+
+    def square(points: Any) -> Any:
+        return np.sum(points**2, axis=1)
+
+    def best(algorithm: Any) -> float:
+        points = first.copy()
+        rng = np.random.default_rng(1)
+        return minimise(
+            algorithm, algorithm.Params(), lambda X: np.sum(X**2, axis=1), box, points, 50, rng
+        ).best_fitness
+
+    assert best(Scribbler) == best(RandomSearch) > 0

@@ -206,7 +206,8 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     if any(is_lerobot(path) for path in files):
         usual = _lerobot_columns(first, options.get("joints"))
         options = {**options, **{name: each for name, each in usual.items() if options.get(name) is None}}
-    assignment = _make_assignment(first, load_arm(robot) if robot else None, options, ask, missing)
+    whole = None if robot is None or options.get("joints") else load_arm(robot)  # of --joints, the reader checks them
+    assignment = _make_assignment(first, whole, options, ask, missing)
     if missing or robot is None:
         raise InputError("; ".join(missing))
     validate = [str(path) for path in options["validate"]]
