@@ -180,10 +180,10 @@ def model_of(file: ModelFile, path: Path) -> TorqueModel:
 
 def _read_component(entry: ComponentEntry, where: str, arm: Arm) -> tuple[Candidate, Array]:
     joints = entry.joints or (() if entry.joint is None else (entry.joint,))
-    if entry.joint is not None and not 1 <= entry.joint <= len(arm):
-        raise InputError(f"{where}: joint {entry.joint} should be from 1 to {len(arm)}")
     if any(not 1 <= each <= len(arm) for each in joints):
         raise InputError(f"{where}: joints {list(joints)} should be from 1 to {len(arm)}")
+    if entry.joint is not None and not 1 <= entry.joint <= len(arm):
+        raise InputError(f"{where}: joint {entry.joint} should be from 1 to {len(arm)}")
     parameters = {name: each.value for name, each in entry.parameters.items()}
     try:
         return family_named(entry.effect).from_parameters(arm, joints, parameters, entry.form)
