@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo, choose_servo
+from armlab.diagnosis.motion.estimate import MAX_START_WINDOWS, fit_servo, thin_windows
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
-from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, Servos
+from armlab.diagnosis.motion.servo import LOWEST, PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
 from armlab.recordings.motion import MotionRecording
@@ -27,7 +28,9 @@ from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
 
 HELD_OUT_SHARE = 1 / 3  # of each run, its end, where no run validates
-MAX_UNEXPLAINED = 0.5  # of the standard deviation of a position: above it no position servo of this law moved the joint
+MAX_UNEXPLAINED = 0.7  # of the error of a servo without gain: above it the command did not move the joint
+AT_FLOOR = 3.0  # times the noise of the encoder: an error that needs no explanation
+NO_SERVO = "no joint follows its command as a position servo does: check the columns, or the controller is another"
 SAME_ERROR = 1.25  # ratio of errors before and after, below which the simulation counts as right
 Status = Literal["mismatch", "none", "inconclusive"]
 
@@ -63,7 +66,8 @@ class JointError:
     """Errors of one joint on held-out data, rad (m).
 
     before, after: of its replay in windows; replay_before, replay_after: of the whole arm over whole runs; None where
-    the simulation has no controller. command: of the command itself, taken as the position. floor: of the encoder.
+    the simulation has no controller. command: of the command itself, taken as the position. spread: of the position
+    about its mean. floor: of the encoder.
     """
 
     joint: int
@@ -72,7 +76,13 @@ class JointError:
     replay_before: float | None
     replay_after: float
     command: float
+    spread: float
     floor: float
+
+    @property
+    def follows(self) -> bool:
+        """Whether the replay tells more than the command alone, or the mean of the position."""
+        return self.replay_after < max(MAX_UNEXPLAINED * min(self.command, self.spread), AT_FLOOR * self.floor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,12 +132,14 @@ def diagnose_motion(
         fitted = None if still[number] else choose_servo(joint, simulation.nominal.values[number], looks)
         chosen.append(fitted if fitted is not None and _explains(joint, fitted) else None)
     if not any(chosen):
-        text = "no joint follows its command as a position servo does: check the columns, or the controller is another"
-        return MotionDiagnosis(recording, simulation, "inconclusive", text)
+        return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("replaying held-out runs")
     judged = make_windows(held_out, simulation)
+    concluded = _conclude(recording, simulation, (windows, judged), chosen, held_out)
+    if concluded.servos is None:
+        return concluded
     return replace(
-        _conclude(recording, simulation, (windows, judged), chosen, held_out),
+        concluded,
         odd=tuple(_odd_stretches(learned, chosen)),
         seconds=time.perf_counter() - started,
     )
@@ -157,7 +169,12 @@ def split_runs(recording: MotionRecording) -> tuple[list[MotionRun], list[Motion
 
 
 def _explains(windows: Windows, chosen: ChosenServo) -> bool:
-    return chosen.fit.rms < MAX_UNEXPLAINED * float(np.std(windows.position))
+    """Whether the command explains the motion: a servo without gain, the rest fitted anew, does much worse."""
+    few = thin_windows(windows, MAX_START_WINDOWS)
+    free, values = chosen.fit.free.copy(), chosen.fit.values.copy()
+    free[place("kp")], values[place("kp")] = False, LOWEST[place("kp")]
+    passive = fit_servo(few, values, free)
+    return _rms(joint_errors(few, chosen.fit.values)[0]) < MAX_UNEXPLAINED * passive.rms
 
 
 def _conclude(
@@ -183,6 +200,9 @@ def _conclude(
     errors = tuple(
         _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
+    if not any(each.follows for each in errors):
+        return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
+    findings = [each for each in findings if errors[each.joint - 1].follows]
     status, reason = _status(findings, errors, chosen, known)
     tools = [
         float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
@@ -201,7 +221,7 @@ def _conclude(
         replayed_before=before,
         replayed_after=after,
         tool=(tools[0] if before else None, tools[-1]),
-        silent=tuple(number + 1 for number, each in enumerate(chosen) if each is None),
+        silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not each.follows),
     )
 
 
@@ -330,6 +350,7 @@ def _errors(
         replay_before=float(joint_rms(before)[number]) if before else None,
         replay_after=float(joint_rms(after)[number]),
         command=_rms(commands),
+        spread=float(np.std(np.concatenate([run.position[:, number] for run in held_out]))),
         floor=encoder_step(judged.position) / np.sqrt(12),
     )
 

@@ -36,13 +36,13 @@ def confused_parameters(windows: Windows, fit: ServoFit) -> dict[int, tuple[int,
             continue
         wider = _inverse([columns[number] for number in (*fitted, other)])
         for position, number in enumerate(fitted):
-            if np.sqrt(wider[position, position] / alone[position, position]) > CLASS_FACTOR:
+            if wider[position, position] > CLASS_FACTOR**2 * alone[position, position] > 0:
                 found[number].append(other)
     return {number: tuple(sorted(others)) for number, others in found.items()}
 
 
 def has_weak_load(windows: Windows, values: Array) -> bool:
-    """Whether gravity is too weak at a joint to set the scale of torques, so that the simulation's inertia alone does."""
+    """Whether gravity is too weak at a joint to set the scale of torques: the simulation's inertia alone does."""
     command = windows.command[:, windows.history : windows.history + windows.measured.shape[1]]
     drive = values[place("kp")] * (command - windows.measured)
     return bool(np.sqrt(np.mean(windows.load**2)) < MIN_LOAD_SHARE * np.sqrt(np.mean(drive**2)))
