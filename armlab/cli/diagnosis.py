@@ -96,8 +96,6 @@ def diagnose(
     """
     from armlab.common.errors import InputError
     from armlab.diagnosis.compare.report import compare_recordings
-    from armlab.diagnosis.motion.compare_write import compare_motion_recordings
-    from armlab.diagnosis.motion.write import diagnose_motion_recording
     from armlab.diagnosis.report.write import diagnose_recording
     from armlab.recordings.motion import is_motion_only
 
@@ -114,8 +112,12 @@ def diagnose(
         raise InputError("--compare: one recording has torque, the other is motion only; they cannot be compared")
     with ProgressLine() as progress:
         if motion_only and old is None:
+            from armlab.diagnosis.motion.write import diagnose_motion_recording
+
             lines = diagnose_motion_recording(recordings[0], out, progress.tell)
         elif motion_only and old is not None:
+            from armlab.diagnosis.motion.compare_write import compare_motion_recordings
+
             lines = compare_motion_recordings((old, *recordings), out, progress.tell)
         elif old is None:
             lines = diagnose_recording(
