@@ -7,6 +7,7 @@ from pathlib import Path
 import engine_cases as cases
 import pytest
 from click.testing import CliRunner
+from told_recordings import frame, recording_in
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
@@ -89,10 +90,10 @@ def _refusal(*arguments: str) -> str:
 
 def test_a_diagnosis_refuses_a_number_that_there_is_not(tmp_path: Path) -> None:
     told = "noise.order: no such tuning number, did you mean 'noise.max_order'?"
-    out = ["--out", str(tmp_path / "out")]
-    assert told in _refusal("diagnose", str(tmp_path), *out, "--set", "noise.order=8")
-    old = ["--compare", str(tmp_path), "--set", "noise.max_order=8"]
-    assert "leave out --set or --compare" in _refusal("diagnose", str(tmp_path), *out, *old)
+    out, folder = ["--out", str(tmp_path / "out")], str(recording_in(tmp_path / "recording", frame(0, 2.0)))
+    assert told in _refusal("diagnose", folder, *out, "--set", "noise.order=8")
+    old = ["--compare", folder, "--set", "noise.max_order=8"]
+    assert "leave out --set or --compare" in _refusal("diagnose", folder, *out, *old)
 
 
 def test_the_page_of_tuning_numbers_is_up_to_date() -> None:
