@@ -193,6 +193,7 @@ class LinkFamily(Family):
         raise ValueError(f"{self.effect} has the forms {', '.join(term.form for term in self.terms)}, not {wanted}")
 
 
+LEAST_RADIUS_M = 0.005  # of gyration: that a body is a body tells no more of a thinner one
 BODY_SIZE_M = 0.1  # the size of a body, which brings its pseudo-inertia to kilograms
 EIGENVALUE_TOLERANCE = 0.1  # of the largest eigenvalue: a point has no spread, and its fit may have a little less
 MAX_PAYLOAD_RATIO = 3.0  # times the mean mass of the links: in the mean square (chosen by eye)
@@ -327,10 +328,17 @@ class SolidBody(LinkTerm):
         return {"mass": mass, "centre": self.shape[:3], "inertia": tuple(mass * each for each in self.shape[3:])}
 
     def known(self, coefficients: Array) -> Array:
-        """That it is a body, see `body_information`."""
-        ten = self.added_body(coefficients)
-        slopes = np.column_stack([self._unit_mass(), float(coefficients[0]) * np.eye(10)[:, 1:]])
-        return np.asarray(slopes.T @ body_information(ten) @ slopes)
+        """That it is a body: the curvature of -log det of its pseudo-inertia, (10, 10), in mass and shape.
+
+        The determinant is that of the spread about the centre times a power of the mass, so the centre itself is free:
+        a small body is a narrow one and not one whose place is known.
+        """
+        x, y, z = self.shape[:3]
+        to_spread = np.column_stack([-_slopes_of_point(x, y, z), np.eye(6)])
+        out = np.zeros((10, 10))
+        out[0, 0] = 4 / float(coefficients[0]) ** 2
+        out[1:, 1:] = to_spread.T @ _spread_information(np.array(self.shape[3:]) - _point_inertia(x, y, z)) @ to_spread
+        return out
 
     def added_body(self, coefficients: Array) -> Array:
         """All ten parameters about the link's frame."""
@@ -412,8 +420,21 @@ def pseudo_inertia_parts() -> Array:
     return np.asarray(pseudo_inertia_basis() * np.outer(to_kilograms, to_kilograms))
 
 
-def body_information(ten: Array) -> Array:
-    """What being a body tells of ten parameters: the curvature of -log det of the pseudo-inertia, (10, 10)."""
-    parts = pseudo_inertia_parts()
-    turned = np.linalg.inv(np.einsum("p,pab->ab", ten, parts)) @ parts
+def _point_inertia(x: float, y: float, z: float) -> Array:
+    """Inertia of one kilogram at a point, (6,), m2."""
+    return np.array([y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
+
+
+def _slopes_of_point(x: float, y: float, z: float) -> Array:
+    """Derivatives of `_point_inertia` by the point, (6, 3), m."""
+    return np.array(
+        [[0, 2 * y, 2 * z], [2 * x, 0, 2 * z], [2 * x, 2 * y, 0], [-y, -x, 0], [-z, 0, -x], [0, -z, -y]], dtype=float
+    )
+
+
+def _spread_information(inertia: Array) -> Array:
+    """Curvature of -log det of the second moments of one kilogram with this inertia (6,) about its centre, (6, 6)."""
+    moments = pseudo_inertia_basis()[4:, :3, :3]
+    widths, axes = np.linalg.eigh(np.einsum("p,pab->ab", inertia, moments))
+    turned = (axes / np.maximum(widths, LEAST_RADIUS_M**2)) @ axes.T @ moments
     return np.asarray(np.einsum("pab,qba->pq", turned, turned))

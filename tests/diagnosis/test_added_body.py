@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from effect_scenes import scene_of
 from told_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
 
@@ -13,7 +14,7 @@ from armlab.diagnosis.plausibility import reason_link_unknown
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
-from armlab.effects.links import BODY_SIZE_M, SolidBody, body_information
+from armlab.effects.links import BODY_SIZE_M, SolidBody
 from armlab.recordings.load import load_recording
 from problem.arm import Link
 from problem.pseudo_inertia import link_from_centre_of_mass
@@ -69,11 +70,22 @@ def test_a_body_of_held_form_with_a_negative_mass_is_none() -> None:
     assert held.objection(np.array([-1.0]), np.array([[1.0]])) is None
 
 
-def test_what_physics_tells_of_a_body_grows_with_certainty_near_a_point() -> None:
-    ball = np.asarray(link_from_centre_of_mass(1.0, np.zeros(3), 0.01 * np.eye(3)).parameters)
-    point = np.asarray(link_from_centre_of_mass(1.0, np.zeros(3), 0.0001 * np.eye(3)).parameters)
-    assert np.all(np.linalg.eigvalsh(body_information(ball)) > 0)
-    assert np.all(np.diag(body_information(point))[4:] > 1e3 * np.diag(body_information(ball))[4:])
+def body_at(x: float, spread: float) -> SolidBody:
+    """Two kilograms. spread: second moment in each direction, m2."""
+    link = link_from_centre_of_mass(2.0, np.array([x, -0.2, 0.3]), 4 * spread * np.eye(3))
+    return SolidBody.of_body(ARM, 3, np.asarray(link.parameters))
+
+
+@pytest.mark.parametrize("size", [0.1, 0.01])
+def test_what_physics_tells_of_a_body_is_its_spread_and_not_its_place(size: float) -> None:
+    body = body_at(0.1, size**2)
+    information = body.known(np.array([2.0]))
+    grown, moved = (
+        np.append(0.0, np.subtract(other.shape, body.shape))
+        for other in (body_at(0.1, 1.01 * size**2), body_at(0.1 + 0.01 * size, size**2))
+    )
+    assert float(grown @ information @ grown) == pytest.approx(3 * 0.01**2)
+    assert float(moved @ information @ moved) < 1e-6
 
 
 def test_fewer_links_are_off_one_by_one_and_all() -> None:
