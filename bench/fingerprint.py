@@ -30,6 +30,8 @@ _SOURCE_FOLDER = Path(__file__).resolve().parents[1]
 _OUR_PACKAGES = frozenset({"problem", "algorithms", "bench", "armlab"})
 # these find code by its name; what they find is a root of its own
 _LOOK_UPS = frozenset({"algorithms.registry", "problem.registry", "armlab"})
+# this reads a robot file, which is part of the key itself, by a package that need not be there
+_READERS = frozenset({"problem.mjcf"})
 # these check settings, and what they make of them is part of the key already
 _SETTINGS_PACKAGES = frozenset({"annotated_types", "pydantic", "pydantic_core", "yaml"})
 # this computes derivatives, and runs only where an algorithm asks for them
@@ -53,7 +55,7 @@ def _code_parts(roots: Iterable[str], unused: Iterable[str]) -> Iterator[str]:
     followed = _OUR_PACKAGES | {_top_package(name) for name in queue}
     for top in followed - _OUR_PACKAGES:
         yield from _package_data(top)
-    found = {*unused, *_LOOK_UPS, *_SETTINGS_PACKAGES, *sys.stdlib_module_names}
+    found = {*unused, *_LOOK_UPS, *_READERS, *_SETTINGS_PACKAGES, *sys.stdlib_module_names}
     while queue:
         name = queue.popleft()
         top = _top_package(name)

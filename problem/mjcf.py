@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -74,8 +73,9 @@ def arm_of(model: Any, path: Path) -> Arm:
 
 
 def _pose(position: Array, quaternion: Array) -> Array:
-    pose = translation(*position)
-    pose[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    pose, turn = translation(*position), np.empty(9)
+    import_mujoco().mju_quat2Mat(turn, quaternion)
+    pose[:3, :3] = turn.reshape(3, 3)
     return pose
 
 

@@ -70,6 +70,11 @@ def pseudo_inertias(parameters: Array) -> Array:
     return np.asarray(np.einsum("jp,pab->jab", parameters.reshape(-1, 10), pseudo_inertia_basis()))
 
 
+def are_bodies(inertial: Array) -> bool:
+    """Whether each link with parameters (10 * joints,) is something: base parameters alone leave links out."""
+    return bool(np.all(np.linalg.eigvalsh(pseudo_inertias(inertial))[:, -1] > 0))
+
+
 def least_eigenvalues(parameters: Array) -> Array:
     """Smallest eigenvalue of each link's pseudo-inertia, (joints,): negative where no body can have it."""
     return np.asarray(np.linalg.eigvalsh(pseudo_inertias(parameters))[:, 0])

@@ -28,7 +28,7 @@ from armlab.diagnosis.fitted_model import (
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
-from armlab.diagnosis.links import are_bodies, link_prior
+from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
 from armlab.diagnosis.prediction import (
@@ -59,6 +59,7 @@ from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
+from problem.pseudo_inertia import are_bodies
 
 
 def diagnose(

@@ -11,7 +11,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from problem.arm import Arm, Link
 from problem.base_parameters import BaseParameters
-from problem.pseudo_inertia import entropic_information, pseudo_inertias, regular_nominal
+from problem.pseudo_inertia import entropic_information, regular_nominal
 
 Widths = tuple[float, ...]
 MIN_VARIANCE_RATIO = 1e-12  # of the largest variance of a base parameter, in scaled columns
@@ -58,11 +58,6 @@ class LinkPrior:
 
     def _part(self, link: int) -> Array:
         return self.grouping[:, 10 * link : 10 * link + 10]
-
-
-def are_bodies(inertial: Array) -> bool:
-    """Whether each link with parameters (10 * joints,) is something: base parameters alone leave links out."""
-    return bool(np.all(np.linalg.eigvalsh(pseudo_inertias(inertial))[:, -1] > 0))
 
 
 def link_prior(arm: Arm, base: BaseParameters, inertial: Array) -> LinkPrior:

@@ -82,7 +82,7 @@ def test_what_cannot_be_checked_names_the_missing_datum(folder: Path) -> None:
 def test_the_page_shows_its_figures_without_any_file_beside_it(folder: Path) -> None:
     page = (folder / "replication.html").read_text()
     sources = re.findall(r'<img src="([^"]*)"', page)
-    assert len(sources) == 6
+    assert len(sources) == 8
     assert all(source.startswith("data:image/png;base64,") for source in sources)
     assert "<script" not in page
     assert "http" not in page

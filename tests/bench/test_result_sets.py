@@ -155,5 +155,5 @@ def test_a_suite_stands_for_all_its_problems_in_a_configuration(tmp_path: Path) 
 
 def test_an_unknown_suite_is_told_with_the_nearest_name(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
-    path.write_text(CONFIG.replace(CONFIG.splitlines()[1], "problem: {suite: suite-2}"))
-    assert "unknown suite 'suite-2': did you mean 'suite-1'?" in refusal(read_experiment, path)
+    path.write_text(CONFIG.replace(CONFIG.splitlines()[1], "problem: {suite: suit-1}"))
+    assert "unknown suite 'suit-1': did you mean 'suite-1'?" in refusal(read_experiment, path)

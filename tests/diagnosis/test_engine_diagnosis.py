@@ -127,20 +127,20 @@ def test_structure_outside_the_library_is_called_unknown_with_what_it_depends_on
     assert found.fit[1].after > 0.8 * found.fit[1].before  # the surrogate is no part of the model
 
 
-def test_torque_of_the_wrong_sign_is_inconclusive_and_says_so() -> None:
+def test_torque_of_the_wrong_sign_is_read_rightly_and_its_friction_found() -> None:
     good = cases.recording(friction_everywhere)
     turned = replace(good, runs=tuple(run.with_signals(run.time, {"torque": -run.torque}) for run in good.runs))
     found = diagnose(turned)
-    assert found.status == "inconclusive"
-    assert "sign" in found.summary
+    assert found.summary.startswith("The recording is read wrongly: the torque of all joints has the other sign.")
+    assert {each.joint for each in found.claims if each.effect == "viscous_friction"} == {1, 2, 3}
 
 
-def test_torque_in_another_unit_is_inconclusive_and_tells_the_factor() -> None:
+def test_torque_in_another_unit_is_read_rightly_and_the_factor_told() -> None:
     good = cases.recording(friction_everywhere)
     scaled = replace(good, runs=tuple(run.with_signals(run.time, {"torque": 1000 * run.torque}) for run in good.runs))
     found = diagnose(scaled)
-    assert found.status == "inconclusive"
-    assert "unit" in found.summary
+    assert "the torque of all joints is 1000 times the true one: another unit" in found.summary
+    assert {each.joint for each in found.claims if each.effect == "viscous_friction"} == {1, 2, 3}
 
 
 def test_an_arm_that_never_moves_is_inconclusive() -> None:

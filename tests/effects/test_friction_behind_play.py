@@ -22,11 +22,11 @@ LAW = FrictionBehindPlay.at(ARM, 1, shape=(GAP, WAY / GAP), bounds=((1e-4, 1e-1)
 
 
 def engaged(position: Array) -> Array:
-    """Share of the level at each position of a slow motion, (samples,)."""
+    """Share of the level of both directions at each position of a slow motion, (samples,)."""
     time = 0.01 * np.arange(len(position))
     column, still = position[:, None], np.zeros((len(position), 1))
     motion = Motion(column, np.gradient(position, time)[:, None], still)
-    return LAW.columns(scene_of(Run("a.csv", "identify", time, column, still), motion, ARM))[:, 0, 0]
+    return LAW.columns(scene_of(Run("a.csv", "identify", time, column, still), motion, ARM))[:, 0].sum(axis=1)
 
 
 def test_after_a_reversal_friction_falls_within_the_way_waits_for_the_gap_and_comes_back() -> None:

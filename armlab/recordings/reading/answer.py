@@ -14,6 +14,7 @@ from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement
 from armlab.recordings.recording import Recording
+from problem.pseudo_inertia import are_bodies
 
 
 @dataclass(frozen=True)
@@ -116,8 +117,9 @@ def _decide(findings: tuple[SetupFinding, ...]) -> str:
 def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:
     """How a recording is to be read.
 
-    inertial: (10 * joints,) of the links of the simulation, None without one.
+    inertial: (10 * joints,) of the links of the simulation, None without one. Base parameters alone are no links.
     """
+    inertial = inertial if inertial is not None and are_bodies(inertial) else None
     channels = thin_channels(recording, tuning)
     if channels is None:
         return Answer((), recording, None)
