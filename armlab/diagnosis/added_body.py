@@ -264,6 +264,14 @@ def holds_body(model: FittedModel) -> bool:
     return bool(set(_held_groups(model)) & set(model.state.groups))
 
 
+def mass_found_anew(model: FittedModel, link: int) -> float | None:
+    """The mass of a held body, kg, where it is found anew beside all that the model has; None without one at a link."""
+    held = next((each for each in _held_groups(model) if each in model.state.groups), None)
+    if held is None or _link(model, held) != link:
+        return None
+    return float(fit_body(model, model.state.minus(held), body_groups(model.solver)[link], link).ten[0])
+
+
 def _trials(model: FittedModel, present: Sequence[int]) -> list[BodyTrial]:
     """A body at each link in the place of the present ones, with links as far off as they are, or fewer of them.
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from armlab.diagnosis.added_body import mass_found_anew
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
@@ -20,6 +21,7 @@ from armlab.diagnosis.search import Step
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
+from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
 
 
@@ -83,11 +85,13 @@ def links_that_data_tell(
     """The claims without those on a link or a load of which these data do not tell; the log says why not.
 
     No parameter of a link that is off differs from zero; or a joint that feels the link has structure left without a
-    name that is comparable with what the claim explains there. left: what is structured beyond chance.
+    name that is comparable with what the claim explains there; or a load has another mass where it is found anew beside
+    all that is named. left: what is structured beyond chance.
     """
     kept, steps = [], list(model.steps)
     for each in claims:
         reason = reason_link_unknown(each, left, model.design.settings.tuning.plausibility)
+        reason = reason or _reason_other_mass(model, each)
         if reason is None:
             kept.append(each)
         else:
@@ -109,6 +113,18 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: Plausib
                 f"what is left without a name at joint {each.joint + 1} is {share} times as large as its torque there"
             )
     return None
+
+
+def _reason_other_mass(model: FittedModel, claim: Claim) -> str | None:
+    if not isinstance(claim.candidate, SolidBody):
+        return None
+    mass, found = claim.parameters[0], mass_found_anew(model, claim.candidate.joints[0])
+    if found is None or mass.interval is None:
+        return None
+    low, high = np.ravel(mass.interval)
+    if low <= found <= high:
+        return None
+    return f"found anew beside all that is named its mass is {found:.4g} kg, outside its interval"
 
 
 def _differs_from_zero(claim: Claim) -> bool:

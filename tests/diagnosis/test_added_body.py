@@ -1,6 +1,8 @@
 """Bodies that are added to a link can exist."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,11 +12,12 @@ from told_recordings import ARM, PAYLOAD, frame, motion_at, recording_in
 from armlab.diagnosis.added_body import _fewer_off, _likeliest_body, is_possible_body
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.plausibility import reason_link_unknown
+from armlab.diagnosis.plausibility import _reason_other_mass, reason_link_unknown
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.links import BODY_SIZE_M, SolidBody
+from armlab.effects.parameters import ParameterValue
 from armlab.recordings.load import load_recording
 from problem.arm import Link
 from problem.pseudo_inertia import link_from_centre_of_mass
@@ -118,3 +121,16 @@ def test_a_load_is_not_told_beside_structure_as_large_as_its_own_torque() -> Non
     assert reason(1, 4.0) is None
     assert "joint 2" in str(reason(1, 6.0))
     assert reason(0, 6.0) is None
+
+
+@pytest.mark.parametrize(("anew", "told"), [(2.05, True), (2.5, False), (None, True)])
+def test_a_load_that_weighs_otherwise_when_found_anew_is_not_told(
+    anew: float | None, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("armlab.diagnosis.plausibility.mass_found_anew", lambda model, link: anew)
+    evidence = Evidence(1, 0.0, 0.0, 0.9, 0.0, 0.9, 9.0, 1.0, 500.0)
+    mass = ParameterValue("mass", 2.0, (1.9, 2.1), "kg")
+    body = SolidBody.of_body(ARM, 3, BODY)
+    load = Claim("payload", 3, (3,), (mass,), "", evidence, np.zeros((5, 3)), candidate=body)
+    model: Any = SimpleNamespace()
+    assert (_reason_other_mass(model, load) is None) == told
