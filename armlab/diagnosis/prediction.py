@@ -16,7 +16,7 @@ from scipy.linalg import cho_factor, cho_solve
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import WhitenedRows, whitened_rows
-from armlab.diagnosis.columns import Block, Columns, base_columns, filtered_columns, stack_columns
+from armlab.diagnosis.columns import Columns
 from armlab.diagnosis.data import Observed, observe, rows_in
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.fitted_model import FittedModel, fit_values, follow_model
@@ -27,7 +27,6 @@ from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.tuning import PredictionTuning
 from armlab.effects.contract import Candidate
-from armlab.effects.scene import scene_of
 from armlab.identification.regression import suggested_cutoff
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Role, Run
@@ -36,8 +35,8 @@ from armlab.recordings.recording import Role, Run
 @dataclass(frozen=True, eq=False)
 class Prediction:
     """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
-    claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the torque as recorded on blocks held out
-    in turn.
+    claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the filtered torque on blocks held out in
+    turn.
     """
 
     model: FittedModel
@@ -62,25 +61,28 @@ def fit_prediction(named: FittedModel) -> Prediction:
     suggested = max(suggested_cutoff(run) for run in identification_runs(named.design.observed))
     smooth = _design_at(named, candidates, min(suggested, named.design.observed.cutoff_hz), position_ratio=1.0)
     judge = _Judge.of(smooth if _has_rows(smooth.observed) else own_design)
-    best = _Trial.of(own_design, start, named.state, named.noise, judge)
-    error = best.held_out(best.begin)
+    best = _improved(_Trial.of(own_design, start, named.state, named.noise, judge), tuning)
+    cutoffs = []
     for cutoff in _lower_cutoffs(named.design.observed, suggested, tuning):
         design = _design_at(named, candidates, cutoff)
-        if not _has_rows(design.observed):
-            continue
-        trial = _Trial.of(design, start, named.state, None, judge)
-        changed = trial.held_out(trial.begin)
-        if changed < (1 - tuning.min_cutoff_gain) * error:
-            best, error = trial, changed
-    for widths in _widths_of_known_links(named):
-        trial = _Trial.of(best.model.design, start, State(named.state.groups, widths), best.model.noise, judge)
-        changed = trial.held_out(trial.begin)
-        if changed < (1 - tuning.min_cutoff_gain) * error:
-            best, error = trial, changed
-    state = best.improve(tuning)
-    model = _settled(replace(best.model, state=state), tuning)
-    places = {group: place for place, group in enumerate(numbers) if place in state.groups}
-    return Prediction(model, places, best.held_out(state))
+        if _has_rows(design.observed):
+            cutoffs.append(_improved(_Trial.of(design, start, named.state, None, judge), tuning))
+    best = _better(best, cutoffs, tuning)
+    design, noise = best.trial.model.design, best.trial.model.noise
+    known = [
+        _improved(_Trial.of(design, start, State(named.state.groups, widths), noise, judge), tuning)
+        for widths in _widths_of_known_links(named)
+    ]
+    best = _better(best, known, tuning)
+    model = _settled(replace(best.trial.model, state=best.state), tuning)
+    places = {group: place for place, group in enumerate(numbers) if place in best.state.groups}
+    return Prediction(model, places, best.held_out)
+
+
+def _better(usual: "_Improved", others: Sequence["_Improved"], tuning: PredictionTuning) -> "_Improved":
+    """The best of some trials, where it is better by more than a small share than the usual one."""
+    best = min(others, key=lambda each: each.held_out, default=usual)
+    return best if best.held_out < (1 - tuning.min_trial_gain) * usual.held_out else usual
 
 
 def _settled(model: FittedModel, tuning: PredictionTuning) -> FittedModel:
@@ -148,25 +150,9 @@ def _design_at(
     return replace(moved, blocks=tuple(moved.block(each, 0) for each in candidates))
 
 
-def _recorded_columns(design: DesignMatrix) -> Columns:
-    """The columns of a design and its torque as recorded, without the filter of the torque."""
-    observed, simulation = design.observed, design.simulation
-    rigid = [base_columns(simulation.arm, design.base, each, same_filter=False) for each in observed.signals]
-    blocks = []
-    for block in design.blocks:
-        scenes = design.scenes_of(block.candidate)
-        values = filtered_columns(block.candidate, scenes, observed, same_filter=False)
-        blocks.append(Block(block.candidate, block.variant, values))
-    target = []
-    for each in observed.signals:
-        simulated = simulation.torque_as_recorded(scene_of(each.run, each.motion, simulation.arm), each.run)
-        target.append((each.run.torque - simulated)[each.filter.rows])
-    return stack_columns(design.base, rigid, blocks, np.concatenate(target))
-
-
 @dataclass(frozen=True, eq=False)
 class _Judge:
-    """The identification rows that judge every trial: the torque as recorded, columns of positions smoothed alike.
+    """The identification rows that judge every trial: one filter of torque and positions, whatever that of a trial.
 
     edges: of each run the stamps at which another block of time begins, s, and the number of its first block.
     """
@@ -189,7 +175,7 @@ class _Judge:
             numbers = np.unique(block[own])
             begins = [float(observed.time[own & (block == number)][0]) for number in numbers]
             edges.append((np.array(begins[1:]), int(numbers[0]) if len(numbers) else 0))
-        return cls(observed, _recorded_columns(design), tuple(edges))
+        return cls(observed, design.columns, tuple(edges))
 
     def blocks(self, observed: Observed) -> NDArray[np.intp]:
         """The block of time of each row (rows,) of the same runs, whatever their cut-off."""
@@ -203,7 +189,7 @@ class _Judge:
 class _Trial:
     """A design on which structures are compared. begin: named effects and the usual ones of every joint.
 
-    rows, recorded: of all columns, whitened, and as the judge has them, the identification rows of each joint. fitting,
+    rows, judged: of all columns, whitened, and as the judge has them, the identification rows of each joint. fitting,
     judging: the block of time of each of those rows.
     """
 
@@ -211,7 +197,7 @@ class _Trial:
     names: tuple[int, ...]
     begin: State
     rows: WhitenedRows
-    recorded: WhitenedRows
+    judged: WhitenedRows
     fitting: tuple[NDArray[np.intp], ...]
     judging: tuple[NDArray[np.intp], ...]
 
@@ -266,16 +252,16 @@ class _Trial:
 
     @cached_property
     def _products(self) -> list[list[tuple[NDArray[np.intp], Array]]]:
-        """Per joint and fold the own columns and their products, the recorded torque last."""
+        """Per joint and fold the own columns and their products, the torque last."""
         out = []
-        for design, target, fold in zip(self.recorded.designs, self.recorded.errors, self.judging, strict=True):
+        for design, target, fold in zip(self.judged.designs, self.judged.errors, self.judging, strict=True):
             used = np.flatnonzero(np.any(design != 0, axis=0))
             both = np.column_stack([design[:, used], target])
             out.append([(used, both[fold == number].T @ both[fold == number]) for number in range(self._tuning.folds)])
         return out
 
     def errors(self, state: State) -> Array:
-        """Squared error of the recorded torque on each fold as it is held out, (folds, joints)."""
+        """Squared error of the torque on each fold as it is held out, (folds, joints)."""
         grams, products = self._normal
         rank = self.model.solver.fit(self.begin).links.shape[1]
         own = [np.arange(rank), *(self._columns(group, rank) for group in state.groups)]
@@ -297,8 +283,8 @@ class _Trial:
 
     @cached_property
     def power(self) -> float:
-        """Squared length of the torque that is to be explained, as recorded, of all joints."""
-        return float(sum(target @ target for target in self.recorded.errors))
+        """Squared length of the torque that is to be explained, of all joints."""
+        return float(sum(target @ target for target in self.judged.errors))
 
     def held_out(self, state: State) -> float:
         """||tau - tau_hat|| / ||tau|| over all joints on the folds held out in turn."""
@@ -341,6 +327,20 @@ class _Trial:
                 other = search.in_place(state, group)
                 if set(self.names) <= set(other.groups):
                     yield other
+
+
+@dataclass(frozen=True, eq=False)
+class _Improved:
+    """A trial with the parts that help its predictions, and the error of that on blocks held out in turn."""
+
+    trial: _Trial
+    state: State
+    held_out: float
+
+
+def _improved(trial: _Trial, tuning: PredictionTuning) -> _Improved:
+    state = trial.improve(tuning)
+    return _Improved(trial, state, trial.held_out(state))
 
 
 def _unit_noise(observed: Observed) -> Noise:

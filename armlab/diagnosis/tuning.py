@@ -238,10 +238,10 @@ class PredictionTuning:
         least=0.01,
     )
     least_change: float = tuned(0.8, unit="of the present cut-off", meaning="higher cut-offs are not tried", most=1.0)
-    min_cutoff_gain: float = tuned(
+    min_trial_gain: float = tuned(
         0.02,
         unit="of the held-out error",
-        meaning="a lower cut-off has to lower the error by more",
+        meaning="a lower cut-off, or links near a robot file, have to lower the error by more",
         most=1.0,
     )
     link_widths: tuple[float, ...] = tuned(

@@ -12,7 +12,7 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.concealed.case_files import write_observation
 from armlab.concealed.pairs.prove import SETTINGS_FILE, digest_of_answers
 from armlab.concealed.prove import answer, is_answered, report_progress
@@ -105,7 +105,7 @@ def _is_seen(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: in
     inject(alone, (mistakes[place],))
     try:
         return can_be_seen(load_recording(right), load_recording(alone))
-    except (InputError, ValueError):
+    except (InputError, DataError):
         return True  # a recording that cannot even be read is seen to be wrong
     finally:
         shutil.rmtree(alone)

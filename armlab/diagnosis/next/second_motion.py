@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.next.decision import Chances, decision_chances
@@ -97,7 +97,7 @@ def _build_problem(verdict: Path, arm: Arm, recording: Recording, budget: Budget
     for rivals in (None, WHOLE_LIBRARY):
         try:
             return tell_apart_problem(*prepare_experiment(verdict, arm, recording, rivals, budget, None))
-        except (InputError, ValueError):
+        except (InputError, DataError):
             continue
     return None
 

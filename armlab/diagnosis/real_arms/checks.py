@@ -119,7 +119,7 @@ def _coupling_check(arm: str, baseline: str, diagnosis: Diagnosis, joints: tuple
 def _skew_check(arm: str, baseline: str, diagnosis: Diagnosis) -> Check:
     claims = [each for each in diagnosis.claims if each.effect in (CHANNEL_SKEW.effect, TIME_DELAY.effect)]
     found = "; ".join(f"{effect_in_words(each.effect)}: {numbers_in_words(each)}" for each in claims) or "not named"
-    return Check(arm, baseline, "skew or delay is named", bool(claims), found)
+    return Check(arm, baseline, "neither skew nor delay is named", not claims, found)
 
 
 def numbers_in_words(claim: Claim) -> str:

@@ -7,6 +7,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from armlab.common.errors import DataError
 from armlab.diagnosis.compare.comparison import Comparison, compare_diagnosed
 from armlab.diagnosis.compare.named import ONE_FACTOR
 from armlab.diagnosis.compare.numbers import Change
@@ -102,7 +103,7 @@ def odd_against_even(recording: Recording, desk: Desk) -> tuple[bool | None, str
             continue
         try:
             holds, detail = _no_change(desk.compare(*parts))
-        except ValueError as error:  # stretches in motion that are too short for a diagnosis
+        except DataError as error:  # stretches in motion that are too short for a diagnosis
             reason = str(error)
             continue
         if holds is not None:
