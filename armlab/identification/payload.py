@@ -7,6 +7,7 @@ The load is a body that can exist: its pseudo-inertia is positive semidefinite. 
 from recordings with and without the load to the lines of `armlab payload` and `armlab gains`.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -286,7 +287,9 @@ def _payload_table(payload: Payload, mass_alone: bool) -> Iterator[str]:
 
 
 def _interval_line(name: str, value: float, half: float, unit: str) -> str:
-    return f"{name} = {value:.4g} [{value - half:.4g}, {value + half:.4g}] {unit}"
+    """A number to two digits of half its interval."""
+    decimals = max(1 - math.floor(math.log10(half)), 0) if half > 0 else 6
+    return f"{name} = {value:.{decimals}f} [{value - half:.{decimals}f}, {value + half:.{decimals}f}] {unit}"
 
 
 def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSetting) -> Iterator[str]:

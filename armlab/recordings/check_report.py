@@ -1,7 +1,7 @@
 """The HTML page of `armlab recording check`: findings first, then each run with its pictures."""
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -34,45 +34,50 @@ def encode_png(figure: Figure) -> str:
 def draw_signals(signals: Signals, arm: Arm) -> Figure:
     """Position and torque of each joint over time, as recorded and filtered."""
     run = signals.run
-    figure = Figure((FIGURE_WIDTH_IN, ROW_HEIGHT_IN * run.joints + 0.6), layout="constrained")
-    axes = figure.subplots(run.joints, 2, sharex=True, squeeze=False)
-    for joint, (left, right) in enumerate(axes):
-        length, force = ("rad", "N m") if arm.joints[joint].kind == "revolute" else ("m", "N")
+
+    def draw(left: Axes, right: Axes, joint: int) -> None:
         left.plot(run.time, run.position[:, joint], color=FILTERED_COLOR, linewidth=1)
         right.plot(run.time, run.torque[:, joint], color=RAW_COLOR, linewidth=0.8, label="recorded")
         right.plot(signals.time, signals.torque[:, joint], color=FILTERED_COLOR, linewidth=1, label="filtered")
-        left.set_ylabel(f"{arm.joints[joint].name}\n{length}", fontsize=8)
-        right.set_ylabel(force, fontsize=8)
-        _show_limits(left, arm.joints[joint].limits.position, run.position[:, joint])
-    axes[0, 0].set_title("position", fontsize=9)
-    axes[0, 1].set_title("torque", fontsize=9)
-    axes[0, 1].legend(fontsize=7, loc="upper right")
-    for axis in axes[-1]:
-        axis.set_xlabel("time, s", fontsize=8)
-    _shrink_labels(axes)
-    return figure
+        right.set_ylabel("N m" if arm.joints[joint].kind == "revolute" else "N", fontsize=8)
+
+    return _draw_joints(run, arm, ("position", "torque"), draw)
 
 
 def draw_motion(run: MotionRun, arm: Arm) -> Figure:
     """Position with the command, and their difference, of each joint over time."""
-    assert run.reference_position is not None
+    command = run.reference_position
+    assert command is not None
+
+    def draw(left: Axes, right: Axes, joint: int) -> None:
+        left.plot(run.time, command[:, joint], color=RAW_COLOR, linewidth=0.8, label="command")
+        left.plot(run.time, run.position[:, joint], color=FILTERED_COLOR, linewidth=1, label="position")
+        right.plot(run.time, command[:, joint] - run.position[:, joint], color="black", linewidth=0.8)
+        right.set_ylabel(_unit_of(arm, joint), fontsize=8)
+
+    return _draw_joints(run, arm, ("command and position", "command - position"), draw)
+
+
+def _draw_joints(run: MotionRun, arm: Arm, titles: tuple[str, str], draw: Callable[[Axes, Axes, int], None]) -> Figure:
+    """Two panels for each joint; draw: fills both of a joint, the left one with its positions."""
     figure = Figure((FIGURE_WIDTH_IN, ROW_HEIGHT_IN * run.joints + 0.6), layout="constrained")
     axes = figure.subplots(run.joints, 2, sharex=True, squeeze=False)
     for joint, (left, right) in enumerate(axes):
-        unit = "rad" if arm.joints[joint].kind == "revolute" else "m"
-        left.plot(run.time, run.reference_position[:, joint], color=RAW_COLOR, linewidth=0.8, label="command")
-        left.plot(run.time, run.position[:, joint], color=FILTERED_COLOR, linewidth=1, label="position")
-        right.plot(run.time, run.reference_position[:, joint] - run.position[:, joint], color="black", linewidth=0.8)
-        left.set_ylabel(f"{arm.joints[joint].name}\n{unit}", fontsize=8)
-        right.set_ylabel(unit, fontsize=8)
+        draw(left, right, joint)
+        left.set_ylabel(f"{arm.joints[joint].name}\n{_unit_of(arm, joint)}", fontsize=8)
         _show_limits(left, arm.joints[joint].limits.position, run.position[:, joint])
-    axes[0, 0].set_title("command and position", fontsize=9)
-    axes[0, 1].set_title("command - position", fontsize=9)
-    axes[0, 0].legend(fontsize=7, loc="upper right")
+    for axis, title in zip(axes[0], titles, strict=True):
+        axis.set_title(title, fontsize=9)
+        if len(axis.get_legend_handles_labels()[0]) > 1:
+            axis.legend(fontsize=7, loc="upper right")
     for axis in axes[-1]:
         axis.set_xlabel("time, s", fontsize=8)
     _shrink_labels(axes)
     return figure
+
+
+def _unit_of(arm: Arm, joint: int) -> str:
+    return "rad" if arm.joints[joint].kind == "revolute" else "m"
 
 
 def _show_limits(axis: Axes, limits: tuple[float, float], position: Array) -> None:

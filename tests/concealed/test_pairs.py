@@ -80,5 +80,5 @@ def test_changes_below_three_detection_limits_do_not_count() -> None:
 
 def test_a_folder_of_other_pairs_is_refused(tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text("{}")
-    with pytest.raises(InputError, match="holds other pairs"):
+    with pytest.raises(InputError, match="holds another set"):
         next(prove_pairs(PairSet(1, 0, 1700), tmp_path, tmp_path / "score", 1))

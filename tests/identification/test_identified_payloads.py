@@ -76,8 +76,18 @@ def test_the_mass_of_a_load_is_found_with_an_interval_that_holds_it(pair: tuple[
 def test_nominal_links_stand_for_runs_without_the_load(pair: tuple[Path, Path]) -> None:
     (line,) = payload_lines(pair[0], None, PayloadSetting(ON_LINK_2))
     low, high = interval(line)
-    assert low <= MASS <= high  # printed to four digits
-    assert high - low < 0.2
+    assert low < MASS + 0.01
+    assert high > MASS - 0.01
+    assert high - low < 0.01
+
+
+def test_intervals_of_a_load_beside_nominal_links_hold_it_nearly_as_often_as_they_say(tmp_path: Path) -> None:
+    held = 0
+    for seed in range(40):
+        loaded = recording(tmp_path / str(seed), MASS * point_mass(1, CENTRE), 2, seed)
+        low, high = interval(next(payload_lines(loaded, None, PayloadSetting(ON_LINK_2))))
+        held += low < MASS < high
+    assert held >= 34  # of 40; 91 % of 500 hold it: smoothed positions add a bias of up to 0.3 standard errors
 
 
 def test_rotors_that_the_robot_file_leaves_out_do_not_shift_the_load_beside_held_links(tmp_path: Path) -> None:

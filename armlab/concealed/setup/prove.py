@@ -1,7 +1,4 @@
-"""The proof: make the cases, seal the answers, diagnose each in a process of its own, and score.
-
-An interrupted proof continues in its folder.
-"""
+"""The proof: make the cases, seal the answers, diagnose each in a process of its own, and score."""
 
 import json
 import shutil
@@ -10,12 +7,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from joblib import Parallel, delayed
-
 from armlab.common.errors import DataError, InputError
 from armlab.concealed.case_files import write_observation
-from armlab.concealed.pairs.prove import SETTINGS_FILE, digest_of_answers
-from armlab.concealed.prove import answer, is_answered, report_progress
+from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker
 from armlab.concealed.setup.mistakes import Injected, inject
 from armlab.concealed.setup.oracle import can_be_seen
 from armlab.concealed.setup.plan import SetupCase, draw_cases, draw_mistakes
@@ -42,40 +36,20 @@ class SetupSet:
 
 def prove_setup(settings: SetupSet, work: Path, results: Path, jobs: int) -> Iterator[str]:
     """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
-    _claim_folder(settings, work)
     cases = list(draw_cases(settings.seed, settings.simulated, settings.real, settings.nulls))
-    missing = [case for case in cases if not (work / "observations" / case.name).is_dir()]
-    made = Parallel(n_jobs=jobs, return_as="generator_unordered")(delayed(_make)(case, work) for case in missing)
-    yield from report_progress("made", made, max(len(missing), 1))
-    yield f"answers SHA-256 {digest_of_answers(work / 'truth')}"
-    names = [case.name for case in cases]
-    waiting = [name for name in names if not is_answered(work / "verdicts" / name)]
-    tasks = (delayed(_diagnose)(work, name, settings.only_setup) for name in waiting)
-    done = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(tasks)
-    yield from report_progress("diagnosed", done, max(len(waiting), 1))
-    yield from score_lines(score_setup(work, names, results))
+    options = ["--only-setup"] if settings.only_setup else []
+    maker = SetMaker(_make, lambda observation: ["diagnose", str(observation), *options], "diagnosed")
+    yield from maker.prove(settings, cases, work, jobs)
+    yield from score_lines(score_setup(work, [case.name for case in cases], results))
 
 
-def _claim_folder(settings: SetupSet, work: Path) -> None:
-    content = json.dumps(asdict(settings), indent=1) + "\n"
-    note = work / SETTINGS_FILE
-    if note.is_file() and note.read_text(encoding="utf-8") != content:
-        raise InputError(f"{work} holds another set (see {note}): choose another folder")
-    work.mkdir(parents=True, exist_ok=True)
-    note.write_text(content, encoding="utf-8")
-
-
-def _make(case: SetupCase, work: Path) -> str:
-    """Makes one case in a draft folder. Its observation is moved last and marks the case as complete."""
-    draft = work / "drafts" / case.name
-    shutil.rmtree(draft, ignore_errors=True)
-    draft.mkdir(parents=True)
-    right, wrong = draft / "right", draft / "observation"
+def _make(case: SetupCase, draft: Path) -> None:
+    right, wrong, public = draft / "right", draft / OBSERVATION, draft / "public"
     true_arm, physics = None, list[list[Any]]()
     if case.recording:
-        open_public_recording(case.recording, work / "public" / case.name)
-        shutil.copytree(work / "public" / case.name / case.recording, right)
-        shutil.rmtree(work / "public" / case.name)
+        open_public_recording(case.recording, public)
+        shutil.copytree(public / case.recording, right)
+        shutil.rmtree(public)
     else:
         simulated = simulate_case(case.plan())
         write_observation(simulated, right)
@@ -90,12 +64,7 @@ def _make(case: SetupCase, work: Path) -> str:
         seen = [_is_seen(right, draft, mistakes, place) for place in range(len(mistakes))]
     truth = {**asdict(case), "mistakes": [asdict(each) for each in mistakes], "seen": seen, "physics": physics}
     truth["arm_joints"] = len(arm)
-    for part in ("truth", "observations"):
-        (work / part).mkdir(parents=True, exist_ok=True)
-    (work / "truth" / f"{case.name}.json").write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
-    wrong.replace(work / "observations" / case.name)
-    shutil.rmtree(draft)
-    return case.name
+    (draft / TRUTH_FILE).write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
 
 
 def _is_seen(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: int) -> bool:
@@ -109,9 +78,3 @@ def _is_seen(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: in
         return True  # a recording that cannot even be read is seen to be wrong
     finally:
         shutil.rmtree(alone)
-
-
-def _diagnose(work: Path, name: str, only_setup: bool) -> str:
-    folder, options = (work / "observations" / name).resolve(), ["--only-setup"] if only_setup else []
-    answer(["diagnose", str(folder), *options], work / "verdicts" / name)
-    return name

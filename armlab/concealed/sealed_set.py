@@ -1,0 +1,97 @@
+"""A set of concealed cases: made in drafts, sealed by a digest, and answered one by one, each in a process of its own.
+
+An interrupted set continues in its folder.
+"""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from joblib import Parallel, delayed
+
+from armlab.common.errors import InputError
+from armlab.concealed.prove import answer, is_answered, report_progress
+
+SETTINGS_FILE = "settings.json"
+OBSERVATION = "observation"  # in a draft, what the program sees
+TRUTH_FILE = "truth.json"  # in a draft, the answer
+
+
+class Named(Protocol):
+    """A plan of a case: it can be sent to another process, and has a name of its own."""
+
+    @property
+    def name(self) -> str:
+        """Of its files."""
+
+
+Plan = TypeVar("Plan", bound=Named)
+
+
+@dataclass(frozen=True)
+class SetMaker(Generic[Plan]):
+    """How a set is made and asked. make: writes OBSERVATION and TRUTH_FILE of a plan into a draft folder.
+
+    question: arguments of the command that a case answers, from the folder of its observation. done: what is said of a
+    case then.
+    """
+
+    make: Callable[[Plan, Path], None]
+    question: Callable[[Path], list[str]]
+    done: str
+
+    def prove(self, settings: Any, plans: Sequence[Plan], work: Path, jobs: int) -> Iterator[str]:
+        """Makes, seals and asks what is not done in a folder; yields the lines that report it.
+
+        settings: a dataclass that tells sets apart. InputError for a folder of another set.
+        """
+        _claim_folder(settings, work)
+        missing = [plan for plan in plans if not (work / "observations" / plan.name).is_dir()]
+        made = Parallel(n_jobs=jobs, return_as="generator_unordered")(
+            delayed(_make)(self.make, plan, work) for plan in missing
+        )
+        yield from report_progress("made", made, max(len(missing), 1))
+        yield f"answers SHA-256 {_digest_of_answers(work / 'truth')}"
+        waiting = [plan.name for plan in plans if not is_answered(work / "verdicts" / plan.name)]
+        tasks = (delayed(self._ask)(work, name) for name in waiting)
+        asked = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(tasks)
+        yield from report_progress(self.done, asked, max(len(waiting), 1))
+
+    def _ask(self, work: Path, name: str) -> str:
+        answer(self.question((work / "observations" / name).resolve()), work / "verdicts" / name)
+        return name
+
+
+def _claim_folder(settings: Any, work: Path) -> None:
+    content = json.dumps(asdict(settings), indent=1) + "\n"
+    note = work / SETTINGS_FILE
+    if note.is_file() and note.read_text(encoding="utf-8") != content:
+        raise InputError(f"{work} holds another set (see {note}): choose another folder")
+    work.mkdir(parents=True, exist_ok=True)
+    note.write_text(content, encoding="utf-8")
+
+
+def _make(make: Callable[[Plan, Path], None], plan: Plan, work: Path) -> str:
+    """Makes one case in a draft folder. Its observation is moved last and marks the case as complete."""
+    draft = work / "drafts" / plan.name
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir(parents=True)
+    make(plan, draft)
+    for part in ("truth", "observations"):
+        (work / part).mkdir(parents=True, exist_ok=True)
+    (draft / TRUTH_FILE).replace(work / "truth" / f"{plan.name}.json")
+    (draft / OBSERVATION).replace(work / "observations" / plan.name)
+    shutil.rmtree(draft)
+    return plan.name
+
+
+def _digest_of_answers(truth: Path) -> str:
+    """SHA-256 of all answers."""
+    out = hashlib.sha256()
+    for path in sorted(truth.glob("*.json")):
+        out.update(path.name.encode() + path.read_bytes())
+    return out.hexdigest()
