@@ -184,7 +184,6 @@ def prove_changes(
 @click.option("--real", type=click.IntRange(min=0), default=200, show_default=True, help="Public recordings.")
 @click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Nothing is wrong.")
 @click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
-@click.option("--only-setup", is_flag=True, help="Ask for mistakes of reading alone, not for physics.")
 @click.option("--work", type=_FOLDER, help="Folder for cases and verdicts [default: .armlab/setup/SEED].")
 @click.option("--results", type=_FOLDER, help="Folder for setup.md and setup.json [default: WORK/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
@@ -193,15 +192,14 @@ def prove_setup(
     real: int,
     nulls: int,
     seed: int | None,
-    only_setup: bool,
     work: Path | None,
     results: Path | None,
     jobs: int,
 ) -> None:
     """Prove that recordings are read rightly.
 
-    Puts mistakes into simulated and public recordings, diagnoses them blindly, and scores. After an interruption the
-    same command continues (extra `engines`).
+    Puts mistakes into simulated and public recordings, diagnoses them blindly, and scores: physics, too, where some is
+    hidden. After an interruption the same command continues (extra `engines`).
     """
     from armlab.concealed.prove import head_commit, judged_seed
     from armlab.concealed.setup.prove import SetupSet
@@ -209,6 +207,6 @@ def prove_setup(
 
     chosen = judged_seed(head_commit()) if seed is None else seed
     folder = work or Path(f".armlab/setup/{chosen}")
-    cases = SetupSet(simulated, real, nulls, chosen, only_setup)
+    cases = SetupSet(simulated, real, nulls, chosen)
     for line in run_proof(cases, folder, results or folder / "score", jobs):
         click.echo(line)

@@ -36,12 +36,12 @@ Plan = TypeVar("Plan", bound=Named)
 class SetMaker(Generic[Plan]):
     """How a set is made and asked. make: writes OBSERVATION and TRUTH_FILE of a plan into a draft folder.
 
-    question: arguments of the command that a case answers, from the folder of its observation. done: what is said of a
-    case then.
+    question: arguments of the command that answers a plan, whose observation is in a folder. done: what is said
+    of a case then.
     """
 
     make: Callable[[Plan, Path], None]
-    question: Callable[[Path], list[str]]
+    question: Callable[[Plan, Path], list[str]]
     done: str
 
     def prove(self, settings: Any, plans: Sequence[Plan], work: Path, jobs: int) -> Iterator[str]:
@@ -56,14 +56,14 @@ class SetMaker(Generic[Plan]):
         )
         yield from report_progress("made", made, max(len(missing), 1))
         yield f"answers SHA-256 {_digest_of_answers(work / 'truth')}"
-        waiting = [plan.name for plan in plans if not is_answered(work / "verdicts" / plan.name)]
-        tasks = (delayed(self._ask)(work, name) for name in waiting)
+        waiting = [plan for plan in plans if not is_answered(work / "verdicts" / plan.name)]
+        tasks = (delayed(self._ask)(plan, work) for plan in waiting)
         asked = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(tasks)
         yield from report_progress(self.done, asked, max(len(waiting), 1))
 
-    def _ask(self, work: Path, name: str) -> str:
-        answer(self.question((work / "observations" / name).resolve()), work / "verdicts" / name)
-        return name
+    def _ask(self, plan: Plan, work: Path) -> str:
+        answer(self.question(plan, (work / "observations" / plan.name).resolve()), work / "verdicts" / plan.name)
+        return plan.name
 
 
 def _claim_folder(settings: Any, work: Path) -> None:

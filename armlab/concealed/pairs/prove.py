@@ -43,5 +43,5 @@ def _make(plan: PairPlan, draft: Path) -> None:
     write_pair(make_pair(plan), draft / OBSERVATION, draft / TRUTH_FILE)
 
 
-def _question(observation: Path) -> list[str]:
+def _question(_: PairPlan, observation: Path) -> list[str]:
     return ["diagnose", "--compare", *(str(observation / side) for side in SIDES)]

@@ -44,11 +44,15 @@ class SetupCase:
         second = EFFECTS[order[(self.index * 5 + 3) % len(EFFECTS)]]
         return (first, second) if self.kind == "pair" and second != first else (first,)
 
+    @property
+    def has_physics(self) -> bool:
+        """Whether physics is hidden in it."""
+        return self.kind == "beside physics" or (self.source == "null" and self.index % 2 == 1)
+
     def plan(self) -> Plan:
-        """The simulated recording; with hidden physics where the kind asks for it, else with none."""
-        hidden = self.kind == "beside physics" or (self.source == "null" and self.index % 2 == 1)
+        """The simulated recording."""
         development = self.seed in DEVELOPMENT_SEEDS
-        plan = draw_plan(self.seed, self.index, "realistic", not hidden, development)
+        plan = draw_plan(self.seed, self.index, "realistic", not self.has_physics, development)
         return _hang(plan, self) if self.kind == "near miss" else plan
 
 

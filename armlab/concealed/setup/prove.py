@@ -22,24 +22,18 @@ from armlab.recordings.public import open_public_recording
 
 @dataclass(frozen=True)
 class SetupSet:
-    """How many cases of each source, from a seed; seeds 1000-1999 are for development.
-
-    only_setup: nothing is asked but how the recording is to be read.
-    """
+    """How many cases of each source, from a seed; seeds 1000-1999 are for development."""
 
     simulated: int
     real: int
     nulls: int
     seed: int
-    only_setup: bool = False
 
 
 def prove_setup(settings: SetupSet, work: Path, results: Path, jobs: int) -> Iterator[str]:
     """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
     cases = list(draw_cases(settings.seed, settings.simulated, settings.real, settings.nulls))
-    options = ["--only-setup"] if settings.only_setup else []
-    maker = SetMaker(_make, lambda observation: ["diagnose", str(observation), *options], "diagnosed")
-    yield from maker.prove(settings, cases, work, jobs)
+    yield from SetMaker(_make, _question, "diagnosed").prove(settings, cases, work, jobs)
     yield from score_lines(score_setup(work, [case.name for case in cases], results))
 
 
@@ -65,6 +59,11 @@ def _make(case: SetupCase, draft: Path) -> None:
     truth = {**asdict(case), "mistakes": [asdict(each) for each in mistakes], "seen": seen, "physics": physics}
     truth["arm_joints"] = len(arm)
     (draft / TRUTH_FILE).write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
+
+
+def _question(case: SetupCase, observation: Path) -> list[str]:
+    """A diagnosis; where no physics is hidden that would judge it, of the reading alone."""
+    return ["diagnose", str(observation), *([] if case.has_physics else ["--only-setup"])]
 
 
 def _is_seen(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: int) -> bool:

@@ -37,7 +37,8 @@ rotor) and *identify*: fitted to the identification runs, with filters that `ide
 has components and prior of that choice, too. *Named*: what `diagnose` names, refitted, and nothing else. *Diagnose*:
 its whole model. *Best known*: percent of filtered torque that a published or hand-made model reaches, by the filter of
 its source. *Share*: (rigid refitted - named) / (rigid refitted - diagnose). *Time*: seconds of `diagnose` over those
-of `identify`, one after the other in one process.
+of `identify`, one after the other in one process. *Reading*: seconds in which `diagnose` asks how the recording is to
+be read over those of what follows.
 
 `identify` sees no run that validates. `diagnose` fits nothing to them, but tests its names there. The runs are not
 untouched: bounds and forms of both procedures were chosen after earlier looks, each of which is in `{LOOKS_FILE}`.
@@ -73,6 +74,7 @@ def _csv_row(line: Line) -> dict[str, object]:
         "identify_seconds": line.identify_seconds,
         "diagnose_seconds": line.diagnose_seconds,
         "time_ratio": line.time_ratio,
+        "reading_ratio": line.reading_ratio,
         "looks": line.looks,
     }
 
@@ -91,7 +93,7 @@ def lines_table(lines: Sequence[Line]) -> str:
     heads = [
         MODEL_STYLES[name][2].removeprefix("diagnose, ").replace("named physics alone", "named") for name in MODELS
     ]
-    headings = ["arm", "baseline", "run", "cut-off Hz", *heads, "best known", "share", "time"]
+    headings = ["arm", "baseline", "run", "cut-off Hz", *heads, "best known", "share", "time", "reading"]
     return markdown_table(headings, [_table_row(line) for line in lines])
 
 
@@ -106,6 +108,7 @@ def _table_row(line: Line) -> list[str]:
         "–" if line.best_known is None else f"{line.best_known:.1f}",
         "–" if share is None else f"{share:.2f}",
         f"{line.time_ratio:.2f}",
+        f"{line.reading_ratio:.2f}",
     ]
 
 

@@ -32,7 +32,8 @@ class Line:
     """A row of the table: the errors of every model on one run; a model that there is not is left out.
 
     cutoff_hz: of the filter that all of them share. best_known: percent of filtered torque that a source states.
-    looks: how often the run was looked at until now.
+    reading_seconds: of `diagnose`, in which it asks how the recording is to be read. looks: how often the run
+    was looked at until now.
     """
 
     arm: str
@@ -43,12 +44,18 @@ class Line:
     best_known: float | None
     identify_seconds: float
     diagnose_seconds: float
+    reading_seconds: float
     looks: int
 
     @property
     def time_ratio(self) -> float:
         """Seconds of `diagnose` over those of `identify`."""
         return self.diagnose_seconds / self.identify_seconds
+
+    @property
+    def reading_ratio(self) -> float:
+        """Seconds that `diagnose` asks how the recording is to be read, over those of what follows."""
+        return self.reading_seconds / (self.diagnose_seconds - self.reading_seconds)
 
     def named_share(self, torque: Literal["recorded", "filtered"]) -> float | None:
         """What named physics closes of what the whole model closes; None where that closes nothing."""
@@ -138,6 +145,7 @@ def _lines(
                 best_known=recipe.best_known.get(each.run.name),
                 identify_seconds=identified.seconds,
                 diagnose_seconds=diagnosis.seconds,
+                reading_seconds=diagnosis.setup_seconds,
                 looks=looks.count(recipe.name, each.run.name),
             )
 
