@@ -1,5 +1,7 @@
 """Reads MJCF, the format of MuJoCo, as an arm. MuJoCo compiles the file: defaults and includes count as it has them."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -51,25 +53,53 @@ def arm_of(model: Any, path: Path) -> Arm:
         raise InputError(f"{path} has no joint")
     if model.neq:
         raise InputError(f"{path}: equality constraints (closed chains, mimic joints) are not supported; remove them")
-    carried: dict[int, tuple[int, Array]] = {0: (0, np.eye(4))}  # body: moving link that carries it, pose in its frame
     joints: list[Joint] = []
-    pseudos: list[Array] = []
-    for body in range(1, model.nbody):
-        carrier, pose = carried[int(model.body_parentid[body])]
-        pose = pose @ _pose(model.body_pos[body], model.body_quat[body])
+    for body, carrier, pose in _walk_bodies(model):
         if model.body_jntnum[body]:
             if carrier != len(joints):
                 name = model.joint(int(model.body_jntadr[body])).name
                 raise InputError(f"{path}, joint '{name}': a second branch of moving joints; cut the file to one arm")
             joints.append(_joint(model, body, pose, path))
-            pseudos.append(np.zeros((4, 4)))
-            carrier, pose = len(joints), np.eye(4)
-        carried[body] = carrier, pose
-        if carrier:
-            pseudos[carrier - 1] = pseudos[carrier - 1] + transform_pseudo_inertia(_pseudo_inertia(model, body), pose)
+    links = [link_from_pseudo_inertia(np.sum([each.seen for each in own], axis=0)) for own in carried_bodies(model)]
     gravity = tuple(model.opt.gravity.tolist())
     rotors = tuple(float(model.dof_armature[joint]) for joint in range(model.njnt))
-    return Arm(path.stem, tuple(joints), tuple(link_from_pseudo_inertia(each) for each in pseudos), gravity, rotors)
+    return Arm(path.stem, tuple(joints), tuple(links), gravity, rotors)
+
+
+def _walk_bodies(model: Any) -> Iterator[tuple[int, int, Array]]:
+    """Each body with the number of the joint before it (0: none), and its pose in the frame of that joint's body."""
+    carried: dict[int, tuple[int, Array]] = {0: (0, np.eye(4))}
+    jointed = 0
+    for body in range(1, model.nbody):
+        carrier, pose = carried[int(model.body_parentid[body])]
+        pose = pose @ _pose(model.body_pos[body], model.body_quat[body])
+        yield body, carrier, pose
+        if model.body_jntnum[body]:
+            jointed += 1
+            carrier, pose = jointed, np.eye(4)
+        carried[body] = carrier, pose
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedBody:
+    """A body of a mujoco.MjModel that a moving joint carries.
+
+    seen: its pseudo-inertia (4, 4) about the frame of the body with the joint, which is the first of those.
+    """
+
+    number: int
+    seen: Array
+
+
+def carried_bodies(model: Any) -> tuple[tuple[CarriedBody, ...], ...]:
+    """The bodies that each joint of a chain carries, from the base on."""
+    groups: list[list[CarriedBody]] = []
+    for body, carrier, pose in _walk_bodies(model):
+        if model.body_jntnum[body]:
+            groups.append([CarriedBody(body, _pseudo_inertia(model, body))])
+        elif carrier:
+            groups[carrier - 1].append(CarriedBody(body, transform_pseudo_inertia(_pseudo_inertia(model, body), pose)))
+    return tuple(tuple(own) for own in groups)
 
 
 def _pose(position: Array, quaternion: Array) -> Array:

@@ -46,19 +46,44 @@ class _Element:
         return str(child.get("link"))
 
 
+@dataclass(frozen=True, eq=False)
+class CarriedLink:
+    """A URDF link that a moving joint carries.
+
+    seen: its pseudo-inertia (4, 4) about the frame of the link right after the joint, which is the first of those.
+    """
+
+    node: ElementTree.Element
+    seen: Array
+
+
+@dataclass(frozen=True, eq=False)
+class UrdfChain:
+    """A URDF document, comments included, and its moving joints from the base on, with the links that each carries."""
+
+    root: ElementTree.Element
+    arm: Arm
+    joints: tuple[ElementTree.Element, ...]
+    carried: tuple[tuple[CarriedLink, ...], ...]
+
+
 def read_urdf(path: Path) -> Arm:
     """The arm of a URDF file; gravity is -9.81 m/s2 along z of the root link.
 
     Raises InputError for a file that is not URDF, for mimic, floating and planar joints, and for a tree with
     more than one branch of moving joints or a closed chain.
     """
+    return read_urdf_chain(path).arm
+
+
+def read_urdf_chain(path: Path) -> UrdfChain:
+    """The document of a URDF file with its moving joints; errors as `read_urdf`."""
     root = _read_root(path)
     joints = [_Element(node, f"{path}, joint '{node.get('name')}'") for node in root.findall("joint")]
     links = {
         str(node.get("name")): _Element(node, f"{path}, link '{node.get('name')}'") for node in root.findall("link")
     }
-    chain = _order_joints(joints, links, path)
-    return _assemble(str(root.get("name") or path.stem), chain, links)
+    return _assemble(root, path.stem, _order_joints(joints, links, path), links)
 
 
 def _read_root(path: Path) -> ElementTree.Element:
@@ -69,7 +94,8 @@ def _read_root(path: Path) -> ElementTree.Element:
     if len(content) > MAX_URDF_BYTES or b"<!ENTITY" in content.replace(b"\0", b""):  # also in UTF-16
         raise InputError(f"{path}: too large, or with XML entities, for a URDF file")
     try:
-        root = ElementTree.fromstring(content)
+        parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
+        root = ElementTree.fromstring(content, parser)
     except ElementTree.ParseError as error:
         raise InputError(f"{path} is not valid XML: {error}") from None
     if root.tag != "robot":
@@ -125,25 +151,31 @@ def _refuse_unsupported(joint: _Element) -> None:
         )
 
 
-def _assemble(name: str, chain: list[_Element], links: dict[str, _Element]) -> Arm:
+def _assemble(root: ElementTree.Element, name: str, chain: list[_Element], links: dict[str, _Element]) -> UrdfChain:
     """Follows the tree: `pose` of each URDF link in the frame of the moving link that carries it (0: the base)."""
     moving: list[Joint] = []
-    inertias: list[Array] = []
-    root = next(link for link in links if link not in {joint.end("child") for joint in chain})
-    carried: dict[str, tuple[int, Array]] = {root: (0, np.eye(4))}
+    nodes: list[ElementTree.Element] = []
+    groups: list[list[CarriedLink]] = []
+    base = next(link for link in links if link not in {joint.end("child") for joint in chain})
+    carried: dict[str, tuple[int, Array]] = {base: (0, np.eye(4))}
     for joint in chain:
         carrier, pose = carried[joint.end("parent")]
         origin = pose @ joint.origin()
         child = joint.end("child")
         if joint.node.get("type") in MOVING_KINDS:
             moving.append(_joint(joint, origin))
-            inertias.append(np.zeros((4, 4)))
+            nodes.append(joint.node)
+            groups.append([])
             carrier, origin = len(moving), np.eye(4)
         carried[child] = carrier, origin
         if carrier:
-            inertias[carrier - 1] = inertias[carrier - 1] + transform_pseudo_inertia(_inertia(links[child]), origin)
-    known = any(np.any(inertia) for inertia in inertias)
-    return Arm(name, tuple(moving), tuple(link_from_pseudo_inertia(inertia) for inertia in inertias) if known else None)
+            seen = transform_pseudo_inertia(_inertia(links[child]), origin)
+            groups[carrier - 1].append(CarriedLink(links[child].node, seen))
+    sums = [np.sum([each.seen for each in own], axis=0) for own in groups]
+    known = any(np.any(inertia) for inertia in sums)
+    bodies = tuple(link_from_pseudo_inertia(inertia) for inertia in sums) if known else None
+    arm = Arm(str(root.get("name") or name), tuple(moving), bodies)
+    return UrdfChain(root, arm, tuple(nodes), tuple(tuple(own) for own in groups))
 
 
 def _joint(joint: _Element, origin: Array) -> Joint:

@@ -156,7 +156,7 @@ def export_model(model: Path, out: Path) -> None:
 
     MODEL: a model.yaml with links. OUT: a .urdf file, or an .xml file for MJCF.
     """
-    from armlab.identification.export import export_model as write
+    from armlab.identification.write_simulator import export_model as write
 
     for line in write(model, out):
         click.echo(line)

@@ -1,4 +1,4 @@
-"""Writes a model as a file of a simulator: URDF, with an SRDF beside it, or MJCF.
+"""A model as a file of a simulator: URDF, with an SRDF beside it, or MJCF.
 
 Payloads and link errors go into the links, a tilt of the base into gravity, and laws that a simulator's joint has to
 the joints (see `Candidate.joint_fields`); effects without a place in the file are listed.
@@ -9,18 +9,14 @@ fixed first joint turns the arm into it. MJCF, the format of MuJoCo, holds armat
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.common.files import write_texts
 from armlab.effects.contract import Candidate
-from armlab.identification.model_file import read_model
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel, joint_fields
 from problem.arm import Arm
@@ -53,6 +49,10 @@ class SimulatorModel:
     fields: dict[str, Array]
     missing: tuple[str, ...]
     thickened_links: tuple[int, ...] = ()
+
+    def field(self, name: str) -> Array:
+        """A field of the joints, (joints,): zero where no effect states it."""
+        return self.fields.get(name, np.zeros(len(self.model.arm)))
 
 
 def has_place_in_simulator(candidate: Candidate, coefficients: Array) -> bool:
@@ -125,35 +125,56 @@ class Body:
 
 def bodies(simulated: SimulatorModel) -> tuple[Body, ...]:
     """The bodies of a model; InputError where it has no links or one that no simulator takes."""
-    model = simulated.model
-    if model.inertial is None:
-        raise InputError("the model has base parameters only: identify it with --method physical to export links")
     origin, out = np.eye(4), []
-    zeros = np.zeros(len(model.arm))
-    for index, (joint, ten) in enumerate(zip(model.arm.joints, model.inertial.reshape(-1, 10), strict=True)):
-        pseudo = transform_pseudo_inertia(pseudo_inertia_of(link_of(ten)), joint.after)
-        if np.linalg.eigvalsh(pseudo)[0] <= MIN_EXTENT_SHARE * np.trace(pseudo):
-            raise InputError(f"link {index + 1} is no body with extent in space: identify with --method physical")
-        centre = pseudo[:3, 3] / pseudo[3, 3]
-        spread = pseudo[:3, :3] - pseudo[3, 3] * np.outer(centre, centre)
-        inertia = np.trace(spread) * np.eye(3) - spread
+    for index, (joint, total) in enumerate(zip(simulated.model.arm.joints, link_inertias(simulated), strict=True)):
+        mass, centre, inertia = body_numbers(transform_pseudo_inertia(total, joint.after))
         limits = joint.limits
         out.append(
             Body(
                 joint.name,
                 joint.kind,
                 origin @ joint.before,
-                float(pseudo[3, 3]),
+                mass,
                 centre,
                 inertia,
                 limits.position,
                 limits.velocity,
                 limits.torque,
-                *(float(simulated.fields.get(name, zeros)[index]) for name in ("damping", "frictionloss", "armature")),
+                *(float(simulated.field(name)[index]) for name in ("damping", "frictionloss", "armature")),
             )
         )
         origin = joint.after
     return tuple(out)
+
+
+def link_inertias(simulated: SimulatorModel) -> list[Array]:
+    """The links' pseudo-inertias (4, 4), each about its frame; InputError where a simulator would not take them."""
+    model = simulated.model
+    if model.inertial is None:
+        raise InputError("the model has base parameters only: identify it with --method physical to export links")
+    out = [pseudo_inertia_of(link_of(ten)) for ten in model.inertial.reshape(-1, 10)]
+    for number, pseudo in enumerate(out, 1):
+        if not has_extent(pseudo):
+            raise InputError(f"link {number} is no body with extent in space: identify with --method physical")
+    return out
+
+
+def has_extent(pseudo: Array) -> bool:
+    """Whether a pseudo-inertia (4, 4) is that of a body with extent in all directions."""
+    return bool(np.linalg.eigvalsh(pseudo)[0] > MIN_EXTENT_SHARE * np.trace(pseudo))
+
+
+def body_numbers(pseudo: Array) -> tuple[float, Array, Array]:
+    """Mass, centre (3,) and inertia (3, 3) about it, in the frame of a pseudo-inertia (4, 4)."""
+    mass = float(pseudo[3, 3])
+    centre = pseudo[:3, 3] / mass
+    spread = pseudo[:3, :3] - mass * np.outer(centre, centre)
+    return mass, centre, np.trace(spread) * np.eye(3) - spread
+
+
+def inertia_entries(inertia: Array) -> Array:
+    """Entries xx, yy, zz, xy, xz, yz of an inertia (3, 3)."""
+    return np.asarray(inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
 
 
 def format_numbers(values: Array | tuple[float, ...]) -> str:
@@ -172,6 +193,7 @@ def srdf_document(simulated: SimulatorModel) -> str:
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
+INERTIA_NAMES = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 MIN_PITCH_COSINE = 1e-12  # cosine of the pitch, below which roll and yaw are one turn
 UNLIMITED = 1e9  # what a reader takes for no limit, where the format wants a number
 
@@ -197,12 +219,7 @@ def _rotation_to_upright(gravity: tuple[float, float, float]) -> Array:
 
 def _add_link(root: ElementTree.Element, body: Body, parent: str, name: str) -> str:
     link = ElementTree.SubElement(root, "link", name=name)
-    inertial = ElementTree.SubElement(link, "inertial")
-    ElementTree.SubElement(inertial, "origin", xyz=format_numbers(body.centre), rpy="0 0 0")
-    ElementTree.SubElement(inertial, "mass", value=repr(body.mass))
-    entries = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    names = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    ElementTree.SubElement(inertial, "inertia", dict(zip(names, map(repr, entries.tolist()), strict=True)))
+    link.append(inertial_element(body.mass, body.centre, body.inertia))
     limited = bool(np.all(np.isfinite(body.limits)))
     kind = "continuous" if body.kind == "revolute" and not limited else body.kind
     joint = ElementTree.SubElement(root, "joint", name=body.name, type=kind)
@@ -214,6 +231,16 @@ def _add_link(root: ElementTree.Element, body: Body, parent: str, name: str) -> 
         limit |= {"lower": _format_finite(body.limits[0]), "upper": _format_finite(body.limits[1])}
     ElementTree.SubElement(joint, "limit", limit)
     return name
+
+
+def inertial_element(mass: float, centre: Array, inertia: Array) -> ElementTree.Element:
+    """The URDF element of a body: kg, m, kg m2 about the centre."""
+    element = ElementTree.Element("inertial")
+    ElementTree.SubElement(element, "origin", xyz=format_numbers(centre), rpy="0 0 0")
+    ElementTree.SubElement(element, "mass", value=repr(mass))
+    entries = map(repr, inertia_entries(inertia).tolist())
+    ElementTree.SubElement(element, "inertia", dict(zip(INERTIA_NAMES, entries, strict=True)))
+    return element
 
 
 def _add_ends(joint: ElementTree.Element, parent: str, child: str, pose: Array) -> None:
@@ -258,11 +285,10 @@ def _add_body(parent: ElementTree.Element, body: Body, number: int) -> ElementTr
     quaternion = Rotation.from_matrix(body.origin[:3, :3]).as_quat(scalar_first=True)
     pose = {"pos": format_numbers(body.origin[:3, 3]), "quat": format_numbers(quaternion)}
     node = ElementTree.SubElement(parent, "body", {"name": f"link{number}", **pose})
-    entries = body.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     inertial = {
         "pos": format_numbers(body.centre),
         "mass": format_numbers((body.mass,)),
-        "fullinertia": format_numbers(entries),
+        "fullinertia": format_numbers(inertia_entries(body.inertia)),
     }
     ElementTree.SubElement(node, "inertial", inertial)
     joint = {"name": body.name, "type": MJCF_JOINT_TYPES[body.kind], "axis": "0 0 1"}
@@ -279,38 +305,3 @@ def _set_springs(root: ElementTree.Element, simulated: SimulatorModel) -> None:
         if "stiffness" in simulated.fields and simulated.fields["stiffness"][number]:
             for name in SPRING_FIELDS:
                 joints[joint.name].set(name, format_numbers((simulated.fields[name][number],)))
-
-
-WRITERS = {".urdf": urdf_document, ".xml": mjcf_document}
-
-
-def export_model(path: Path, out: Path) -> Iterator[str]:
-    """Writes the file and says what it does not hold; InputError where the ending or the model does not fit."""
-    if out.suffix not in WRITERS:
-        raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
-    model = read_model(path)
-    simulated = build_simulator_model(model)
-    texts = {out.name: WRITERS[out.suffix](simulated)}
-    missing, notes = list(simulated.missing), list[str]()
-    if out.suffix == ".urdf":
-        stiffness = simulated.fields.get("stiffness", np.zeros(0))
-        missing = [f"spring of joint {number}" for number, each in enumerate(stiffness, 1) if each] + missing
-        if "armature" in simulated.fields and simulated.fields["armature"].any():
-            texts[out.with_suffix(".srdf").name] = srdf_document(simulated)
-            notes.append(
-                "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
-            )
-    _refuse_input_files((path, Path(model.robot)), texts, out)
-    yield from map(str, write_texts(texts, out.parent))
-    yield from notes
-    if missing:
-        yield "not in the file: " + "; ".join(missing)
-    if simulated.thickened_links:
-        yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
-
-
-def _refuse_input_files(inputs: Iterable[Path], names: Iterable[str], out: Path) -> None:
-    for name in names:
-        place = out.parent / name
-        if place.exists() and any(each.exists() and place.samefile(each) for each in inputs):
-            raise InputError(f"{place} is a file that the model is made from: choose another name")

@@ -11,8 +11,8 @@ from told_recordings import TORQUE, frame, motion_at, recording_in
 from armlab.common.errors import InputError
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.verdict_files import write_verdict
-from armlab.identification.export import export_model
 from armlab.identification.model_file import read_model
+from armlab.identification.write_simulator import export_model
 from armlab.recordings.load import load_recording
 from problem.motion import Motion
 from problem.robot_file import load_arm

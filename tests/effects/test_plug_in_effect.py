@@ -22,10 +22,10 @@ from armlab.diagnosis.next.verdict_file import read_verdict, select_rival_groups
 from armlab.diagnosis.report.write import diagnose_recording
 from armlab.diagnosis.result import Rival
 from armlab.effects.library import effect_named, library
-from armlab.identification.export import export_model
 from armlab.identification.identifier import Identifier
 from armlab.identification.model_file import read_model
 from armlab.identification.structure import Structure
+from armlab.identification.write_simulator import export_model
 from armlab.recordings.load import load_recording
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque

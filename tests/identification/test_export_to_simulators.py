@@ -11,13 +11,13 @@ from armlab.common.errors import InputError
 from armlab.identification.components import usual_components
 from armlab.identification.export import (
     build_simulator_model,
-    export_model,
     mjcf_document,
     srdf_document,
     urdf_document,
 )
 from armlab.identification.model import Model
 from armlab.identification.structure import Structure
+from armlab.identification.write_simulator import export_model
 from problem.motion import Motion
 from problem.pseudo_inertia import parameters_of, regular_nominal
 from problem.robot_file import load_arm

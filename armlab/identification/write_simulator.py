@@ -1,0 +1,64 @@
+"""`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.common.files import write_texts
+from armlab.identification.export import (
+    SimulatorModel,
+    build_simulator_model,
+    mjcf_document,
+    srdf_document,
+    urdf_document,
+)
+from armlab.identification.model_file import read_model
+from armlab.identification.patch import Patched, patched_mjcf, patched_urdf
+
+FORMATS = (".urdf", ".xml")
+
+
+def export_model(path: Path, out: Path) -> Iterator[str]:
+    """Writes the file and says what it does not hold.
+
+    A model of a URDF becomes that URDF with other numbers, and that of an MJCF likewise; any other model becomes a
+    chain of bodies without meshes. Raises InputError where the ending or the model does not fit.
+    """
+    if out.suffix not in FORMATS:
+        raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
+    model = read_model(path)
+    simulated, source = build_simulator_model(model), Path(model.robot)
+    patched = _document(simulated, source, out)
+    texts = {out.name: patched.text}
+    missing, notes = list(simulated.missing), list(patched.notes)
+    if out.suffix == ".urdf":
+        missing = [f"spring of joint {number}" for number, each in enumerate(simulated.field("stiffness"), 1) if each]
+        missing += simulated.missing
+        if simulated.field("armature").any():
+            texts[out.with_suffix(".srdf").name] = srdf_document(simulated)
+            notes.append(
+                "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
+            )
+    _refuse_input_files((path, source), texts, out)
+    yield from map(str, write_texts(texts, out.parent))
+    yield from notes
+    if missing:
+        yield "not in the file: " + "; ".join(missing)
+    if simulated.thickened_links:
+        yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
+
+
+def _document(simulated: SimulatorModel, source: Path, out: Path) -> Patched:
+    if source.suffix != out.suffix:
+        text = urdf_document(simulated) if out.suffix == ".urdf" else mjcf_document(simulated)
+        keeps = f"a chain of bodies without meshes: only a {source.suffix} file keeps what {source.name} has"
+        return Patched(text, (keeps,) if source.suffix in FORMATS else ())
+    made = patched_urdf(simulated, source, out.parent) if out.suffix == ".urdf" else patched_mjcf(simulated, source)
+    return Patched(made.text, (f"{source.name} with other numbers: its names, frames and meshes stay", *made.notes))
+
+
+def _refuse_input_files(inputs: Iterable[Path], names: Iterable[str], out: Path) -> None:
+    for name in names:
+        place = out.parent / name
+        if place.exists() and any(each.exists() and place.samefile(each) for each in inputs):
+            raise InputError(f"{place} is a file that the model is made from: choose another name")
