@@ -12,6 +12,7 @@ from joblib import cpu_count
 
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError, InputError
+from armlab.common.notebook import notebook_html
 from armlab.common.settings import suggest_name
 from armlab.effects.contract import Candidate
 from armlab.identification.identifier import METHODS, Identifier
@@ -75,6 +76,13 @@ class ExperimentResult:
             medians = rows.groupby("algorithm", sort=False)["value"].median().sort_values()
             lines.append(f"  {problem}: " + ", ".join(f"{name} {value:.4g}" for name, value in medians.items()))
         return "\n".join(lines + _count_more(len(problems), "problems"))
+
+    def _repr_html_(self) -> str:
+        table = self.table
+        shown = [name for name in table.columns if name not in ("average", "standard_deviation", "evaluations")]
+        rows = [[f"{cell:.4g}" if isinstance(cell, float) else cell for cell in row] for row in table[shown].to_numpy()]
+        text = f"trials: {len(self.trials)}, files: {len(self.files)}"
+        return notebook_html(f"Experiment {self.name}", text, [name.replace("_", " ") for name in shown], rows)
 
 
 def run_experiment(
@@ -150,6 +158,13 @@ class Prediction:
         for each in self.errors[:SHOWN]:
             lines.append(f"  {each.run} ({each.role}): {each.relative_percent:.2f} %, {each.recorded_percent:.2f} %")
         return "\n".join(lines + _count_more(len(self.errors), "runs"))
+
+    def _repr_html_(self) -> str:
+        rows = [(e.run, e.role, f"{e.relative_percent:.2f}", f"{e.recorded_percent:.2f}") for e in self.errors]
+        text = "Error in percent of the torque."
+        return notebook_html(
+            f"Prediction of {self.recording.name}", text, ("run", "role", "filtered", "recorded"), rows
+        )
 
 
 def predict(model: Model, recording: Recording) -> Prediction:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Protocol
 import yaml
 
 from algorithms.registry import is_plug_in
+from armlab.common.documents import ResultLines
 from bench.config import Experiment, read_experiment
 from bench.dispatch import claim_order, count_missing, count_missing_work, execute_missing
 from bench.errors import StoppedError, TrialsFailedError
@@ -74,6 +75,16 @@ def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Pa
         from bench.results import write_results  # pandas takes longer to import than a small run
 
         return write_results(experiment, entries, loaded.settings, store, options.results)  # tables and figures
+
+
+def report_run(path: Path, options: RunOptions, bar: ProgressBar) -> ResultLines:
+    """Run a configuration and tell the written files; the document has the rows of the tables among them."""
+    written = run_experiment(path, options, bar)
+    yield from map(str, written)
+    from pandas import read_csv
+
+    tables = {file.name: read_csv(file).to_dict("records") for file in written if file.suffix == ".csv"}
+    return {"name": load_experiment(path).experiment.name, "files": written, "tables": tables}
 
 
 @dataclass(frozen=True)
@@ -170,9 +181,10 @@ class _Failures:
 _TIMED_POPULATIONS = 4
 
 
-def describe_run(path: Path, options: RunOptions) -> Iterator[str]:
+def describe_run(path: Path, options: RunOptions) -> ResultLines:
     """Lines that list the trials of a configuration and estimate the time; nothing is run or stored."""
-    entries = load_experiment(path).entries
+    loaded = load_experiment(path)
+    entries = loaded.entries
     missing = _count_missing_by_series(entries, options)
     for series in entries.series:
         yield _describe_series(series, entries.repetitions, missing[series])
@@ -180,6 +192,8 @@ def describe_run(path: Path, options: RunOptions) -> Iterator[str]:
     yield f"{len(entries)} trials, {len(entries) - total} done, {total} to do"
     seconds = _estimate_seconds(missing) / options.workers
     yield f"about {seconds:.1f} s on {options.workers} cores, if otherwise idle, start not counted"
+    counts = {"trials": len(entries), "done": len(entries) - total, "to_do": total}
+    return {"name": loaded.experiment.name, **counts, "seconds": seconds, "workers": options.workers}
 
 
 def _count_missing_by_series(entries: Plan, options: RunOptions) -> dict[Series, int]:

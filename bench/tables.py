@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
-from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.markdown import latex_table, markdown_page, markdown_table
 from bench.config import Experiment
 from bench.execute import Curves
 from bench.plan import Entry
@@ -170,6 +170,13 @@ def summary_page(table: pd.DataFrame, experiment: Experiment) -> str:
     rows = [_summary_cells(row, names, experiment.printed) for row in table.to_dict("records")]
     notes = [_SUMMARY_NOTE, *([_PRINTED_NOTE.format(name=experiment.name)] if experiment.printed else [])]
     return markdown_page(experiment.name, _settings_line(experiment), markdown_table(headings, rows), *notes)
+
+
+def summary_latex(table: pd.DataFrame) -> str:
+    """A summary table as a table of LaTeX."""
+    names = [name for name in table.columns if name not in _SUMMARY_HEADINGS]
+    rows = [_summary_cells(row, names, beside=False) for row in table.to_dict("records")]
+    return latex_table([*names, *_SUMMARY_HEADINGS.values()], rows)
 
 
 def _settings_line(experiment: Experiment) -> str:

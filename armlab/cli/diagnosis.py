@@ -1,12 +1,14 @@
 """Commands of the diagnosis: what physics is missing, and which experiment to do next."""
 
-import sys
+from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 
 import click
 
 from armlab.cli.options import FiniteNumber, OutputPath
+from armlab.cli.output import prints_lines, prints_result, tell_progress
+from armlab.common.documents import ResultLines
 
 _FILE = click.Path(path_type=Path)
 
@@ -32,6 +34,7 @@ _FILE = click.Path(path_type=Path)
 @click.option("--rate", "rate_hz", type=FiniteNumber(min=1, max=100_000), default=250.0, show_default=True, help="Hz.")
 @click.option("--out", type=OutputPath(), default=Path("next"), show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@prints_result
 def next_experiment(
     verdict: Path,
     robot: str,
@@ -45,7 +48,7 @@ def next_experiment(
     rate_hz: float,
     out: Path,
     seed: int,
-) -> None:
+) -> ResultLines:
     """Design the motion that decides between rival effects.
 
     VERDICT: a verdict whose findings have rivals. Writes the motion as CSV, ROS 2 message and RAPID module, with a
@@ -55,8 +58,7 @@ def next_experiment(
     from armlab.diagnosis.next.motion import Budget
 
     budget = Budget(duration, harmonics, algorithm, evaluations, seed)
-    for line in write_next_experiment(verdict, robot, recording, rivals, budget, links, rate_hz, out):
-        click.echo(line)
+    return write_next_experiment(verdict, robot, recording, rivals, budget, links, rate_hz, out)
 
 
 @click.command()
@@ -76,6 +78,7 @@ def next_experiment(
 )
 @click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
 @click.option("--only-setup", is_flag=True, help="Look for these mistakes alone, not for physics.")
+@prints_result
 def diagnose(
     recordings: tuple[Path, ...],
     out: Path,
@@ -87,7 +90,7 @@ def diagnose(
     changes: tuple[str, ...],
     as_read: bool,
     only_setup: bool,
-) -> None:
+) -> ResultLines:
     """Find the physics that the simulation of RECORDING lacks.
 
     Says whether the recording is read wrongly, where the simulation is wrong, which effects are missing, and how much
@@ -110,56 +113,51 @@ def diagnose(
         raise InputError("a recording of motion only takes --out, --compare and nothing else: leave out the others")
     if old is not None and is_motion_only(old) != motion_only:
         raise InputError("--compare: one recording has torque, the other is motion only; they cannot be compared")
-    with ProgressLine() as progress:
-        if motion_only and old is None:
-            from armlab.diagnosis.motion.write import diagnose_motion_recording
+    if motion_only and old is None:
+        from armlab.diagnosis.motion.write import diagnose_motion_recording
 
-            lines = diagnose_motion_recording(recordings[0], out, progress.tell)
-        elif motion_only and old is not None:
-            from armlab.diagnosis.motion.compare_write import compare_motion_recordings
+        return diagnose_motion_recording(recordings[0], out, tell_progress)
+    if motion_only and old is not None:
+        from armlab.diagnosis.motion.compare_write import compare_motion_recordings
 
-            lines = compare_motion_recordings((old, *recordings), out, progress.tell)
-        elif old is None:
-            lines = diagnose_recording(
-                recordings[0], out, baseline, seed, without, changes, as_read, only_setup, progress.tell
-            )
-        else:
-            lines = compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), progress.tell)
-        for line in lines:
-            progress.clear()
-            click.echo(line)
+        return compare_motion_recordings((old, *recordings), out, tell_progress)
+    if old is not None:
+        return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
+    return diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress)
 
 
 @click.command()
 @click.option("--out", type=OutputPath(), help="File for the page [default: the terminal].")
-def tuning(out: Path | None) -> None:
+@prints_result
+def tuning(out: Path | None) -> ResultLines:
     """List the tuning numbers of the diagnosis.
 
     Each with its value, unit, meaning and source, as Markdown. Their names are those of `diagnose --set` and
     `ablate --vary`.
     """
     from armlab.common.files import write_texts
-    from armlab.diagnosis.tuning import tuning_page
+    from armlab.diagnosis.tuning import Tuning, tuning_numbers, tuning_page
 
     if out is None:
-        click.echo(tuning_page(), nl=False)
+        yield tuning_page().rstrip("\n")
     else:
         write_texts({out.name: tuning_page()}, out.parent)
-        click.echo(f"wrote {out}")
+        yield f"wrote {out}"
+    return {"tuning": list(tuning_numbers(Tuning())), "files": [] if out is None else [out]}
 
 
 @click.command("export-model")
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("out", type=click.Path(path_type=Path))
-def export_model(model: Path, out: Path) -> None:
+@prints_result
+def export_model(model: Path, out: Path) -> ResultLines:
     """Export MODEL as URDF or MJCF.
 
     MODEL: a model.yaml with links. OUT: a .urdf file, or an .xml file for MJCF.
     """
     from armlab.identification.write_simulator import export_model as write
 
-    for line in write(model, out):
-        click.echo(line)
+    return write(model, out)
 
 
 @click.command()
@@ -172,7 +170,10 @@ def export_model(model: Path, out: Path) -> None:
 @click.option(
     "--leave-one-out", is_flag=True, help="Choose settings of the diagnosis on all arms but one, and judge them on it."
 )
-def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None, leave_one_out: bool) -> None:
+@prints_lines
+def real(
+    results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None, leave_one_out: bool
+) -> Iterator[str]:
     """Identify and diagnose public recordings of real arms.
 
     Writes arms.md, arms.csv and arms.svg; with --leave-one-out leave_one_out.md and .csv instead, and an interrupted
@@ -184,31 +185,23 @@ def real(results: Path, recordings: Path, only: tuple[str, ...], peers: Path | N
 
     if leave_one_out and peers is not None:
         raise InputError("--peers has no part in --leave-one-out: give one of them")
-    with ProgressLine() as progress:
-        lines = (
-            leave_arms_out(results, recordings, only, progress.tell)
-            if leave_one_out
-            else bench_real_arms(results, recordings, only, peers, progress.tell)
-        )
-        for line in lines:
-            progress.clear()
-            click.echo(line)
+    if leave_one_out:
+        return leave_arms_out(results, recordings, only, tell_progress)
+    return bench_real_arms(results, recordings, only, peers, tell_progress)
 
 
 @click.command("real-motion")
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
-def real_motion(results: Path, recordings: Path) -> None:
+@prints_lines
+def real_motion(results: Path, recordings: Path) -> Iterator[str]:
     """Diagnose public recordings of position servos.
 
     An SO-101 arm against its public MJCF, and an XL330 servo at four gains, pair by pair. Writes motion.md.
     """
     from armlab.diagnosis.motion.real import bench_real_motion
 
-    with ProgressLine() as progress:
-        for line in bench_real_motion(results, recordings, progress.tell):
-            progress.clear()
-            click.echo(line)
+    return bench_real_motion(results, recordings, tell_progress)
 
 
 @click.command()
@@ -217,7 +210,10 @@ def real_motion(results: Path, recordings: Path) -> None:
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a recording [default: all at hand].")
 @click.option("--quick", is_flag=True, help="The short relations alone.")
-def relations(folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], quick: bool) -> None:
+@prints_lines
+def relations(
+    folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], quick: bool
+) -> Iterator[str]:
     """Check relations that need no truth on real recordings.
 
     A recording against itself has no change, the found model explains its recording, other units change nothing, and
@@ -225,17 +221,15 @@ def relations(folders: tuple[Path, ...], results: Path, recordings: Path, only: 
     """
     from armlab.diagnosis.relations.bench import bench_relations
 
-    with ProgressLine() as progress:
-        for line in bench_relations(results, recordings, folders, only, quick, progress.tell):
-            progress.clear()
-            click.echo(line)
+    return bench_relations(results, recordings, folders, only, quick, tell_progress)
 
 
 @click.command("real-concealed")
 @click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
-def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> None:
+@prints_lines
+def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> Iterator[str]:
     """Judge diagnoses of effects concealed in real recordings.
 
     Conceals effects in public recordings of real arms, diagnoses them, and compares. Writes concealed.md,
@@ -243,10 +237,7 @@ def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> No
     """
     from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 
-    with ProgressLine() as progress:
-        for line in conceal_in_recordings(results, recordings, only, progress.tell):
-            progress.clear()
-            click.echo(line)
+    return conceal_in_recordings(results, recordings, only, tell_progress)
 
 
 @click.command()
@@ -257,7 +248,10 @@ def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> No
 )
 @click.option("--joints", type=click.IntRange(min=1), help="How many of its first joints move [default: all].")
 @click.option("--out", type=OutputPath(), help="Folder for the card as page, tables and pictures.")
-def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints: int | None, out: Path | None) -> None:
+@prints_result
+def confusability(
+    robot: str, trajectory: str, noise: tuple[float, ...], joints: int | None, out: Path | None
+) -> ResultLines:
     """List the effects that TRAJECTORY cannot tell apart.
 
     Needs no recording: it tells before anyone records the trajectory.
@@ -267,8 +261,7 @@ def confusability(robot: str, trajectory: str, noise: tuple[float, ...], joints:
     """
     from armlab.diagnosis.confusability.report import write_card
 
-    for line in write_card(robot, trajectory, joints, noise, out):
-        click.echo(line)
+    return write_card(robot, trajectory, joints, noise, out)
 
 
 def _parse_dates(text: str | None) -> tuple[date, ...]:
@@ -279,28 +272,3 @@ def _parse_dates(text: str | None) -> tuple[date, ...]:
         return tuple(date.fromisoformat(each.strip()) for each in text.split(",")) if text else ()
     except ValueError:
         raise InputError(f"--dates {text}: should be days like 2026-01-31,2026-02-28") from None
-
-
-class ProgressLine:
-    """Tells on the terminal's error stream, in one line, what is being done; nothing where that is no terminal."""
-
-    def __init__(self) -> None:
-        self.seen = sys.stderr.isatty()
-
-    def __enter__(self) -> "ProgressLine":
-        """Itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Leaves a clear line, for the error too that may have ended the work."""
-        self.clear()
-
-    def tell(self, message: str) -> None:
-        """Shows a message in place of the one before."""
-        if self.seen:
-            click.echo(f"\r\033[K{message} ...", nl=False, err=True)
-
-    def clear(self) -> None:
-        """Takes the message away."""
-        if self.seen:
-            click.echo("\r\033[K", nl=False, err=True)

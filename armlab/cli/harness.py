@@ -1,6 +1,6 @@
 """Commands of the benchmark harness: run experiments, list what there is, report, share, best known."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -8,14 +8,8 @@ from typing import Any
 import click
 
 from armlab.cli.options import FiniteNumber, OutputPath
-
-
-def trial_bar(total: int, done: int) -> Any:
-    """A bar over trials with the time left; silent where no one watches."""
-    from tqdm import tqdm
-
-    return tqdm(total=total, initial=done, unit="trial", disable=None)  # None: only on a terminal
-
+from armlab.cli.output import prints_lines, prints_result, trial_bar
+from armlab.common.documents import Document, ResultLines, written_files
 
 _DEFAULT_STORE = Path(".armlab/runs.sqlite")
 
@@ -55,50 +49,56 @@ def _run_options(command: Callable[..., None], results: str = "results") -> Call
 @click.command()
 @click.argument("config", type=click.Path(path_type=Path))
 @_run_options
-def run(config: Path, **options: Any) -> None:
+@prints_result
+def run(config: Path, **options: Any) -> ResultLines:
     """Run the missing trials of CONFIG and write its results."""
-    _run_configs([config], **options)
+    return _run_configs([config], **options)
 
 
 @click.command()
 @_run_options
-def table3(**options: Any) -> None:
+@prints_result
+def table3(**options: Any) -> ResultLines:
     """Make Table 3 of the paper: configs/table3.yaml."""
-    _run_configs([Path("configs/table3.yaml")], **options)
+    return _run_configs([Path("configs/table3.yaml")], **options)
 
 
 @click.command()
 @_run_options
-def figure2(**options: Any) -> None:
+@prints_result
+def figure2(**options: Any) -> ResultLines:
     """Make Figure 2 of the paper: configs/figure2*.yaml.
 
     Once as published, and once at equal evaluations.
     """
-    _run_configs([Path("configs/figure2.yaml"), Path("configs/figure2_equal_evaluations.yaml")], **options)
+    return _run_configs([Path("configs/figure2.yaml"), Path("configs/figure2_equal_evaluations.yaml")], **options)
 
 
 @click.command()
 @_run_options
-def figure3(**options: Any) -> None:
+@prints_result
+def figure3(**options: Any) -> ResultLines:
     """Make Figure 3 of the paper: configs/figure3.yaml."""
-    _run_configs([Path("configs/figure3.yaml")], **options)
+    return _run_configs([Path("configs/figure3.yaml")], **options)
 
 
 @click.command()
 @partial(_run_options, results="results/paper")
-def paper(**options: Any) -> None:
+@prints_lines
+def paper(**options: Any) -> Iterator[str]:
     """Make all tables and figures of the paper.
 
     Writes them into results/paper/, with a report on which claims of the paper could be reproduced.
     """
     from bench.studies.paper.replication import describe_paper, make_paper
 
-    _make_study(make_paper, describe_paper, **options)
+    return _make_study(make_paper, describe_paper, **options)
 
 
 @click.command()
 @partial(_run_options, results="results/study")
-def study(**options: Any) -> None:
+@prints_lines
+def study(**options: Any) -> Iterator[str]:
     """Compare the algorithms beyond the paper's cases.
 
     Six joints, randomly shifted coordinates, equal evaluations, larger budgets, and MuPSO's ingredients one by one.
@@ -106,23 +106,24 @@ def study(**options: Any) -> None:
     """
     from bench.studies.beyond_paper.study import describe_study, make_study
 
-    _make_study(make_study, describe_study, **options)
+    return _make_study(make_study, describe_study, **options)
 
 
-def _make_study(make: Callable[..., Any], describe: Callable[..., Any], dry_run: bool, **options: Any) -> None:
+def _make_study(make: Callable[..., Any], describe: Callable[..., Any], dry_run: bool, **options: Any) -> Iterator[str]:
     configs, settings = Path("configs"), _read_run_options(**options)
     records = Path("results/best_known.json")
-    for line in describe(configs, settings) if dry_run else make(configs, settings, records, trial_bar):
-        click.echo(line)
+    yield from map(str, describe(configs, settings) if dry_run else make(configs, settings, records, trial_bar))
 
 
-def _run_configs(configs: Sequence[Path], dry_run: bool, **options: Any) -> None:
-    from bench.run import describe_run, run_experiment
+def _run_configs(configs: Sequence[Path], dry_run: bool, **options: Any) -> ResultLines:
+    from bench.run import describe_run, report_run
 
     settings = _read_run_options(**options)
+    documents = []
     for config in configs:
-        for line in describe_run(config, settings) if dry_run else run_experiment(config, settings, trial_bar):
-            click.echo(line)
+        lines = describe_run(config, settings) if dry_run else report_run(config, settings, trial_bar)
+        documents.append((yield from lines))
+    return {"experiments": documents}
 
 
 def _read_run_options(workers: int | None, executor: str | None, address: str | None, **options: Any) -> Any:
@@ -139,7 +140,8 @@ def _read_run_options(workers: int | None, executor: str | None, address: str | 
 
 
 @click.command("list")
-def list_names() -> None:
+@prints_result
+def list_names() -> ResultLines:
     """List the algorithms, problems and arms by their names.
 
     A configuration uses these names.
@@ -149,19 +151,29 @@ def list_names() -> None:
     from problem.robot_file import built_in_arms
     from problem.suite import instances, suites
 
-    click.echo("algorithms: " + ", ".join(algorithms.names()))
-    click.echo("peers (extra `peers`): " + ", ".join(algorithms.peer_names()))
-    click.echo("with derivatives: " + ", ".join(algorithms.names_with_derivatives()))
-    click.echo("problems: " + ", ".join(problems.names()))
+    document: Document = {
+        "algorithms": algorithms.names(),
+        "peers": algorithms.peer_names(),
+        "with_derivatives": algorithms.names_with_derivatives(),
+        "problems": problems.names(),
+        "suites": {suite: instances(suite) for suite in suites()},
+        "arms": built_in_arms(),
+    }
+    yield "algorithms: " + ", ".join(document["algorithms"])
+    yield "peers (extra `peers`): " + ", ".join(document["peers"])
+    yield "with derivatives: " + ", ".join(document["with_derivatives"])
+    yield "problems: " + ", ".join(document["problems"])
     for suite in suites():
-        click.echo(f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first")
-    click.echo("arms: " + ", ".join(built_in_arms()))
+        yield f"suite {suite}: {len(instances(suite))} problems, {instances(suite)[0]} the first"
+    yield "arms: " + ", ".join(document["arms"])
+    return document
 
 
 @click.command()
 @click.argument("robot")
 @click.option("--columns", type=click.Choice(["later_columns", "earlier_columns"]), default="later_columns")
-def base(robot: str, columns: str) -> None:
+@prints_result
+def base(robot: str, columns: str) -> ResultLines:
     """Show the base parameters of ROBOT.
 
     ROBOT: the name of a built-in arm, a robot file or a URDF.
@@ -170,15 +182,22 @@ def base(robot: str, columns: str) -> None:
     from problem.robot_file import load_arm
 
     found = base_parameters(load_arm(robot), columns)
-    click.echo(f"{len(found)} base parameters:\n  " + "\n  ".join(found.sums))
-    click.echo(f"{len(found.alone)} identifiable alone: " + " ".join(found.alone))
-    click.echo(f"{len(found.grouped)} only in sums: " + " ".join(found.grouped))
-    click.echo(f"{len(found.unidentifiable)} without effect: " + " ".join(found.unidentifiable))
+    yield f"{len(found)} base parameters:\n  " + "\n  ".join(found.sums)
+    yield f"{len(found.alone)} identifiable alone: " + " ".join(found.alone)
+    yield f"{len(found.grouped)} only in sums: " + " ".join(found.grouped)
+    yield f"{len(found.unidentifiable)} without effect: " + " ".join(found.unidentifiable)
+    return {
+        "sums": found.sums,
+        "alone": found.alone,
+        "only_in_sums": found.grouped,
+        "without_effect": found.unidentifiable,
+    }
 
 
 @click.command()
 @click.argument("algorithm")
-def check(algorithm: str) -> None:
+@prints_result
+def check(algorithm: str) -> ResultLines:
     """Test whether ALGORITHM keeps its contract."""
     from algorithms.check import BrokenPromiseError, check_algorithm
     from bench.config import find_algorithm
@@ -187,7 +206,8 @@ def check(algorithm: str) -> None:
         check_algorithm(find_algorithm(algorithm, "check"))
     except BrokenPromiseError as error:
         raise click.ClickException(str(error)) from None
-    click.echo(f"{algorithm} keeps its promises")
+    yield f"{algorithm} keeps its promises"
+    return {"algorithm": algorithm, "keeps_its_promises": True}
 
 
 _PATH = click.Path(path_type=Path)
@@ -200,7 +220,8 @@ _STORE_OPTION = click.option(
 @click.argument("results", type=_PATH)
 @_STORE_OPTION
 @click.option("--out", type=OutputPath(), help="HTML file [default: results/NAME_report.html].")
-def report(results: Path, store: Path, out: Path | None) -> None:
+@prints_result
+def report(results: Path, store: Path, out: Path | None) -> ResultLines:
     """Write one HTML page about RESULTS.
 
     RESULTS: a configuration file whose trials were run, or a folder that `share` wrote. The page needs no other
@@ -208,7 +229,7 @@ def report(results: Path, store: Path, out: Path | None) -> None:
     """
     from bench.report.page import write_report
 
-    click.echo(write_report(results, store, out))
+    return written_files([write_report(results, store, out)])
 
 
 @click.command()
@@ -216,7 +237,8 @@ def report(results: Path, store: Path, out: Path | None) -> None:
 @click.argument("second", type=_PATH)
 @_STORE_OPTION
 @click.option("--out", type=OutputPath(), help="Folder for comparison.md and .csv [default: print only].")
-def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
+@prints_result
+def compare(first: Path, second: Path, store: Path, out: Path | None) -> ResultLines:
     """Show what changed between two sets of results.
 
     Compares SECOND with FIRST, algorithm by algorithm and problem by problem. Each is a configuration file whose
@@ -224,24 +246,24 @@ def compare(first: Path, second: Path, store: Path, out: Path | None) -> None:
     """
     from bench.result_sets.compare import compare_results
 
-    click.echo(compare_results(first, second, store, out), nl=False)
+    return compare_results(first, second, store, out)
 
 
 @click.command()
 @click.argument("results", type=_PATH)
 @_STORE_OPTION
-@click.option("--as", "form", type=click.Choice(["csv", "parquet", "ioh"]), default="csv", show_default=True)
+@click.option("--as", "form", type=click.Choice(["csv", "parquet", "ioh", "latex"]), default="csv", show_default=True)
 @click.option("--out", type=OutputPath(), required=True, help="Folder to write into.")
-def share(results: Path, store: Path, form: str, out: Path) -> None:
+@prints_result
+def share(results: Path, store: Path, form: str, out: Path) -> ResultLines:
     """Write RESULTS as tables or in IOHprofiler's format.
 
-    csv, parquet: tidy tables. ioh: the format of IOHprofiler. RESULTS: a configuration file whose trials were run,
-    or a folder that `share` wrote.
+    csv, parquet: tidy tables. ioh: the format of IOHprofiler. latex: the summary as a table of LaTeX (booktabs).
+    RESULTS: a configuration file whose trials were run, or a folder that `share` wrote.
     """
     from bench.result_sets.formats import share_results
 
-    for path in share_results(results, store, form, out):
-        click.echo(path)
+    return written_files(share_results(results, store, form, out))
 
 
 @click.command()
@@ -255,7 +277,8 @@ def share(results: Path, store: Path, form: str, out: Path) -> None:
     show_default=True,
     help="File of the best known trajectories.",
 )
-def draw(results: Path, store: Path, out: Path, records: Path) -> None:
+@prints_result
+def draw(results: Path, store: Path, out: Path, records: Path) -> ResultLines:
     """Draw RESULTS: ends, ranking, budgets.
 
     Writes PNG and SVG: every end with median and best known, the ranks over problems, and the medians against the
@@ -263,27 +286,30 @@ def draw(results: Path, store: Path, out: Path, records: Path) -> None:
     """
     from bench.result_sets.draw import draw_results
 
-    for path in draw_results(results, store, records, out):
-        click.echo(path)
+    return written_files(draw_results(results, store, records, out))
 
 
 @click.command()
 @click.argument("damaged", type=_PATH)
 @click.option("--out", type=OutputPath(), required=True, help="File of the new store.")
-def salvage(damaged: Path, out: Path) -> None:
+@prints_result
+def salvage(damaged: Path, out: Path) -> ResultLines:
     """Copy what is readable of a DAMAGED run store.
 
     The copy is a new store; the next run computes what it lacks.
     """
     from bench.store import salvage as save
 
-    click.echo(f"{save(damaged, out)} outcomes of {damaged} are in {out}")
+    count = save(damaged, out)
+    yield f"{count} outcomes of {damaged} are in {out}"
+    return {"outcomes": count, "files": [out]}
 
 
 @click.command()
 @click.argument("algorithms", nargs=-1)
 @click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
-def properties(algorithms: tuple[str, ...], results: Path) -> None:
+@prints_result
+def properties(algorithms: tuple[str, ...], results: Path) -> ResultLines:
     """Measure general properties of ALGORITHMS [default: all].
 
     Behaviour under translation, scale and noise, use of the bounds, and overhead. Writes properties.md and
@@ -291,8 +317,7 @@ def properties(algorithms: tuple[str, ...], results: Path) -> None:
     """
     from bench.studies.properties import write_properties
 
-    for path in write_properties(algorithms, results):
-        click.echo(path)
+    return written_files(write_properties(algorithms, results))
 
 
 _RESULTS_OPTION = click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
@@ -302,15 +327,15 @@ _RESULTS_OPTION = click.option("--results", type=OutputPath(), default=Path("res
 @click.option("--minutes", type=FiniteNumber(min=0), default=10.0, show_default=True)
 @click.option("--problem", help="Name of a problem in configs/best_known.yaml [default: all in turn].")
 @_RESULTS_OPTION
-def best_known(minutes: float, problem: str | None, results: Path) -> None:
+@prints_lines
+def best_known(minutes: float, problem: str | None, results: Path) -> Iterator[str]:
     """Search for better trajectories than the best known.
 
     Updates best_known.json. You can stop the search at any time; the next call continues from there.
     """
     from bench.studies.best_known.search import improve_best_known
 
-    for line in improve_best_known(results, minutes, problem):
-        click.echo(line)
+    return improve_best_known(results, minutes, problem)
 
 
 @click.command()
@@ -320,9 +345,10 @@ def best_known(minutes: float, problem: str | None, results: Path) -> None:
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_STORE_OPTION
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/tune"), show_default=True)
+@prints_result
 def tune(
     algorithms: tuple[str, ...], config: Path, budget: int | None, workers: int | None, store: Path, results: Path
-) -> None:
+) -> ResultLines:
     """Tune ALGORITHMS, the same budget for each [default: all].
 
     Tries hyper-parameters on training problems and judges the best ones on problems that took no part, beside the
@@ -334,14 +360,14 @@ def tune(
 
     records = Path("results/best_known.json")
     options = TuningOptions(algorithms, budget, store, results, records, workers or cpu_count())
-    for path in tune_algorithms(config, options, trial_bar):
-        click.echo(path)
+    return written_files(tune_algorithms(config, options, trial_bar))
 
 
 @click.command("does-it-help")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_RESULTS_OPTION
-def does_it_help(workers: int | None, results: Path) -> None:
+@prints_result
+def does_it_help(workers: int | None, results: Path) -> ResultLines:
     """Test whether a small condition number helps.
 
     Identifies a simulated arm with trajectories of many condition numbers. Writes paper/does_it_help.*.
@@ -350,8 +376,7 @@ def does_it_help(workers: int | None, results: Path) -> None:
 
     from bench.studies.does_it_help.study import make_does_it_help as answer
 
-    for path in answer(results, workers or cpu_count()):
-        click.echo(path)
+    return written_files(answer(results, workers or cpu_count()))
 
 
 @click.command()
@@ -368,7 +393,8 @@ def does_it_help(workers: int | None, results: Path) -> None:
 )
 @click.option("--out", type=OutputPath(), required=True)
 @_RESULTS_OPTION
-def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> None:
+@prints_result
+def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> ResultLines:
     """Write a best known trajectory for a robot controller.
 
     Refuses a trajectory that breaks a limit of PROBLEM at the controller's rate.
@@ -377,4 +403,4 @@ def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, res
     from bench.studies.best_known.records import RECORDS_FILE
 
     write(problem, record, form, out, results / RECORDS_FILE, rate_hz)
-    click.echo(out)
+    return written_files([out])

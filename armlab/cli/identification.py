@@ -1,11 +1,13 @@
 """The commands `identify`, `predict`, `coverage`, `payload` and `gains`: options only, no logic."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
 from armlab.cli.options import FiniteNumber, OutputPath
+from armlab.cli.output import prints_lines, prints_result
+from armlab.common.documents import ResultLines
 
 METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likelihood", "instrumental", "physical")
 
@@ -24,6 +26,7 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
 )
 @click.option("--select", "choose", is_flag=True, help="Choose cut-off, components and prior by cross-validation.")
 @click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
+@prints_result
 def identify(
     recording: Path,
     out: Path | None,
@@ -32,47 +35,45 @@ def identify(
     tolerance: float | None,
     choose: bool,
     as_read: bool,
-) -> None:
+) -> ResultLines:
     """Identify the parameters of an arm from RECORDING.
 
     RECORDING: a recording folder. A recording that is read wrongly is refused, with the correction.
     """
     from armlab.identification.identify import IdentifyOptions, identify_recording
 
-    for line in identify_recording(
-        recording, out or recording, IdentifyOptions(method, cutoff_hz, tolerance, choose, as_read)
-    ):
-        click.echo(line)
+    options = IdentifyOptions(method, cutoff_hz, tolerance, choose, as_read)
+    return identify_recording(recording, out or recording, options)
 
 
 @click.command()
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("recording", type=click.Path(path_type=Path))
 @click.option("--out", type=OutputPath(), help="Folder for the predicted torques, a CSV a run.")
-def predict(model: Path, recording: Path, out: Path | None) -> None:
+@prints_result
+def predict(model: Path, recording: Path, out: Path | None) -> ResultLines:
     """Compare the torque of MODEL with that of RECORDING.
 
     MODEL: a model.yaml. RECORDING: a recording folder.
     """
     from armlab.identification.identify import predict_recording
 
-    for line in predict_recording(model, recording, out):
-        click.echo(line)
+    return predict_recording(model, recording, out)
 
 
 @click.command()
 @click.option("--experiments", type=click.IntRange(min=10), default=1000, show_default=True)
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
-def coverage(experiments: int, seed: int, results: Path) -> None:
+@prints_lines
+def coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
     """Measure how often 95 % intervals contain the truth.
 
     Simulates experiments and identifies them. Writes coverage.json.
     """
     from armlab.identification.coverage import write_coverage
 
-    for line in write_coverage(experiments, seed, results):
-        click.echo(line)
+    return write_coverage(experiments, seed, results)
 
 
 def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -103,6 +104,7 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
     help="Known place of the load in the link's frame, m.",
 )
 @_add_load_options
+@prints_result
 def payload(
     loaded: Path,
     without: Path | None,
@@ -110,15 +112,14 @@ def payload(
     link: int | None,
     counterbalance: int | None,
     cutoff_hz: float | None,
-) -> None:
+) -> ResultLines:
     """Identify the load that an arm carries in LOADED.
 
     LOADED: a recording folder.
     """
     from armlab.identification.payload import PayloadSetting, Place, payload_lines
 
-    for line in payload_lines(loaded, without, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)):
-        click.echo(line)
+    return payload_lines(loaded, without, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz))
 
 
 @click.command()
@@ -133,6 +134,7 @@ def payload(
     help="Its centre of mass in the link's frame, m.",
 )
 @_add_load_options
+@prints_result
 def gains(
     loaded: Path,
     without: Path,
@@ -141,12 +143,11 @@ def gains(
     link: int | None,
     counterbalance: int | None,
     cutoff_hz: float | None,
-) -> None:
+) -> ResultLines:
     """Estimate the error of the torque gains of all joints.
 
     Uses the known load that the arm carries in LOADED, a recording folder.
     """
     from armlab.identification.payload import PayloadSetting, Place, gains_lines
 
-    for line in gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)):
-        click.echo(line)
+    return gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz))

@@ -9,56 +9,71 @@ from typing import Any
 
 import click
 
+from armlab.common.documents import FailedResultError
 from armlab.common.errors import DataError, InputError
 from bench.errors import StoppedError, TrialsFailedError
 
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-_COMMANDS = {
-    "run": "armlab.cli.harness:run",
-    "table3": "armlab.cli.harness:table3",
-    "figure2": "armlab.cli.harness:figure2",
-    "figure3": "armlab.cli.harness:figure3",
-    "paper": "armlab.cli.harness:paper",
-    "study": "armlab.cli.harness:study",
-    "list": "armlab.cli.harness:list_names",
-    "base": "armlab.cli.harness:base",
-    "check": "armlab.cli.harness:check",
-    "report": "armlab.cli.harness:report",
-    "compare": "armlab.cli.harness:compare",
-    "share": "armlab.cli.harness:share",
-    "draw": "armlab.cli.harness:draw",
-    "salvage": "armlab.cli.harness:salvage",
-    "properties": "armlab.cli.harness:properties",
-    "best-known": "armlab.cli.harness:best_known",
-    "export": "armlab.cli.harness:export",
-    "tune": "armlab.cli.harness:tune",
-    "does-it-help": "armlab.cli.harness:does_it_help",
-    "recording": "armlab.cli.recordings:recording",
-    "identify": "armlab.cli.identification:identify",
-    "predict": "armlab.cli.identification:predict",
-    "payload": "armlab.cli.identification:payload",
-    "gains": "armlab.cli.identification:gains",
-    "export-model": "armlab.cli.diagnosis:export_model",
-    "real": "armlab.cli.diagnosis:real",
-    "real-motion": "armlab.cli.diagnosis:real_motion",
-    "real-concealed": "armlab.cli.diagnosis:real_concealed",
-    "coverage": "armlab.cli.identification:coverage",
-    "diagnose": "armlab.cli.diagnosis:diagnose",
-    "relations": "armlab.cli.diagnosis:relations",
-    "tuning": "armlab.cli.diagnosis:tuning",
-    "confusability": "armlab.cli.diagnosis:confusability",
-    "conceal": "armlab.cli.proof:conceal",
-    "next": "armlab.cli.diagnosis:next_experiment",
-    "next-loop": "armlab.cli.proof:next_loop",
-    "score": "armlab.cli.proof:score",
-    "prove": "armlab.cli.proof:prove",
-    "prove-setup": "armlab.cli.proof:prove_setup",
-    "prove-changes": "armlab.cli.proof:prove_changes",
-    "ablate": "armlab.cli.proof:ablate",
-    "speed": "armlab.cli.maintenance:speed",
-    "scale": "armlab.cli.maintenance:scale",
-    "regression": "armlab.cli.maintenance:regression",
+_GROUPS = {
+    "Recordings": {
+        "recording": "armlab.cli.recordings:recording",
+    },
+    "Diagnosis": {
+        "diagnose": "armlab.cli.diagnosis:diagnose",
+        "next": "armlab.cli.diagnosis:next_experiment",
+        "confusability": "armlab.cli.diagnosis:confusability",
+        "tuning": "armlab.cli.diagnosis:tuning",
+    },
+    "Identification": {
+        "identify": "armlab.cli.identification:identify",
+        "predict": "armlab.cli.identification:predict",
+        "payload": "armlab.cli.identification:payload",
+        "gains": "armlab.cli.identification:gains",
+        "export-model": "armlab.cli.diagnosis:export_model",
+        "base": "armlab.cli.harness:base",
+    },
+    "Harness": {
+        "run": "armlab.cli.harness:run",
+        "list": "armlab.cli.harness:list_names",
+        "check": "armlab.cli.harness:check",
+        "report": "armlab.cli.harness:report",
+        "compare": "armlab.cli.harness:compare",
+        "share": "armlab.cli.harness:share",
+        "draw": "armlab.cli.harness:draw",
+        "properties": "armlab.cli.harness:properties",
+        "tune": "armlab.cli.harness:tune",
+        "best-known": "armlab.cli.harness:best_known",
+        "export": "armlab.cli.harness:export",
+        "table3": "armlab.cli.harness:table3",
+        "figure2": "armlab.cli.harness:figure2",
+        "figure3": "armlab.cli.harness:figure3",
+        "paper": "armlab.cli.harness:paper",
+        "study": "armlab.cli.harness:study",
+        "does-it-help": "armlab.cli.harness:does_it_help",
+    },
+    "Proof": {
+        "prove": "armlab.cli.proof:prove",
+        "prove-setup": "armlab.cli.proof:prove_setup",
+        "prove-changes": "armlab.cli.proof:prove_changes",
+        "conceal": "armlab.cli.proof:conceal",
+        "score": "armlab.cli.proof:score",
+        "next-loop": "armlab.cli.proof:next_loop",
+        "ablate": "armlab.cli.proof:ablate",
+        "real": "armlab.cli.diagnosis:real",
+        "real-motion": "armlab.cli.diagnosis:real_motion",
+        "real-concealed": "armlab.cli.diagnosis:real_concealed",
+        "relations": "armlab.cli.diagnosis:relations",
+        "coverage": "armlab.cli.identification:coverage",
+    },
+    "Maintenance": {
+        "doctor": "armlab.cli.maintenance:doctor",
+        "salvage": "armlab.cli.harness:salvage",
+        "speed": "armlab.cli.maintenance:speed",
+        "scale": "armlab.cli.maintenance:scale",
+        "regression": "armlab.cli.maintenance:regression",
+    },
 }
+_COMMANDS = {name: place for commands in _GROUPS.values() for name, place in commands.items()}
 
 
 class _CommandGroup(click.Group):
@@ -76,6 +91,14 @@ class _CommandGroup(click.Group):
         command: click.Command = getattr(import_module(module), name)
         return command
 
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands with their help lines, group by group."""
+        width = max(map(len, _COMMANDS))
+        for title, names in _GROUPS.items():
+            commands = [(name.ljust(width), self.get_command(ctx, name)) for name in names]
+            with formatter.section(title):
+                formatter.write_dl([(name, each.get_short_help_str(80)) for name, each in commands if each])
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command with one BLAS thread; exit codes: 2 bad input, 130 stopped, 1 failed trials."""
         os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))  # read when numpy is imported, which comes later
@@ -90,6 +113,9 @@ class _CommandGroup(click.Group):
         except TrialsFailedError as error:
             click.echo(f"armlab: {error}", err=True)
             ctx.exit(1)
+        except FailedResultError as error:
+            click.echo(f"armlab: {error}", err=True)
+            ctx.exit(error.status)
 
 
 @click.group(cls=_CommandGroup, context_settings={"help_option_names": ["-h", "--help"]})

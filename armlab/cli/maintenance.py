@@ -4,21 +4,35 @@ from pathlib import Path
 
 import click
 
-from armlab.cli.harness import trial_bar
 from armlab.cli.options import OutputPath
+from armlab.cli.output import prints_result, trial_bar
+from armlab.common.documents import ResultLines, written_files
 
 
 @click.command()
 @click.option("--results", type=OutputPath(), default=Path("results"), show_default=True)
-def speed(results: Path) -> None:
+@prints_result
+def speed(results: Path) -> ResultLines:
     """Measure speed beside that of other packages.
 
     The others are Pinocchio, mealpy, pygmo and scipy (extras `engines`, `peers`). Writes speed.json and speed.md.
     """
     from bench.studies.speed.report import write_speed_report
 
-    for path in write_speed_report(results):
-        click.echo(path)
+    return written_files(write_speed_report(results))
+
+
+@click.command()
+@prints_result
+def doctor() -> ResultLines:
+    """Examine the installation and test it shortly.
+
+    Versions, extras, compiled kernels, folders, and a self-test of a few seconds. Exit code 1 if something that is
+    needed is broken.
+    """
+    from armlab.cli.doctor import examine_installation
+
+    return examine_installation()
 
 
 _PATH = click.Path(path_type=Path)

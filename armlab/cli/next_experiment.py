@@ -4,10 +4,10 @@ Apart from the click commands, since it imports the diagnosis, and `armlab --hel
 """
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.next.card import card_content, card_lines, draw_card
@@ -28,7 +28,7 @@ def write_next_experiment(
     links: str | None,
     rate_hz: float,
     out: Path,
-) -> Iterator[str]:
+) -> ResultLines:
     """Designs and writes the next experiment, and yields the lines of its card.
 
     Raises InputError for a file or an option that cannot be used.
@@ -36,12 +36,13 @@ def write_next_experiment(
     known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
     experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links)
     yield from card_lines(experiment)
-    files: dict[str, str | bytes] = {
-        "next.json": json.dumps(card_content(experiment), indent=1, allow_nan=False) + "\n"
-    }
+    card = card_content(experiment)
+    files: dict[str, str | bytes] = {"next.json": json.dumps(card, indent=1, allow_nan=False) + "\n"}
     motion, left_out = _motion_files(experiment, rate_hz)
-    yield from (f"wrote {path}" for path in write_texts(files | motion, out))
+    written = write_texts(files | motion, out)
+    yield from (f"wrote {path}" for path in written)
     yield from (f"left out {out / name}: {reason}" for name, reason in left_out.items())
+    return card | {"files": written, "left_out": left_out}
 
 
 def _motion_files(experiment: Experiment, rate_hz: float) -> tuple[dict[str, str | bytes], dict[str, str]]:

@@ -1,11 +1,14 @@
 """Commands on concealed cases: make and score them, the proof, the value of each guard, and the closed loop."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
 import click
 
 from armlab.cli.options import OutputPath
+from armlab.cli.output import prints_lines, prints_result
+from armlab.common.documents import ResultLines
 
 _FOLDER = click.Path(path_type=Path)
 
@@ -24,7 +27,10 @@ _FOLDER = click.Path(path_type=Path)
     metavar="NUMBER=VALUE",
     help="A tuning number with another value too, like noise.max_order=8.",
 )
-def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int, changes: tuple[str, ...]) -> None:
+@prints_lines
+def ablate(
+    seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: int, changes: tuple[str, ...]
+) -> Iterator[str]:
     """Measure what each guard of the diagnosis is worth.
 
     Diagnoses concealed cases with one guard off at a time, and with one tuning number changed at a time (extra
@@ -42,8 +48,7 @@ def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: i
         vary(Settings(), *parse_change(change))
     settings = AblationSettings(seed, cases, nulls, changes)
     diagnose = partial(verdicts_without_each, changes=changes)
-    for line in run_ablation(settings, diagnose, work, results, jobs):
-        click.echo(line)
+    return run_ablation(settings, diagnose, work, results, jobs)
 
 
 @click.command("next-loop")
@@ -57,7 +62,8 @@ def ablate(seed: int, cases: int, nulls: int, work: Path, results: Path, jobs: i
 )
 @click.option("--results", type=OutputPath(), help="Folder for table and picture [default: OUT/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
-def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> None:
+@prints_lines
+def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> Iterator[str]:
     """Measure how well a second motion decides between rivals.
 
     Makes ambiguous recordings, diagnoses them, adds a second motion, diagnoses both, and counts how often the right
@@ -73,13 +79,13 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
 
     settings = LoopSettings(cases, seed)
     answers = seal_loop(settings, out)
-    click.echo(f"sealed {out / 'truth'}, SHA-256 of the answers {answers}")
+    yield f"sealed {out / 'truth'}, SHA-256 of the answers {answers}"
     tools = Tools(write_diagnosis, suspect_rivals, plan_second_motion)
     for _ in tqdm(play_cases(settings, out, tools, jobs), total=cases, unit="case"):
         pass
     manifest = close_loop(settings, out, answers)
     for path in write_page(settings, read_results(settings, out), Seals(answers, manifest), results or out / "score"):
-        click.echo(f"wrote {path}")
+        yield f"wrote {path}"
 
 
 @click.command()
@@ -90,6 +96,7 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
 @click.option("--development", is_flag=True, help="Leave out the kinds of noise of judged sets.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
 @click.option("--out", type=OutputPath(), required=True, help="Folder for observations, truth and manifest.")
+@prints_result
 def conceal(
     cases: int,
     seed: int,
@@ -98,7 +105,7 @@ def conceal(
     development: bool,
     jobs: int,
     out: Path,
-) -> None:
+) -> ResultLines:
     """Make recordings with hidden effects and sealed answers.
 
     Needs the extra `engines`.
@@ -111,7 +118,8 @@ def conceal(
     for _ in tqdm(conceal_cases(settings, out, jobs), total=cases, unit="case", desc="concealed"):
         pass
     _, sealed = seal_set(settings, out)
-    click.echo(f"{out / MANIFEST_FILE} SHA-256 {sealed}")
+    yield f"{out / MANIFEST_FILE} SHA-256 {sealed}"
+    return {"manifest": out / MANIFEST_FILE, "sha256": sealed}
 
 
 @click.command()
@@ -119,15 +127,17 @@ def conceal(
 @click.option("--verdicts", type=_FOLDER, required=True, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
 @click.option("--out", type=OutputPath(), help="Folder for the score [default: VERDICTS/score].")
-def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> None:
+@prints_result
+def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> ResultLines:
     """Score verdicts against the sealed answers of FOLDER.
 
     FOLDER: a concealed set.
     """
     from armlab.concealed.score.scoring import format_lines, score_set
 
-    for line in format_lines(score_set(folder, verdicts, manifest, out or verdicts / "score")):
-        click.echo(line)
+    document = score_set(folder, verdicts, manifest, out or verdicts / "score")
+    yield from format_lines(document)
+    return document
 
 
 @click.command()
@@ -138,9 +148,10 @@ def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) 
 @click.option("--work", type=_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
 @click.option("--results", type=OutputPath(), help="Folder for scores [default: results/proof].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@prints_lines
 def prove(
     quick: bool, development: int | None, cases: int, nulls: int, work: Path | None, results: Path | None, jobs: int
-) -> None:
+) -> Iterator[str]:
     """Prove the diagnosis: conceal, diagnose blindly, score.
 
     Logs the score. After an interruption the same command continues (extra `engines`).
@@ -151,8 +162,7 @@ def prove(
     proof = choose_proof(quick, development, cases, nulls)
     folder = work or Path(".armlab/proof") / proof.name
     scores = results or (Path("results/proof") if proof.commit else folder / "score")
-    for line in run_proof(proof, folder, scores, jobs):
-        click.echo(line)
+    return run_proof(proof, folder, scores, jobs)
 
 
 @click.command("prove-changes")
@@ -162,9 +172,10 @@ def prove(
 @click.option("--work", type=_FOLDER, help="Folder for pairs and verdicts [default: .armlab/changes/SEED].")
 @click.option("--results", type=OutputPath(), help="Folder for changes.md and changes.json [default: WORK/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@prints_lines
 def prove_changes(
     nulls: int, changed: int, seed: int | None, work: Path | None, results: Path | None, jobs: int
-) -> None:
+) -> Iterator[str]:
     """Prove the comparison of recordings.
 
     Makes pairs of recordings of one robot, with nothing or one thing changed, compares them blindly, and scores. After
@@ -175,8 +186,7 @@ def prove_changes(
 
     chosen = judged_seed(head_commit()) if seed is None else seed
     folder = work or Path(f".armlab/changes/{chosen}")
-    for line in prove_pairs(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs):
-        click.echo(line)
+    return prove_pairs(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs)
 
 
 @click.command("prove-setup")
@@ -187,6 +197,7 @@ def prove_changes(
 @click.option("--work", type=_FOLDER, help="Folder for cases and verdicts [default: .armlab/setup/SEED].")
 @click.option("--results", type=_FOLDER, help="Folder for setup.md and setup.json [default: WORK/score].")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@prints_lines
 def prove_setup(
     simulated: int,
     real: int,
@@ -195,7 +206,7 @@ def prove_setup(
     work: Path | None,
     results: Path | None,
     jobs: int,
-) -> None:
+) -> Iterator[str]:
     """Prove that recordings are read rightly.
 
     Puts mistakes into simulated and public recordings, diagnoses them blindly, and scores: physics, too, where some is
@@ -208,5 +219,4 @@ def prove_setup(
     chosen = judged_seed(head_commit()) if seed is None else seed
     folder = work or Path(f".armlab/setup/{chosen}")
     cases = SetupSet(simulated, real, nulls, chosen)
-    for line in run_proof(cases, folder, results or folder / "score", jobs):
-        click.echo(line)
+    return run_proof(cases, folder, results or folder / "score", jobs)

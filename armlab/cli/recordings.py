@@ -8,7 +8,8 @@ from typing import Any
 import click
 
 from armlab.cli.options import OutputPath
-from armlab.common.errors import InputError
+from armlab.cli.output import prints_result
+from armlab.common.documents import FailedResultError, ResultLines
 
 PUBLIC_RECORDING_NAMES = (
     "kuka-kr300",
@@ -43,7 +44,8 @@ def recording() -> None:
 @recording.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--out", type=OutputPath(), help="HTML file to write [default: NAME-check.html].")
-def check(folder: Path, out: Path | None) -> None:
+@prints_result
+def check(folder: Path, out: Path | None) -> ResultLines:
     """Check and draw a recording.
 
     Lists errors, repairs and suspicious channels, and draws the signals on one HTML page.
@@ -53,17 +55,21 @@ def check(folder: Path, out: Path | None) -> None:
 
     found = check_recording(folder)
     page = write_check_page(found, out or Path(f"{found.recording.name}-check.html"))
-    for line in found.lines or ("nothing was repaired and nothing looks wrong",):
-        click.echo(line)
-    click.echo(f"page: {page}")
+    document = found.document | {"files": [page]}
+    yield from found.lines or ("nothing was repaired and nothing looks wrong",)
+    yield f"page: {page}"
     if found.refused:
-        raise InputError(f"{len(found.refused)} of the run files of {folder} cannot be used; the lines above say why")
+        count = len(found.refused)
+        message = f"{count} of the run files of {folder} cannot be used; the lines above say why"
+        raise FailedResultError(message, document, status=2)
+    return document
 
 
 @recording.command()
 @click.argument("name", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
 @click.option("--out", type=OutputPath(), help="New folder for the recording [default: NAME].")
-def fetch(name: str, out: Path | None) -> None:
+@prints_result
+def fetch(name: str, out: Path | None) -> ResultLines:
     """Fetch a public recording of a real arm.
 
     The recording is written as a recording folder.
@@ -72,12 +78,12 @@ def fetch(name: str, out: Path | None) -> None:
     from armlab.recordings.public_motion import fetch_motion_recording
 
     if name in PUBLIC_MOTION_NAMES:
-        click.echo(
-            f"{fetch_motion_recording(name, out or Path(name))}: motion only; its recording.yaml names the source"
-        )
-        return
-    folder = fetch_recording(name, out or Path(name))
-    click.echo(f"{folder}: from {PUBLIC_RECORDINGS[name].source}, licence {PUBLIC_RECORDINGS[name].licence}")
+        folder = fetch_motion_recording(name, out or Path(name))
+        yield f"{folder}: motion only; its recording.yaml names the source"
+        return {"recording": folder}
+    folder, public = fetch_recording(name, out or Path(name)), PUBLIC_RECORDINGS[name]
+    yield f"{folder}: from {public.source}, licence {public.licence}"
+    return {"recording": folder, "source": public.source, "licence": public.licence}
 
 
 def _column_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -100,7 +106,8 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
 @click.option("--topic", help="Topic of the joint states in a bag.")
 @click.option("--ask/--no-ask", default=None, help="Ask for missing options [default: ask if the input is a terminal].")
-def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> None:
+@prints_result
+def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> ResultLines:
     """Convert files of other formats.
 
     Reads .mat, ROS bags, MCAP, Parquet, CSV of any layout and LeRobot datasets, and writes a new recording folder.
@@ -112,6 +119,6 @@ def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any
 
     asked = sys.stdin.isatty() if ask is None else ask
     prompt = (lambda text, default: str(click.prompt(text, default=default, err=True))) if asked else None
-    lines = import_files(files, out, options, prompt)
-    for line in lines:
-        click.echo(line)
+    imported = import_files(files, out, options, prompt)
+    yield from imported.lines
+    return imported.document

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from armlab.common.arrays import Array
+from armlab.common.notebook import notebook_html
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.formats import Status
@@ -159,3 +160,11 @@ class Diagnosis:
         if len(self.claims) > 4:
             lines.append(f"  and {len(self.claims) - 4} more claims")
         return "\n".join(lines if self.claims else [*lines, f"  {self.summary}"])
+
+    def _repr_html_(self) -> str:
+        rows: list[tuple[object, ...]] = [
+            ("setup", "", each.text) for each in (self.setup.findings if self.setup else ())
+        ]
+        rows += [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.claims]
+        title = f"Diagnosis of {self.recording.name}: {self.status}"
+        return notebook_html(title, self.summary, ("effect", "joint", "equation"), rows)

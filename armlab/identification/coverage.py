@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.files import write_texts
 from armlab.effects.scene import Scene
 from armlab.identification.components import usual_components
 from armlab.identification.identifier import Identifier
@@ -112,13 +112,8 @@ def write_coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
         np.average([row["coverage"] for row in rows.values()], weights=[row["experiments"] for row in rows.values()])
     )
     yield f"all: {100 * total:.1f} % in {experiments} experiments"
-    path = results / "coverage.json"
-    try:
-        results.mkdir(parents=True, exist_ok=True)
-        path.write_text(json.dumps({"seed": seed, "coverage": total, "kinds": rows}, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    yield str(path)
+    text = json.dumps({"seed": seed, "coverage": total, "kinds": rows}, indent=2, allow_nan=False) + "\n"
+    yield from map(str, write_texts({"coverage.json": text}, results))
 
 
 def _coverage_row(held: np.ndarray) -> dict[str, float]:

@@ -1,6 +1,5 @@
 """The flows of `armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
 from importlib.metadata import version
@@ -8,11 +7,12 @@ from pathlib import Path
 
 import pandas as pd
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
-from armlab.identification.model_file import model_text
+from armlab.identification.model_file import model_content, model_text
 from armlab.identification.pictures import png_data_url
 from armlab.identification.priors import NO_PULL, Pull
 from armlab.identification.selection import (
@@ -65,8 +65,10 @@ class IdentifyOptions:
     as_read: bool = False
 
 
-def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Iterator[str]:
+def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> ResultLines:
     """Identifies, writes model.yaml and report.html into `out`, and yields lines with parameters and errors.
+
+    The document has the content of the model and the errors of each run.
 
     Raises InputError, in one line, for a recording that cannot be used or is read wrongly, and options that do not fit
     it. `corrected/` in `out` then holds the recording as it should be read.
@@ -98,6 +100,15 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Ite
     file, report = write_texts({"model.yaml": model_text(model, out), "report.html": page}, out)
     yield f"model: {file}"
     yield f"page: {report}"
+    return {
+        "recording": recording.name,
+        "model": model_content(model, out),
+        "condition_number": identifier.condition_number_,
+        "left_out": [part.label for part in identifier.absorbed_],
+        "errors": errors,
+        "validated": bool(recording.with_role("validate")),
+        "files": [file, report],
+    }
 
 
 def wrong_reading(recording: Recording) -> tuple[str, Answer] | None:
@@ -144,15 +155,19 @@ def robot_path(recording: Recording) -> str:
     return str(beside) if beside.is_file() else recording.robot
 
 
-def predict_recording(path: Path, folder: Path, out: Path | None) -> Iterator[str]:
+def predict_recording(path: Path, folder: Path, out: Path | None) -> ResultLines:
     """Errors of a model on each run of a recording, in lines; predicted torques as CSV files into `out`."""
     model, recording = Model.load(path), load_recording(folder)
     if len(model.arm) != len(recording.arm):
         raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
-    yield error_table(tuple(run_error(model, model.signals(run)) for run in recording.runs))
+    errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
+    yield error_table(errors)
+    written: tuple[Path, ...] = ()
     if out is not None:
         texts = {f"{run.name.replace('/', '-')}.predicted.csv": _torque_text(model, run) for run in recording.runs}
-        yield from map(str, write_texts(texts, out))
+        written = write_texts(texts, out)
+        yield from map(str, written)
+    return {"recording": recording.name, "errors": errors, "files": written}
 
 
 def _torque_text(model: Model, run: Run) -> str:

@@ -91,6 +91,11 @@ def write_model(model: TorqueModel, path: Path) -> Path:
 
 def model_text(model: TorqueModel, folder: Path) -> str:
     """The text of `model.yaml` as it is to stand in a folder."""
+    return yaml.safe_dump(model_content(model, folder), sort_keys=False, default_flow_style=None, width=110)
+
+
+def model_content(model: TorqueModel, folder: Path) -> dict[str, Any]:
+    """The content of `model.yaml` as it is to stand in a folder."""
     content: dict[str, Any] = {"schema": SCHEMA, "robot": _robot_as_written(model.robot, folder)}
     if model.inertial is not None:
         content |= {"links": [_link_entry(ten) for ten in model.inertial.reshape(-1, 10)]}
@@ -103,7 +108,7 @@ def model_text(model: TorqueModel, folder: Path) -> str:
     factor = {"interval_factor": None if model.covariance is None else model.factor}
     provenance = {**model.provenance, **filters, **factor}
     content["provenance"] = {key: value for key, value in provenance.items() if value is not None}
-    return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
+    return content
 
 
 def _robot_as_written(robot: str, folder: Path) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.documents import Document, ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.effects.drive import RotorInertia, TorqueOffset
 from armlab.identification.components import usual_components
@@ -268,22 +269,30 @@ def _payload_structure(arm: Arm, setting: PayloadSetting, nominal: bool) -> Stru
     return structure if nominal else structure.separable()[0]  # beside links that are held, nothing is absorbed by them
 
 
-def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -> Iterator[str]:
+def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -> ResultLines:
     """The load of a recording, with intervals; InputError, in one line, where the recordings do not determine it."""
     task = _PayloadTask.of(loaded, without, setting)
     try:
         payload = identify_payload(task.structure, task.without, task.loaded, setting.place)
     except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
-    yield from _payload_table(payload, mass_alone=setting.place.centre is not None)
+    rows = list(_payload_rows(payload, mass_alone=setting.place.centre is not None))
+    yield from (_interval_line(*row) for row in rows)
+    link = setting.place.link or len(task.structure.arm)
+    return {"link": link, "parameters": {name: _interval(value, half, unit) for name, value, half, unit in rows}}
 
 
-def _payload_table(payload: Payload, mass_alone: bool) -> Iterator[str]:
+def _payload_rows(payload: Payload, mass_alone: bool) -> Iterator[tuple[str, float, float, str]]:
+    """Name, value, half width of the interval and unit of each number of a load."""
     rows = list(zip(PARAMETER_NAMES, payload.parameters, payload.half_widths, PARAMETER_UNITS, strict=True))
-    yield from (_interval_line(*row) for row in rows[: 1 if mass_alone else 10])
+    yield from rows[: 1 if mass_alone else 10]
     if not mass_alone and payload.parameters[0] > 0:
-        centre = zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, strict=True)
-        yield from (_interval_line(*row, "m") for row in centre)
+        yield from zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, ["m"] * 3, strict=True)
+
+
+def _interval(value: float, half: float, unit: str) -> Document:
+    """A number as a verdict writes it."""
+    return {"value": value, "ci95": [value - half, value + half], "unit": unit}
 
 
 def _interval_line(name: str, value: float, half: float, unit: str) -> str:
@@ -292,7 +301,7 @@ def _interval_line(name: str, value: float, half: float, unit: str) -> str:
     return f"{name} = {value:.{decimals}f} [{value - half:.{decimals}f}, {value + half:.{decimals}f}] {unit}"
 
 
-def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSetting) -> Iterator[str]:
+def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSetting) -> ResultLines:
     """The gain of each joint's torque reading from a load of known mass at a known point."""
     task = _PayloadTask.of(loaded, without, setting)
     load = link_from_centre_of_mass(mass, np.array(setting.place.centre or (0.0, 0.0, 0.0)), np.zeros((3, 3)))
@@ -301,6 +310,8 @@ def gains_lines(loaded: Path, without: Path, mass: float, setting: PayloadSettin
     except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
     yield from _gains_table(gains)
+    pairs = enumerate(zip(gains.gains, gains.half_widths, strict=True), 1)
+    return {"gains": [{"joint": joint, **_interval(gain, half, "1")} for joint, (gain, half) in pairs]}
 
 
 def _gains_table(gains: TorqueGains) -> Iterator[str]:

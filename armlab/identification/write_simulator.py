@@ -1,8 +1,9 @@
 """`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.identification.export import (
@@ -18,7 +19,7 @@ from armlab.identification.patch import Patched, patched_mjcf, patched_urdf
 FORMATS = (".urdf", ".xml")
 
 
-def export_model(path: Path, out: Path) -> Iterator[str]:
+def export_model(path: Path, out: Path) -> ResultLines:
     """Writes the file and says what it does not hold.
 
     A model of a URDF becomes that URDF with other numbers, and that of an MJCF likewise; any other model becomes a
@@ -40,12 +41,14 @@ def export_model(path: Path, out: Path) -> Iterator[str]:
                 "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
             )
     _refuse_input_files((path, source), texts, out)
-    yield from map(str, write_texts(texts, out.parent))
+    written = write_texts(texts, out.parent)
+    yield from map(str, written)
     yield from notes
     if missing:
         yield "not in the file: " + "; ".join(missing)
     if simulated.thickened_links:
         yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
+    return {"files": written, "not_in_the_file": missing, "thickened_links": simulated.thickened_links, "notes": notes}
 
 
 def _document(simulated: SimulatorModel, source: Path, out: Path) -> Patched:

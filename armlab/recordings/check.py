@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.documents import Document
 from armlab.common.errors import InputError
 from armlab.recordings.load import load_runs, open_recording, with_runs
 from armlab.recordings.motion import (
@@ -170,6 +171,22 @@ class CheckResult:
         """One line a finding, as the terminal shows them."""
         found = [f"{run}: {finding.severity}: {finding.text}" for run, finding in self.findings]
         return (*(f"{file}: refused: {reason}" for file, reason in self.refused), *found)
+
+    @property
+    def document(self) -> Document:
+        """The same for programs."""
+        return {
+            "recording": self.recording.name,
+            "runs": [
+                {"name": run.name, "role": run.role, "samples": run.samples, "rate_hz": run.rate_hz}
+                for run in self.recording.runs
+            ],
+            "refused": [{"file": file, "reason": reason} for file, reason in self.refused],
+            "findings": [
+                {"run": run, "kind": each.kind, "severity": each.severity, "joint": each.joint, "text": each.text}
+                for run, each in self.findings
+            ],
+        }
 
 
 def check_recording(folder: Path) -> CheckResult:

@@ -96,9 +96,7 @@ def fetch_motion_recording(name: str, folder: Path) -> Path:
         draft, robot = _so101(), _file("so101", "model/so101_new_calib.xml", SO101_SOURCE).read_text(encoding="utf-8")
     else:
         draft, robot = _xl330(name), PENDULUM
-    write_recording(draft, folder)
-    (folder / draft.robot).write_text(robot, encoding="utf-8")
-    return folder
+    return write_recording(draft, folder, {draft.robot: robot})
 
 
 def _file(folder: str, name: str, source: str) -> Path:

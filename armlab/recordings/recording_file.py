@@ -1,8 +1,10 @@
 """The folder of a recording: the keys of `recording.yaml`, the reader of the file, and the writer of a new folder."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 import pandas as pd
@@ -235,8 +237,8 @@ class Draft:
         return {"schema": "recording/1", "robot": self.robot, **given}
 
 
-def write_recording(draft: Draft, folder: Path) -> Path:
-    """Writes a draft into a new folder and returns its path.
+def write_recording(draft: Draft, folder: Path, beside: Mapping[str, str] = MappingProxyType({})) -> Path:
+    """Writes a draft into a new folder and returns its path. beside: further files by name, such as the robot.
 
     Raises InputError for a folder that holds something already and for a draft that is no valid recording.
     """
@@ -246,7 +248,7 @@ def write_recording(draft: Draft, folder: Path) -> Path:
     file = validate(RecordingFile, settings, str(folder / FILE_NAME))
     wanted = [name for names in file.columns.signals().values() for name in names]
     texts = {run.file: _to_csv(run, wanted) for run in draft.runs}
-    write_texts({**texts, FILE_NAME: _to_yaml(settings, draft.source)}, folder)
+    write_texts({**texts, **beside, FILE_NAME: _to_yaml(settings, draft.source)}, folder)
     return folder
 
 

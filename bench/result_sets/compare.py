@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
+from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
-from armlab.common.files import write_whole
+from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.statistics import adjust_by_holm
-from bench.result_sets.formats import make_folder, read_results
+from bench.result_sets.formats import read_results
 from bench.result_sets.result_set import CELL_COLUMNS, ResultSet
 from bench.statistics import is_feasible, quantile
 from bench.statistics.pairwise import log_losses, signed_rank_p, superiority, superiority_unpaired
@@ -106,8 +107,10 @@ _CHANGE_NAMES = {"better": "better", "worse": "worse", "=": "not told apart"}
 _TEST_NAMES = {True: "Wilcoxon's signed-rank test, paired by repetition", False: "Mann and Whitney's rank-sum test"}
 
 
-def compare_results(first: Path, second: Path, store: Path, out: Path | None) -> str:
+def compare_results(first: Path, second: Path, store: Path, out: Path | None) -> ResultLines:
     """The page of a comparison, in Markdown; with `out` also `comparison.md` and `comparison.csv` in that folder.
+
+    The document has a row a comparison.
 
     Raises InputError, in one line, if there are no results or the two have nothing in common.
     """
@@ -116,11 +119,11 @@ def compare_results(first: Path, second: Path, store: Path, out: Path | None) ->
     if table.empty:
         raise InputError(f"{first} and {second} have no problem, budget and algorithm in common")
     text = _comparison_page(*sets, table)
-    if out is not None:
-        make_folder(out)
-        write_whole(out / "comparison.md", text)
-        write_whole(out / "comparison.csv", as_csv(table))
-    return text
+    pages = {"comparison.md": text, "comparison.csv": as_csv(table)}
+    written = () if out is None else write_texts(pages, out)
+    yield text.rstrip("\n")
+    names = {"first": sets[0].name, "second": sets[1].name}
+    return {**names, "paired": are_paired(*sets), "comparisons": table.to_dict("records"), "files": written}
 
 
 def _comparison_page(first: ResultSet, second: ResultSet, table: pd.DataFrame) -> str:

@@ -23,6 +23,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from bench.result_sets.result_set import TRIAL_COLUMNS, ResultSet, TableOfCurves, read_stored_results, runs_by_algorithm
 from bench.statistics.performance import Run
+from bench.tables import summary_latex, summary_table
 
 SETTINGS, ORIGINS, TABLES = "settings.yaml", "origins.json", ("trials", "curves")
 _README_TEXT = """\
@@ -120,6 +121,14 @@ _WRITERS: dict[str, Callable[[Iterator[pd.DataFrame]], Any]] = {"csv": _to_csv, 
 _READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": pd.read_csv, "parquet": pd.read_parquet}
 
 
+def write_latex(results: ResultSet, folder: Path) -> list[Path]:
+    """Write the summary of a result set into a folder as a table of LaTeX; returns the file."""
+    path = folder / f"{results.name}.tex"
+    make_folder(folder)
+    write_whole(path, summary_latex(summary_table(results.trials)))
+    return [path]
+
+
 NOTHING_KNOWN = float(np.finfo(float).max)
 _IOH_VERSION = "0.3.5"  # of the format
 
@@ -186,6 +195,7 @@ SHARED_FORMATS: Mapping[str, Callable[[ResultSet, Path], list[Path]]] = MappingP
         "csv": lambda results, folder: write_tidy(results, folder, "csv"),
         "parquet": lambda results, folder: write_tidy(results, folder, "parquet"),
         "ioh": write_iohprofiler,
+        "latex": write_latex,
     }
 )
 

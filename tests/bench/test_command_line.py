@@ -26,7 +26,7 @@ def test_the_help_line_of_every_command_fits_into_a_terminal_of_eighty_columns()
     for group in ([], ["recording"]):
         told = CliRunner().invoke(main, [*group, "--help"], terminal_width=80)
         assert told.exit_code == 0
-        assert "..." not in told.output.partition("Commands:")[2]
+        assert "..." not in told.output.partition("Options:")[2]
 
 
 def test_run_writes_table_page_times_and_settings(armlab: Armlab, small: Path, tmp_path: Path) -> None:

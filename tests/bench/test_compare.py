@@ -70,22 +70,22 @@ def test_an_infeasible_end_counts_as_the_worst(results: ResultSet) -> None:
 
 def test_the_page_tells_the_verdict_and_writes_it_to_a_folder(small_run: Ran, tmp_path: Path) -> None:
     share_results(*small_run, "csv", tmp_path / "theirs")
-    text = compare_results(small_run.config, tmp_path / "theirs", small_run.store, tmp_path / "out")
+    (text,) = compare_results(small_run.config, tmp_path / "theirs", small_run.store, tmp_path / "out")
     assert "0 better, 0 worse, 6 not told apart." in text
     assert "| sphere | spso |" in text
-    assert (tmp_path / "out" / "comparison.md").read_text() == text
+    assert (tmp_path / "out" / "comparison.md").read_text() == text + "\n"
     assert len((tmp_path / "out" / "comparison.csv").read_text().splitlines()) == 7
 
 
 def test_a_problem_with_other_settings_under_the_same_name_is_pointed_out(small_run: Ran, tmp_path: Path) -> None:
     other = ran(tmp_path, CONFIG.replace("dimension: 3, shift_seed: 1", "dimension: 3, shift_seed: 5"))
     share_results(*other, "csv", tmp_path / "theirs")
-    text = compare_results(small_run.config, tmp_path / "theirs", small_run.store, None)
+    (text,) = compare_results(small_run.config, tmp_path / "theirs", small_run.store, None)
     assert "Not the same problem in both sets: sphere." in text
 
 
 def test_sets_with_nothing_in_common_are_refused(small_run: Ran, tmp_path: Path) -> None:
     other = ran(tmp_path, CONFIG.replace("iterations: 9", "iterations: 3"))
     share_results(*other, "csv", tmp_path / "theirs")
-    told = refusal(compare_results, small_run.config, tmp_path / "theirs", small_run.store, None)
+    told = refusal(next, compare_results(small_run.config, tmp_path / "theirs", small_run.store, None))
     assert told.endswith("have no problem, budget and algorithm in common")

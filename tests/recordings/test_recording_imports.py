@@ -77,7 +77,7 @@ def test_numbers_in_a_comment_are_no_measurement(tmp_path: Path) -> None:
 def test_a_cut_last_row_of_an_odd_file_is_left_out_and_said_so(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text() + "9.9,0.1")
-    lines = import_files([path], tmp_path / "new", OPTIONS, None)
+    lines = import_files([path], tmp_path / "new", OPTIONS, None).lines
     assert "the last row (line 1602) has 2 cells of 7; left out" in lines[0]
 
 

@@ -12,6 +12,7 @@ from datetime import date
 import numpy as np
 
 from armlab.common.errors import InputError
+from armlab.common.notebook import notebook_html
 from armlab.diagnosis.compare.changes import ChangeTable, Tested, make_table
 from armlab.diagnosis.compare.named import NamedChange, list_table, name_changes
 from armlab.diagnosis.compare.numbers import Change, common_values, list_movements
@@ -67,6 +68,12 @@ class Comparison:
             return "\n".join([*lines, f"  {self.reason}"])
         lines += [f"  {each.effect}@{each.joint}: {each.equation}" for each in self.named]
         return "\n".join([*lines, f"  parameters compared: {len(self.changes)}"])
+
+    def _repr_html_(self) -> str:
+        rows = [(each.effect, "" if each.joint is None else each.joint, each.equation) for each in self.named]
+        title = f"Comparison of {', '.join(self.names)}: {self.status}"
+        text = self.reason or f"parameters compared: {len(self.changes)}"
+        return notebook_html(title, text, ("effect", "joint", "change"), rows)
 
 
 def compare(

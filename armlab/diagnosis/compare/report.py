@@ -11,6 +11,7 @@ from typing import Any, get_args
 
 import numpy as np
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.compare.comparison import Comparison, compare
@@ -430,8 +431,10 @@ def compare_recordings(
     seed: int,
     dates: Sequence[date] = (),
     progress: Callable[[str], None] = lambda message: None,
-) -> Iterator[str]:
+) -> ResultLines:
     """Compares, writes comparison.json and comparison.html into `out`, both or none, and yields lines to print.
+
+    The document is the content of comparison.json, with the written files beside it.
 
     folders: of the recordings, the oldest first. dates: of each; those of their files if left out. Raises InputError,
     in one line, for recordings that cannot be used or are not of one robot.
@@ -446,10 +449,9 @@ def compare_recordings(
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += ["--dates", ",".join(each.isoformat() for each in dates)] if dates else []
     command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out), *options])
-    texts = {
-        "comparison.json": make_comparison_file(comparison).to_json(),
-        "comparison.html": comparison_page(comparison, command),
-    }
-    write_texts(texts, out)
+    file = make_comparison_file(comparison)
+    texts = {"comparison.json": file.to_json(), "comparison.html": comparison_page(comparison, command)}
+    written = write_texts(texts, out)
     yield from comparison_lines(comparison)
     yield f"wrote {out}: {', '.join(texts)}"
+    return file.content() | {"files": written}

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.confusability.card import (
@@ -242,7 +243,7 @@ def _classes_table(card: Card, view: str) -> str:
 
 def write_card(
     robot: str, trajectory: str, joints: int | None, noise: tuple[float, ...], out: Path | None
-) -> Iterator[str]:
+) -> ResultLines:
     """Yields the lines of the card, and writes it as files where a folder is given.
 
     Raises InputError, in one line, for joints, a trajectory or a noise that do not fit the arm.
@@ -258,6 +259,7 @@ def write_card(
     except DataError as error:
         raise InputError(f"{trajectory}: {error}") from None
     yield from card_lines(card)
+    written: tuple[Path, ...] = ()
     if out is not None:
         maps = {
             f"figures/{view}_joint{joint}.svg": draw_heat_map(card, view, joint) + "\n"
@@ -270,8 +272,9 @@ def write_card(
             "confusability.csv": card_csv(card),
             "confusability.json": json.dumps(card_content(card), indent=1, allow_nan=False) + "\n",
         }
-        write_texts(texts | maps, out)
+        written = write_texts(texts | maps, out)
         yield f"wrote {out}: {', '.join(texts)}, {len(maps)} pictures in figures"
+    return card_content(card) | {"files": written}
 
 
 def _noise_by_joint(given: tuple[float, ...], arm: Arm) -> Array | None:

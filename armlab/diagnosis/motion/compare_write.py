@@ -1,9 +1,10 @@
 """Compares two recordings of motion only and writes comparison.json and a page."""
 
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import (
@@ -133,7 +134,7 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
 
 def compare_motion_recordings(
     folders: Sequence[Path], out: Path, progress: Callable[[str], None] = lambda message: None
-) -> Iterator[str]:
+) -> ResultLines:
     """Compares two recordings, writes comparison.json and comparison.html into `out`, and yields lines to print.
 
     Raises InputError, in one line, for recordings that cannot be used, and for more than two.
@@ -143,8 +144,10 @@ def compare_motion_recordings(
     old, new = (load_motion_recording(folder) for folder in folders)
     comparison = compare_motion(old, new, progress)
     command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out)])
-    texts = {"comparison.json": make_motion_comparison(comparison).to_json()}
-    write_texts(texts | {"comparison.html": comparison_page(comparison, command)}, out)
-    yield f"{make_motion_comparison(comparison).status.upper()}: {comparison_summary(comparison)}"
+    file = make_motion_comparison(comparison)
+    texts = {"comparison.json": file.to_json(), "comparison.html": comparison_page(comparison, command)}
+    written = write_texts(texts, out)
+    yield f"{file.status.upper()}: {file.summary}"
     yield from (f"  {note}" for note in comparison.notes)
-    yield f"wrote {out}: comparison.json, comparison.html"
+    yield f"wrote {out}: {', '.join(texts)}"
+    return file.content() | {"files": written}

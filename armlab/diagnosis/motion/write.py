@@ -1,21 +1,22 @@
 """Diagnoses a recording of motion only and writes verdict, model, simulation and report into a folder."""
 
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.diagnosis.motion.report import motion_page
-from armlab.diagnosis.motion.verdict import motion_texts
+from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.words import motion_lines
 from armlab.recordings.motion import load_motion_recording
 
 
 def diagnose_motion_recording(
     folder: Path, out: Path, progress: Callable[[str], None] = lambda message: None
-) -> Iterator[str]:
+) -> ResultLines:
     """Diagnoses the recording in `folder`, writes all files into `out` or none, and yields lines to print.
 
     Raises InputError, in one line, for a recording that cannot be used.
@@ -26,8 +27,9 @@ def diagnose_motion_recording(
     diagnosis = diagnose_motion(recording, progress)
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out)])
     texts = motion_texts(diagnosis, out) | {"report.html": motion_page(diagnosis, command)}
-    write_texts(texts, out)
+    written = write_texts(texts, out)
     yield from motion_lines(diagnosis)
     yield f"wrote {out}: {', '.join(texts)}"
     if diagnosis.seconds:
         yield f"diagnosed in {diagnosis.seconds:.1f} s once read"
+    return make_motion_verdict(diagnosis).content() | {"files": written}

@@ -3,10 +3,11 @@
 import resource
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import get_args
 
+from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.diagnose import diagnose
@@ -22,6 +23,7 @@ from armlab.diagnosis.tuning import parse_change
 from armlab.diagnosis.verdict_files import (
     PREDICTED_FOLDER,
     check_output_folder,
+    make_verdict,
     predicted_texts,
     verdict_texts,
 )
@@ -74,8 +76,10 @@ def diagnose_recording(
     as_read: bool = False,
     only_setup: bool = False,
     progress: Callable[[str], None] = lambda message: None,
-) -> Iterator[str]:
+) -> ResultLines:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
+
+    The document is the verdict, with the written files beside it.
 
     out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
     numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted.
@@ -99,7 +103,7 @@ def diagnose_recording(
     options += ["--as-read"] * as_read + ["--only-setup"] * only_setup
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     texts = verdict_texts(diagnosis, out) | report_texts(diagnosis, command) | predicted_texts(diagnosis)
-    write_texts(texts, out)
+    written = write_texts(texts, out)
     yield from verdict_lines(diagnosis)
     pictures = sum(name.startswith(FIGURES_FOLDER) for name in texts)
     files = ", ".join(name for name in texts if not name.startswith((FIGURES_FOLDER, PREDICTED_FOLDER)))
@@ -113,6 +117,7 @@ def diagnose_recording(
     if diagnosis.seconds:
         asked = f", {diagnosis.setup_seconds:.1f} s of it how it is to be read" if diagnosis.setup else ""
         yield f"diagnosed in {diagnosis.seconds:.1f} s once read{asked}; {_peak_memory_gb():.2f} GB of memory at most"
+    return make_verdict(diagnosis).content() | {"files": written}
 
 
 def _peak_memory_gb() -> float:

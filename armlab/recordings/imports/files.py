@@ -7,6 +7,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from armlab.common.documents import Document
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.lerobot import COMMAND, STATE, is_lerobot, read_lerobot
@@ -185,8 +186,49 @@ ASKED_SIGNALS = ("time", "position", "torque")
 SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semicolon": ";"}
 
 
-def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], ask: Ask | None) -> list[str]:
-    """Writes the recording and returns lines that tell how each file was read, and what each signal was taken from.
+@dataclass(frozen=True, eq=False)
+class ImportedRecording:
+    """A recording that was written. sources: by the path that was given. columns: names by the signal."""
+
+    folder: Path
+    sources: Mapping[str, Source]
+    columns: Mapping[str, Sequence[str]]
+    draft: Draft
+
+    @property
+    def lines(self) -> list[str]:
+        """How each file was read, what each signal was taken from, and what to do next."""
+        return [
+            *(_describe_source(path, source) for path, source in self.sources.items()),
+            *(_describe_signal(self.draft, signal, names) for signal, names in self.columns.items()),
+            f"{self.folder}: written; `armlab recording check {self.folder}` examines it",
+        ]
+
+    @property
+    def document(self) -> Document:
+        """The same for programs."""
+        runs = zip(self.draft.runs, self.sources.items(), strict=True)
+        return {
+            "recording": self.folder,
+            "robot": self.draft.robot,
+            "runs": [
+                {
+                    "file": run.file,
+                    "role": run.role,
+                    "rows": len(source.table.values),
+                    "from": path,
+                    "read_as": source.note,
+                    "findings": [each.text for each in source.table.findings],
+                }
+                for run, (path, source) in runs
+            ],
+            "columns": self.columns,
+            "units": {signal: self.draft.units[signal] for signal in self.columns},
+        }
+
+
+def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], ask: Ask | None) -> ImportedRecording:
+    """Writes the recording, and tells how each file was read and what each signal was taken from.
 
     options: robot, the columns of each signal, units, gains, validate, separator, decimal, topic; None if not given.
     ask: asks the user for a missing option.
@@ -218,11 +260,7 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     if options.get("joints"):
         draft = replace(draft, others={**draft.others, "joints": _split_names(options["joints"])})
     write_recording(draft, out)
-    return [
-        *(_describe_source(path, source) for path, source in sources.items()),
-        *(_describe_signal(draft, signal, names) for signal, names in assignment.columns.items()),
-        f"{out}: written; `armlab recording check {out}` examines it",
-    ]
+    return ImportedRecording(out, sources, assignment.columns, draft)
 
 
 def _split_names(text: str) -> list[str]:

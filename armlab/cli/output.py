@@ -1,0 +1,120 @@
+"""How a command tells its result: lines or one JSON document on the standard output, progress on standard error.
+
+A command that is decorated with `prints_lines` or `prints_result` returns the lines instead of printing them. Both add
+`--quiet`; `prints_result` adds `--json`, too, whose document is what the lines' generator returns at its end.
+"""
+
+import sys
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Any
+
+import click
+
+from armlab.common.documents import Document, FailedResultError, ResultLines, json_text
+
+_PROGRESS = "armlab.progress"  # key of the running command's progress in click's context
+
+_quiet_option = click.option("--quiet", is_flag=True, help="Print no lines and no progress, only errors.")
+_json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON document.")
+
+
+class Progress:
+    """Tells on the terminal's error stream, in one line, what is being done; nothing where that is no terminal."""
+
+    def __init__(self, quiet: bool) -> None:
+        self.shown = sys.stderr.isatty() and not quiet
+        self.quiet = quiet
+
+    def tell(self, message: str) -> None:
+        """Show a message in place of the one before."""
+        if self.shown:
+            click.echo(f"\r\033[K{message} ...", nl=False, err=True)
+
+    def clear(self) -> None:
+        """Take the message away."""
+        if self.shown:
+            click.echo("\r\033[K", nl=False, err=True)
+
+
+def tell_progress(message: str) -> None:
+    """Tell what the running command is doing; nothing under `--quiet` and outside a command."""
+    progress = _current_progress()
+    if progress is not None:
+        progress.tell(message)
+
+
+def trial_bar(total: int, done: int) -> Any:
+    """A bar over trials with the time left, on the error stream; silent where no one watches."""
+    from tqdm import tqdm
+
+    progress = _current_progress()
+    hidden = True if progress is not None and progress.quiet else None  # None: shown on a terminal alone
+    return tqdm(total=total, initial=done, unit="trial", disable=hidden)
+
+
+def prints_lines(command: Callable[..., Iterable[str]]) -> Callable[..., None]:
+    """Print the lines that a command returns; adds --quiet."""
+
+    @wraps(command)
+    def run(*, quiet: bool, **options: Any) -> None:
+        progress = _start_progress(quiet)
+        try:
+            for line in command(**options):
+                _print_line(line, progress)
+        finally:
+            progress.clear()
+
+    return _quiet_option(run)
+
+
+def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
+    """Print the lines that a command returns, or the document at their end alone; adds --quiet and --json."""
+
+    @wraps(command)
+    def run(*, quiet: bool, as_json: bool, **options: Any) -> None:
+        progress = _start_progress(quiet)
+        try:
+            document = _print_lines(command(**options), progress, hidden=as_json)
+        except FailedResultError as error:
+            _print_document(error.document, as_json)
+            raise
+        finally:
+            progress.clear()
+        _print_document(document, as_json)
+
+    return _json_option(_quiet_option(run))
+
+
+def _print_lines(lines: ResultLines, progress: Progress, hidden: bool) -> Document:
+    """The document at the end of the lines."""
+    while True:
+        try:
+            line = next(lines)
+        except StopIteration as end:
+            document: Document = end.value
+            return document
+        if not hidden:
+            _print_line(line, progress)
+
+
+def _print_line(line: str, progress: Progress) -> None:
+    progress.clear()
+    if not progress.quiet:
+        click.echo(line)
+
+
+def _print_document(document: Document, as_json: bool) -> None:
+    if as_json:
+        click.echo(json_text(document), nl=False)
+
+
+def _start_progress(quiet: bool) -> Progress:
+    progress = Progress(quiet)
+    click.get_current_context().meta[_PROGRESS] = progress
+    return progress
+
+
+def _current_progress() -> Progress | None:
+    context = click.get_current_context(silent=True)
+    return None if context is None else context.meta.get(_PROGRESS)
