@@ -5,7 +5,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -102,6 +102,9 @@ regression: .venv/dev ## the best condition numbers against the committed baseli
 fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in all
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]' --no-build-isolation
 	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
+
+hostile: .venv/dev ## damaged input for the commands: tests/hostile_outcomes.csv
+	PYTHONPATH=tests $(BIN)/python tests/hostile_commands.py
 
 clean: ## everything that was made here, the environment included
 	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \

@@ -3,6 +3,7 @@
 Only click is imported until a command runs, so that `armlab --help` answers at once.
 """
 
+import errno
 import os
 from importlib import import_module
 from typing import Any
@@ -14,6 +15,7 @@ from armlab.common.errors import DataError, InputError
 from bench.errors import StoppedError, TrialsFailedError
 
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_SHOWN_CHARACTERS = 40  # of a name that is too long
 _GROUPS = {
     "Recordings": {
         "recording": "armlab.cli.recordings:recording",
@@ -116,6 +118,11 @@ class _CommandGroup(click.Group):
         except FailedResultError as error:
             click.echo(f"armlab: {error}", err=True)
             ctx.exit(error.status)
+        except OSError as error:
+            if error.errno != errno.ENAMETOOLONG:  # a name that no file can have is the user's, all else is a bug
+                raise
+            click.echo(f"armlab: {str(error.filename)[:_SHOWN_CHARACTERS]}...: {error.strerror}", err=True)
+            ctx.exit(2)
 
 
 @click.group(cls=_CommandGroup, context_settings={"help_option_names": ["-h", "--help"]})

@@ -4,8 +4,10 @@ A command that is decorated with `prints_lines` or `prints_result` returns the l
 `--quiet`; `prints_result` adds `--json`, too, whose document is what the lines' generator returns at its end.
 """
 
+import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, nullcontext, redirect_stdout
 from functools import wraps
 from typing import Any
 
@@ -15,6 +17,7 @@ from armlab.common.documents import Document, FailedResultError, ResultLines, js
 
 _PROGRESS = "armlab.progress"  # key of the running command's progress in click's context
 
+_STANDARD_OUTPUT, _STANDARD_ERROR = 1, 2  # file descriptors, which processes of plug-ins inherit
 _quiet_option = click.option("--quiet", is_flag=True, help="Print no lines and no progress, only errors.")
 _json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON document.")
 
@@ -75,7 +78,8 @@ def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
     def run(*, quiet: bool, as_json: bool, **options: Any) -> None:
         progress = _start_progress(quiet)
         try:
-            document = _print_lines(command(**options), progress, hidden=as_json)
+            with _prints_to_errors() if as_json else nullcontext():
+                document = _print_lines(command(**options), progress, hidden=as_json)
         except FailedResultError as error:
             _print_document(error.document, as_json)
             raise
@@ -84,6 +88,19 @@ def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
         _print_document(document, as_json)
 
     return _json_option(_quiet_option(run))
+
+
+@contextmanager
+def _prints_to_errors() -> Iterator[None]:
+    """What plug-ins and their processes print meanwhile goes to the error stream: the document stands alone."""
+    with redirect_stdout(sys.stderr):
+        kept = os.dup(_STANDARD_OUTPUT)
+        os.dup2(_STANDARD_ERROR, _STANDARD_OUTPUT)
+        try:
+            yield
+        finally:
+            os.dup2(kept, _STANDARD_OUTPUT)
+            os.close(kept)
 
 
 def _print_lines(lines: ResultLines, progress: Progress, hidden: bool) -> Document:

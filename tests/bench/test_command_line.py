@@ -1,5 +1,6 @@
 """The command line answers at once, runs what it is told and writes whole results."""
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -100,6 +101,28 @@ def test_a_trial_that_raises_ends_the_run_with_exit_code_1_and_no_table(
     assert "6 trials, 3 done, 3 to do" in dry.stdout
     assert dry.returncode == 1
     assert "plug-in on" in dry.stderr
+
+
+def test_what_a_plug_in_prints_does_not_stand_in_the_document(
+    armlab: Armlab, small: Path, plug_in: Callable[[str], Path]
+) -> None:
+    plug_in("print('from a plug-in', flush=True)")
+    small.write_text(small.read_text().replace("[spso, de]", "[plug-in]"))
+    done = armlab("run", small, "--workers", "1", "--json")
+    assert json.loads(done.stdout)["experiments"][0]["name"] == "small"
+    assert "from a plug-in" in done.stderr
+
+
+def test_a_plug_in_that_ends_its_process_fails_alone(
+    armlab: Armlab, small: Path, plug_in: Callable[[str], Path]
+) -> None:
+    plug_in("__import__('os')._exit(7)")
+    small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
+    done = armlab("run", small, "--workers", "1")
+    assert done.returncode == 1
+    assert "3 trials raised an error and are not kept" in done.stderr
+    small.write_text(small.read_text().replace("[plug-in, de]", "[de]"))
+    assert "3 trials, 3 done, 0 to do" in armlab("run", small, "--dry-run").stdout
 
 
 def test_list_names_algorithms_and_problems(armlab: Armlab) -> None:

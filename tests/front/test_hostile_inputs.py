@@ -1,8 +1,7 @@
 """Hostile inputs: one clear line with exit status 2, no traceback, nothing written."""
 
+import errno
 import os
-import random
-import string
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from click.testing import CliRunner
+from hostile_commands import EXPERIMENT, KINDS, LINK, Kind, read_outcomes, run_case
 from refusals import refusal
 
 from algorithms.contract import Box
@@ -18,17 +18,6 @@ from algorithms.driver import minimise
 from algorithms.random_search import RandomSearch
 from armlab.cli.main import main
 from armlab.common.files import write_texts
-
-LINK = {"mass": 2.0, "first_moment": [0.01, 0.02, 0.1], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}
-EXPERIMENT = {
-    "name": "h",
-    "problem": ["sphere"],
-    "algorithms": ["spso"],
-    "swarm_size": 10,
-    "iterations": 5,
-    "repetitions": 1,
-    "seed": 1,
-}
 
 
 def run_refused(folder: Path, *words: object) -> str:
@@ -169,60 +158,60 @@ def test_experiments_that_no_machine_can_hold_are_refused_before_they_start(
     assert message in run_refused(tmp_path, "run", path, "--results", tmp_path / "r", "--store", tmp_path / "s.sqlite")
 
 
-HOSTILE_VALUES: tuple[Any, ...] = (
-    *(float("nan"), float("inf"), -1, 0, 1e307, -1e307, 10**400, "", "../..", "/etc/passwd", "\u202e", "<b>", None),
-    *([], {}, [[]], {"a": {}}, True, "1e5", [1, "x"], "x" * 10_000),
-)
+QUICK_KINDS = [kind for kind in KINDS if kind.damaged in ("robot", "model", "experiment") and kind.command != "predict"]
 
 
-def mutate(content: Any, rng: random.Random) -> Any:
-    """The content with one key or entry replaced, removed or added."""
-    if isinstance(content, dict) and content and rng.random() < 0.8:
-        key = rng.choice(sorted(content))
-        kind = rng.random()
-        if kind < 0.15:
-            return {each: value for each, value in content.items() if each != key}
-        if kind < 0.25:
-            return content | {"".join(rng.choices(string.ascii_lowercase, k=5)): rng.choice(HOSTILE_VALUES)}
-        return content | {key: mutate(content[key], rng)}
-    if isinstance(content, list) and content and rng.random() < 0.7:
-        place = rng.randrange(len(content))
-        return [*content[:place], mutate(content[place], rng), *content[place + 1 :]]
-    return rng.choice(HOSTILE_VALUES)
-
-
-ROBOT = {
-    "name": "two",
-    "dh_convention": "standard",
-    "joints": [{"name": f"j{n}", "type": "revolute", "a": 0.3, "d": 0.1, "alpha": 1.57} for n in (1, 2)],
-    "links": [LINK, LINK],
-}
-FILES: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
-    "robot": (ROBOT, ("base", "{file}")),
-    "model": (
-        {"schema": "model/1", "robot": "irb120-arm", "links": [LINK] * 3, "components": []},
-        ("export-model", "{file}", "{folder}/out.xml"),
-    ),
-    "experiment": (EXPERIMENT, ("run", "{file}", "--dry-run", "--store", "{folder}/s.sqlite")),
-}
-
-
-@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("kind", QUICK_KINDS, ids=lambda kind: kind.name)
 @pytest.mark.parametrize("seed", range(100))
-def test_a_damaged_file_is_used_or_refused_in_one_line(kind: str, seed: int, tmp_path: Path) -> None:
+def test_a_damaged_file_is_used_or_refused_in_one_line(
+    kind: Kind, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Outcomes of the seeds: exit 0 with finite numbers alone, or exit 2 with one line; never a traceback."""
-    content, words = FILES[kind]
-    damaged = mutate(content, random.Random(f"{kind} {seed}"))
-    file = write_yaml(tmp_path / f"{kind}.yaml", damaged)
-    filled = [word.format(file=file, folder=tmp_path) for word in words]
-    result = CliRunner().invoke(main, filled)
-    assert result.exception is None or isinstance(result.exception, SystemExit), f"{damaged}: {result.exception!r}"
-    assert result.exit_code in (0, 2), result.output
-    if result.exit_code == 2:
-        assert len(result.stderr.strip().splitlines()) == 1
-        assert sorted(path.name for path in tmp_path.iterdir()) == [f"{kind}.yaml"]
-    else:
-        assert "nan" not in result.stdout.lower().split()
+    monkeypatch.chdir(tmp_path)
+    outcome = run_case(kind, seed, tmp_path)
+    assert outcome.verdict in ("used", "refused"), outcome
+
+
+def test_the_list_of_outcomes_has_every_case_of_the_generator_and_no_broken_one() -> None:
+    listed = read_outcomes()
+    assert [each.case for each in listed] == [f"{kind.name}/{seed}" for kind in KINDS for seed in range(kind.seeds)]
+    assert [each for each in listed if each.verdict not in ("used", "refused")] == []
+
+
+SLOW_KINDS = [kind for kind in KINDS if kind not in QUICK_KINDS and kind.command != "next"]
+
+
+@pytest.mark.parametrize("kind", SLOW_KINDS, ids=lambda kind: kind.name)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_command_does_with_damaged_input_what_the_list_says(
+    kind: Kind, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    outcome = run_case(kind, seed, tmp_path)
+    listed = next(each for each in read_outcomes() if each.case == outcome.case)
+    assert (outcome.exit_status, outcome.verdict) == (listed.exit_status, listed.verdict), outcome
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The third file of a folder finds no space left."""
+    written = list[Path]()
+
+    def write_bytes(path: Path, data: bytes) -> int:
+        written.append(path)
+        if len(written) == 3:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        with path.open("wb") as file:
+            return file.write(data)
+
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "a").write_text("kept")
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+    for folder in ("new", "old"):
+        written.clear()
+        message = str(refusal(write_texts, {"a": "1", "b/c": "2", "d": "3"}, tmp_path / folder))
+        assert message == f"cannot write into {tmp_path / folder}: No space left on device"
+    assert [str(path.relative_to(tmp_path)) for path in sorted(tmp_path.rglob("*"))] == ["old", "old/a"]
+    assert (tmp_path / "old" / "a").read_text() == "kept"
 
 
 def test_a_time_that_stands_still_is_refused_by_the_check(tmp_path: Path) -> None:

@@ -1,0 +1,351 @@
+"""Damages the input of commands by seeded chance, runs them, and judges what they do: `hostile_commands.py`.
+
+The command writes the list of outcomes, `tests/hostile_outcomes.csv`, one row a case. A case is right where the command
+uses its input (exit 0, no NaN in any file) or refuses it (exit 2, one line, nothing written). `recording check` writes
+its page in both cases. Anything else is broken: a traceback, a hang, another exit status, a file half written.
+"""
+
+import argparse
+import csv
+import json
+import os
+import random
+import re
+import signal
+import string
+import sys
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import yaml
+from click.testing import CliRunner
+
+from armlab.cli.main import main as armlab
+
+OUTCOMES = Path(__file__).with_name("hostile_outcomes.csv")
+TIME_LIMIT_S = 120
+HOSTILE_VALUES: tuple[Any, ...] = (
+    *(float("nan"), float("inf"), -1, 0, 1e307, -1e307, 10**400, "", "../..", "/etc/passwd", "\u202e", "<b>", None),
+    *([], {}, [[]], {"a": {}}, True, "1e5", [1, "x"], "x" * 10_000),
+)
+HOSTILE_WORDS = (
+    *("nan", "inf", "-1", "0", "1e307", "-1e307", "1" + "0" * 400, "", "no/such/place", "/dev/null", "\u202e", "<b>"),
+    *("x", "1,2", "*", "--help-me", "x" * 10_000, "\N{SNOWMAN}", "1e-320", "%s", "a=b"),
+)
+HOSTILE_CELLS = ("", "nan", "inf", "1e307", "-1e307", "1e400", "x", "1;2", '"', "0x10", "\u0663", "1,5", "\x00")
+LINK = {"mass": 2.0, "first_moment": [0.01, 0.02, 0.1], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}
+EXPERIMENT = {
+    "name": "h",
+    "problem": ["sphere"],
+    "algorithms": ["spso"],
+    "swarm_size": 10,
+    "iterations": 5,
+    "repetitions": 1,
+    "seed": 1,
+}
+ROBOT = {
+    "name": "two",
+    "dh_convention": "standard",
+    "joints": [{"name": f"j{n}", "type": "revolute", "a": 0.3, "d": 0.1, "alpha": 1.57} for n in (1, 2)],
+    "links": [LINK, LINK],
+}
+MODEL = {"schema": "model/1", "robot": "irb120-arm", "links": [LINK] * 3, "components": []}
+RECORDING = {
+    "schema": "recording/1",
+    "robot": "irb120-arm",
+    "columns": {"time": "t", "position": ["q1", "q2", "q3"], "torque": ["u1", "u2", "u3"]},
+    "units": {"time": "s", "position": "rad", "torque": "N.m"},
+    "gains": [1.0, 1.0, 1.0],
+    "transmission": {"offset": [0.0, 0.0, 0.0]},
+    "runs": [{"file": "run.csv", "role": "identify"}],
+}
+FINDING = {
+    "effect": "viscous_friction",
+    "kind": "physics",
+    "joint": 1,
+    "joints": [1],
+    "parameters": {"coefficient": {"value": 2.3, "ci95": [2.2, 2.4], "unit": "N.m.s/rad"}},
+    "equation": "tau_1 += 2.3 qd_1",
+    "heldout_rms_before": 1.9,
+    "heldout_rms_after": 0.1,
+    "p_value": 1e-9,
+    "rivals": [],
+    "next_experiment": None,
+}
+FIT = {"joint": 1, "heldout_rms_before": 1.9, "heldout_rms_after": 0.1, "noise_floor": 0.05, "gap_closed": 0.9}
+VERDICT = {
+    "schema": "verdict/1",
+    "status": "mismatch",
+    "summary": "Friction.",
+    "located": [],
+    "findings": [FINDING],
+    "unexplained": [],
+    "fit": [FIT],
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a command did with a damaged input. verdict: used, refused, or what is broken. told: its last line."""
+
+    case: str
+    exit_status: int
+    verdict: str
+    told: str
+
+
+def run_csv() -> str:
+    """A run of 3 s of the built-in three-joint arm, moved by sums of sines; its torque is no arm's."""
+    time = np.arange(300) / 100
+    columns = [time, *(np.sin((1 + n / 3) * time + n) for n in range(3)), *(np.cos(2 * time * n) for n in range(1, 4))]
+    rows = "".join(",".join(f"{cell:.6f}" for cell in row) + "\n" for row in np.column_stack(columns))
+    return "t,q1,q2,q3,u1,u2,u3\n" + rows
+
+
+def mutate(content: Any, rng: random.Random) -> Any:
+    """The content with one key or entry replaced, removed or added."""
+    if isinstance(content, dict) and content and rng.random() < 0.8:
+        key = rng.choice(sorted(content))
+        kind = rng.random()
+        if kind < 0.15:
+            return {each: value for each, value in content.items() if each != key}
+        if kind < 0.25:
+            return content | {"".join(rng.choices(string.ascii_lowercase, k=5)): rng.choice(HOSTILE_VALUES)}
+        return content | {key: mutate(content[key], rng)}
+    if isinstance(content, list) and content and rng.random() < 0.7:
+        place = rng.randrange(len(content))
+        return [*content[:place], mutate(content[place], rng), *content[place + 1 :]]
+    return rng.choice(HOSTILE_VALUES)
+
+
+def damage_table(text: str, rng: random.Random) -> str:
+    """A table with cells, columns or rows spoilt: one cell, a whole column, the order of time, the heading, the end."""
+    head, *rows = [line.split(",") for line in text.splitlines()]
+    column, place = rng.randrange(len(head)), rng.randrange(len(rows))
+    kind = rng.randrange(9)
+    cell = rng.choice(HOSTILE_CELLS)
+    if kind == 0:
+        rows[place][column] = cell
+    elif kind == 1:
+        rows = [[*row[:column], cell, *row[column + 1 :]] for row in rows]
+    elif kind == 2:
+        rows[place:] = rows[place:][::-1]
+    elif kind == 3:
+        head[column] = cell
+    elif kind == 4:
+        rows = rows[: rng.choice((0, 1, 2, 5, 20))]
+    elif kind == 5:
+        rows[place] = rows[place][:column]
+    elif kind == 6:
+        factor = rng.choice((1e-300, 1e-9, 1e9, 1e300, -1.0, 0.0))
+        rows = [[*row[:column], repr(float(row[column]) * factor), *row[column + 1 :]] for row in rows]
+    elif kind == 7:
+        rows = [row for number, row in enumerate(rows) if number % 2 or number < place] + rows[:place]
+    else:
+        rows = [rows[place]] * len(rows)
+    return "\n".join(",".join(row) for row in [head, *rows]) + "\n"
+
+
+def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
+    """Sound inputs of all commands, but for the damaged one."""
+    for name, content in (("robot", ROBOT), ("model", MODEL), ("experiment", EXPERIMENT)):
+        whole = mutate(content, rng) if name == damaged else content
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(whole))
+    (folder / "rec").mkdir()
+    recording = mutate(RECORDING, rng) if damaged == "recording" else RECORDING
+    (folder / "rec" / "recording.yaml").write_text(yaml.safe_dump(recording))
+    table = damage_table(run_csv(), rng) if damaged == "table" else run_csv()
+    (folder / "rec" / "run.csv").write_text(table)
+    (folder / "motion.csv").write_text(re.sub(r"(?m)(,[^,\n]*){3}$", "", table))
+    verdict = mutate(VERDICT, rng) if damaged == "verdict" else VERDICT
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+
+
+COMMANDS = {
+    "base": "base robot.yaml",
+    "export-model": "export-model model.yaml out.xml",
+    "run": "run experiment.yaml --dry-run --workers 1 --store s.sqlite --results r",
+    "identify": "identify rec --as-read --out out",
+    "predict": "predict model.yaml rec --out out",
+    "check": "recording check rec --out check.html",
+    "payload": "payload rec --link 3 --centre 0 0 0.1 --cutoff-hz 5",
+    "gains": "gains rec --without rec --mass 5 --centre 0 0 0.1",
+    "import": "recording import rec/run.csv --robot irb120-arm --position q* --torque u* --time t --out new "
+    "--unit position=rad --unit torque=N.m --unit time=s",
+    "confusability": "confusability irb120-arm motion.csv --noise 0.1",
+    "next": "next verdict.json --robot irb120-arm --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next",
+}
+WRITES_WITH_REFUSAL = {"check": "check.html"}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is damaged for a command, and how many seeds the list has. damaged: a file, or `words` of the command."""
+
+    command: str
+    damaged: str
+    seeds: int
+
+    @property
+    def name(self) -> str:
+        return f"{self.command}/{self.damaged}"
+
+
+KINDS = (
+    Kind("base", "robot", 100),
+    Kind("export-model", "model", 100),
+    Kind("run", "experiment", 100),
+    Kind("identify", "recording", 15),
+    Kind("identify", "table", 30),
+    Kind("identify", "words", 30),
+    Kind("check", "recording", 15),
+    Kind("check", "table", 4),
+    Kind("predict", "model", 15),
+    Kind("predict", "table", 30),
+    Kind("payload", "table", 30),
+    Kind("payload", "words", 30),
+    Kind("gains", "words", 30),
+    Kind("import", "table", 30),
+    Kind("import", "words", 30),
+    Kind("confusability", "table", 30),
+    Kind("next", "verdict", 15),
+    Kind("next", "words", 30),
+    Kind("run", "words", 30),
+)
+
+
+def damage_words(words: list[str], rng: random.Random) -> list[str]:
+    """The words with one value of an option or argument replaced; the command and the flags stay."""
+    fixed = {"import", "check"}
+    places = [n for n in range(1, len(words)) if not words[n].startswith("--") and words[n] not in fixed]
+    place = rng.choice(places)
+    return [*words[:place], rng.choice(HOSTILE_WORDS), *words[place + 1 :]]
+
+
+def run_case(kind: Kind, seed: int, folder: Path) -> Outcome:
+    """One case in an empty folder, which is the working folder meanwhile."""
+    rng = random.Random(f"{kind.damaged} {kind.command} {seed}")
+    _write_inputs(folder, rng, kind.damaged)
+    words = COMMANDS[kind.command].split()
+    if kind.damaged == "words":
+        words = damage_words(words, rng)
+    before = _contents(folder)
+    result = _invoke(words)
+    return _judge(kind, seed, result, before, folder)
+
+
+def _invoke(words: list[str]) -> Any:
+    def give_up(*_: object) -> None:
+        raise TimeoutError(f"hangs for {TIME_LIMIT_S} s")
+
+    usual = signal.signal(signal.SIGALRM, give_up)
+    signal.alarm(TIME_LIMIT_S)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", RuntimeWarning)
+            return CliRunner().invoke(armlab, words)
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, usual)
+
+
+def _contents(folder: Path) -> dict[str, int]:
+    return {str(path.relative_to(folder)): path.lstat().st_mtime_ns for path in folder.rglob("*")}
+
+
+def _judge(kind: Kind, seed: int, result: Any, before: dict[str, int], folder: Path) -> Outcome:
+    error = None if isinstance(result.exception, SystemExit) else result.exception
+    lines = result.stderr.strip().splitlines()
+    told = repr(error) if error else lines[-1] if lines else ""
+    told = re.sub(r"\s+", " ", told.replace(str(folder), ""))[:150]
+    after = _contents(folder)
+    allowed = WRITES_WITH_REFUSAL.get(kind.command)
+    changed = {name for name in after if after[name] != before.get(name)} - {allowed}
+    verdict = "used" if result.exit_code == 0 else "refused"
+    if error is not None:
+        verdict = f"broken: {type(error).__name__}"
+    elif result.exit_code not in (0, 2):
+        verdict = "broken: exit status"
+    elif result.exit_code == 2 and changed:
+        verdict = f"broken: wrote {min(changed)}"
+    elif result.exit_code == 2 and not _is_one_line(lines):
+        verdict = "broken: more than one line"
+    elif result.exit_code == 0 and not all(map(_is_free_of_nan, _new_files(folder, changed))):
+        verdict = "broken: NaN in a file"
+    elif result.exit_code == 0 and re.search(r"(?i)(?<![\w/])-?nan\b", result.stdout):
+        verdict = "broken: NaN on the terminal"
+    return Outcome(f"{kind.name}/{seed}", result.exit_code, verdict, told)
+
+
+def _is_one_line(lines: list[str]) -> bool:
+    return len(lines) == 1 or lines[0].startswith("Usage:")  # click's usage errors have four
+
+
+def _new_files(folder: Path, names: set[str]) -> Iterator[Path]:
+    return (folder / name for name in names if (folder / name).is_file())
+
+
+def _is_free_of_nan(path: Path) -> bool:
+    if path.suffix not in (".yaml", ".json", ".csv", ".xml", ".mod"):
+        return True
+    return not re.search(r"(?i)(^|[\s,:\[\"])[+-]?\.?(nan|inf|infinity)($|[\s,\]\"])", path.read_text(encoding="utf-8"))
+
+
+def outcomes_of(kind: Kind) -> Iterator[Outcome]:
+    """The outcomes of all seeds of a kind."""
+    home = Path.cwd()
+    for seed in range(kind.seeds):
+        with TemporaryDirectory() as name:
+            os.chdir(name)
+            try:
+                yield run_case(kind, seed, Path(name))
+            finally:
+                os.chdir(home)
+
+
+def read_outcomes() -> list[Outcome]:
+    """The list in the repository; none where there is no list yet."""
+    if not OUTCOMES.exists():
+        return []
+    with OUTCOMES.open(encoding="utf-8", newline="") as file:
+        rows = csv.DictReader(file)
+        return [Outcome(row["case"], int(row["exit_status"]), row["verdict"], row["told"]) for row in rows]
+
+
+def write_outcomes(found: list[Outcome]) -> None:
+    """Puts outcomes into the list, in place of older ones of the same cases; cases that no kind has go."""
+    known = {each.case: each for each in [*read_outcomes(), *found]}
+    cases = [f"{kind.name}/{seed}" for kind in KINDS for seed in range(kind.seeds)]
+    with OUTCOMES.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow([each.name for each in fields(Outcome)])
+        writer.writerows(astuple(known[case]) for case in cases if case in known)
+
+
+def main(arguments: list[str]) -> int:
+    """Runs the cases of the named kinds, else all, and puts them into the list; 1 if a case is broken."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("kinds", nargs="*", choices=[[], *(kind.name for kind in KINDS)], default=[])
+    chosen = parser.parse_args(arguments).kinds
+    counts = Counter[str]()
+    for kind in KINDS:
+        if chosen and kind.name not in chosen:
+            continue
+        found = list(outcomes_of(kind))
+        write_outcomes(found)
+        counts.update(each.verdict for each in found)
+        for each in found:
+            if each.verdict.startswith("broken"):
+                print(each.case, each.verdict, each.told, flush=True)
+    print(f"{counts.total()} cases:", ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items())))
+    return 1 if any(verdict.startswith("broken") for verdict in counts) else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
