@@ -134,6 +134,10 @@ def test_files_that_never_end_or_are_too_wide_are_refused(
     assert message in run_refused(tmp_path, *words)
 
 
+def test_a_name_that_no_file_can_have_is_refused(tmp_path: Path) -> None:
+    assert run_refused(tmp_path, "identify", "x" * 10_000).endswith(": File name too long")
+
+
 def test_a_separator_of_several_characters_is_refused(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("1,2\n3,4\n")
     words = ("recording", "import", tmp_path / "run.csv", "--separator", "banana", "--out", tmp_path / "new")
