@@ -162,7 +162,7 @@ def test_verdict_model_simulation_and_page_are_written(diagnosis: MotionDiagnosi
     assert sum(each.share_of_gap for each in verdict.story) == pytest.approx(1.0)
     assert len(read_model(tmp_path / "model.yaml").effects) >= 4
     assert "<svg" in texts["report.html"]
-    assert "DelayedPDActuatorCfg" in texts["actuators.isaaclab.txt"]
+    assert "DelayedPDActuatorCfg" in texts["isaaclab_actuators.py"]
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "simulation.xml")).nu == 2
     assert any("mrad" in line for line in motion_lines(diagnosis))
 
