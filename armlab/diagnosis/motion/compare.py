@@ -31,6 +31,7 @@ from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.recordings.motion import MotionRecording
 
+MIN_RUNS = 3  # of each recording, for a scatter between runs
 POWER_QUANTILE = 1.2816  # of 90 % power, for the smallest change that would have been seen
 Pair = tuple[Windows, Windows]
 
@@ -196,6 +197,36 @@ class _Model:
     evaluations: int
 
 
+def _run_errors(pair: Pair, model: _Model) -> tuple[Array, Array]:
+    """Standard errors of the changes from the scatter between runs, and degrees of freedom, (changing,) each.
+
+    What the law leaves out is alike in all windows of one motion, and differs between motions. So each run is a block:
+    the model is fitted without each of the G runs of a recording in turn (jackknife; Tukey 1958),
+
+        variance = sum over recordings of (G - 1) / G sum_k (change_k - mean)^2
+
+    with degrees of freedom after Welch 1947. Recordings of fewer than MIN_RUNS runs tell nothing: zeros.
+    """
+    changing = list(model.changing)
+    variances, freedoms = [], []
+    for recording, windows in enumerate(pair):
+        runs = np.unique(windows.run)
+        if len(runs) < MIN_RUNS or not changing:
+            return np.zeros(len(changing)), np.ones(len(changing))
+        moves = []
+        for run in runs:
+            parts = [pair[0], pair[1]]
+            parts[recording] = windows.select(np.flatnonzero(windows.run != run))
+            start = (model.fit.old, model.fit.change)
+            fitted = _fit_pair((parts[0], parts[1]), start, model.free, changing, model.evaluations)
+            moves.append(fitted.change[changing])
+        variances.append((len(runs) - 1) * np.var(moves, axis=0))
+        freedoms.append(len(runs) - 1)
+    whole = variances[0] + variances[1]
+    weights = variances[0] ** 2 / freedoms[0] + variances[1] ** 2 / freedoms[1]
+    return np.sqrt(whole), np.maximum(whole**2 / np.maximum(weights, 1e-300), 1.0)
+
+
 def _other_half_errors(pair: Pair, model: _Model) -> Array:
     """Squared error of each window of both recordings by numbers that were fitted on the other half."""
     squares = [np.zeros(each.count) for each in pair]
@@ -245,9 +276,10 @@ def _compare_joint(
             break
         best = min(needless, key=lambda number: float(errors[number].sum()))
         model, judged = tied[best], errors[best]
-    return [
-        _change(pair, number, joint, model, (every, numbers), gains, (looks, tuning.max_p_value)) for number in numbers
-    ]
+    models = (model, _Model(every, free, tuple(numbers), tuning.pair_evaluations))
+    judged_models = [(each, *_run_errors(pair, each)) for each in models]
+    found, test = {number: gains[number] for number in model.changing}, (looks, tuning.max_p_value)
+    return [_change(pair, number, joint, judged_models[number not in found], found, test) for number in numbers]
 
 
 def _tie(pair: Pair, model: "_Model", number: int) -> "_Model":
@@ -264,22 +296,22 @@ def _change(
     pair: Pair,
     number: int,
     joint: int,
-    model: "_Model",
-    every: tuple[_PairFit, list[int]],
+    judged: tuple[_Model, Array, Array],
     gains: dict[int, tuple[float, float, float]],
     test: tuple[int, float],
 ) -> ServoChange:
     """One number: its change where it was found, else none, with the interval of the fit in which all change.
 
-    test: number of tests in all, and their level.
+    judged: that model, its errors between runs, and their degrees of freedom. test: number of tests in all, and their
+    level. The interval is the wider one of those of windows and of runs.
     """
     looks, level = test
-    changed = number in model.changing
-    source, places = (model.fit, list(model.changing)) if changed else every
-    count = int(model.free.sum())
-    column = count + places.index(number)
-    error = float(np.sqrt(source.covariance[column, column]))
-    freedom = max(pair[0].count + pair[1].count - count - len(places), 1)
+    (model, run_errors, run_freedoms), changed = judged, number in gains
+    source, position, count = model.fit, model.changing.index(number), int(model.free.sum())
+    windows_error = float(np.sqrt(source.covariance[count + position, count + position]))
+    windows_freedom = float(max(pair[0].count + pair[1].count - count - len(model.changing), 1))
+    candidates = ((windows_error, windows_freedom), (float(run_errors[position]), float(run_freedoms[position])))
+    error, freedom = max(candidates, key=lambda each: each[0] * float(student.ppf(0.975, each[1])))
     half = float(student.ppf(0.975, freedom)) * error
     low, high = LOWEST[number], HIGHEST[number]
     old = float(np.clip(from_coordinates(source.old)[number], low, high))

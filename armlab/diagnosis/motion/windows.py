@@ -32,8 +32,8 @@ class Windows:
 
     command: (windows, history + steps + history), rad; the first step of a window is column `history`. inertia, load,
     slope, measured: (windows, steps). supply: the same, factor of the torque, or None. first_velocity: (windows,),
-    rad/s. begin: (windows + 1,), the first sample of each window; row, fraction: (samples,), where on the grid a
-    measured sample lies; position: (samples,), rad.
+    rad/s. run: (windows,), the run that a window was cut from. begin: (windows + 1,), the first sample of each window;
+    row, fraction: (samples,), where on the grid a measured sample lies; position: (samples,), rad.
     """
 
     step_s: float
@@ -45,6 +45,7 @@ class Windows:
     measured: Array
     supply: Array | None
     first_velocity: Array
+    run: NDArray[np.intp]
     begin: NDArray[np.int64]
     row: NDArray[np.int64]
     fraction: Array
@@ -73,6 +74,7 @@ class Windows:
             measured=self.measured[chosen],
             supply=None if self.supply is None else self.supply[chosen],
             first_velocity=self.first_velocity[chosen],
+            run=self.run[chosen],
             begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
             row=self.row[kept],
             fraction=self.fraction[kept],
@@ -150,7 +152,7 @@ def make_windows(
             _column(runs[p.run], motions[p.run], loads[p.run], p, joint, simulation, (step, steps, history))
             for p in pieces
         ]
-        made.append(_stack(columns, step, history))
+        made.append(_stack(columns, np.array([p.run for p in pieces]), step, history))
     return made
 
 
@@ -212,7 +214,7 @@ def _column(
     }
 
 
-def _stack(columns: list[dict[str, Array | None]], step: float, history: int) -> Windows:
+def _stack(columns: list[dict[str, Array | None]], run: NDArray[np.intp], step: float, history: int) -> Windows:
     def grid(name: str) -> Array:
         return np.ascontiguousarray(np.stack([np.asarray(column[name]) for column in columns]))
 
@@ -229,6 +231,7 @@ def _stack(columns: list[dict[str, Array | None]], step: float, history: int) ->
         measured=grid("measured"),
         supply=None if columns[0]["supply"] is None else grid("supply"),
         first_velocity=np.array([float(np.asarray(column["velocity"])) for column in columns]),
+        run=run,
         begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
         row=row,
         fraction=place - row,
