@@ -109,14 +109,16 @@ def diagnose(
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     motion_only = is_motion_only(recordings[0])
-    if motion_only and (baseline or without or changes or as_read or only_setup):
-        raise InputError("a recording of motion only takes --out, --compare and nothing else: leave out the others")
+    if motion_only and (baseline or without or as_read or only_setup):
+        raise InputError("a recording of motion only takes --out, --set, --compare: leave out the others")
+    if any(change.startswith("motion.") != motion_only for change in changes):
+        raise InputError("--set: numbers of motion.* are for recordings of motion only, and these take no others")
     if old is not None and is_motion_only(old) != motion_only:
         raise InputError("--compare: one recording has torque, the other is motion only; they cannot be compared")
     if motion_only and old is None:
         from armlab.diagnosis.motion.write import diagnose_motion_recording
 
-        return diagnose_motion_recording(recordings[0], out, tell_progress)
+        return diagnose_motion_recording(recordings[0], out, tell_progress, changes)
     if motion_only and old is not None:
         from armlab.diagnosis.motion.compare_write import compare_motion_recordings
 

@@ -104,14 +104,16 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
 @click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
-@click.option("--topic", help="Topic of the joint states in a bag.")
+@click.option("--topic", help="Topic of the joint or controller states in a bag.")
+@click.option("--command-topic", metavar="TOPIC", help="Topic of the commands in a bag.")
 @click.option("--ask/--no-ask", default=None, help="Ask for missing options [default: ask if the input is a terminal].")
 @prints_result
 def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> ResultLines:
     """Convert files of other formats.
 
     Reads .mat, ROS bags, MCAP, Parquet, CSV of any layout and LeRobot datasets, and writes a new recording folder.
-    Without --torque, --reference-position makes a recording of motion only.
+    Without --torque, --reference-position makes a recording of motion only, and
+    so does a bag with the states of a controller or with --command-topic.
 
     NAMES are column names with commas between them; * and ? stand for any characters.
     """

@@ -162,7 +162,7 @@ def test_verdict_model_simulation_and_page_are_written(diagnosis: MotionDiagnosi
     assert sum(each.share_of_gap for each in verdict.story) == pytest.approx(1.0)
     assert len(read_model(tmp_path / "model.yaml").effects) >= 4
     assert "<svg" in texts["report.html"]
-    assert "DelayedPDActuatorCfg" in texts["actuators.isaaclab.txt"]
+    assert "DelayedPDActuatorCfg" in texts["isaaclab_actuators.py"]
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "simulation.xml")).nu == 2
     assert any("mrad" in line for line in motion_lines(diagnosis))
 
@@ -220,6 +220,24 @@ def test_a_comparison_names_the_gain_that_was_raised_and_nothing_else(tmp_path: 
     assert file.status == "changed"
     assert "a factor of" in file.summary
     assert "controller gain" in comparison_page(comparison, "armlab diagnose --compare")
+
+
+def test_an_interval_of_a_change_is_as_wide_as_the_scatter_between_runs(tmp_path: Path) -> None:
+    gains = {"old": (7.0, 8.0, 9.0), "new": (14.0, 16.0, 18.0)}
+    for name, each in gains.items():
+        folder = write_recording(tmp_path / name, {**TRUTH, "kp": each[0]}, seconds=4.0)
+        for seed, gain in enumerate(each, start=1):
+            command = commands(seed, 4.0)
+            truth = {**TRUTH, "kp": gain}
+            columns = simulate(arm_text(**truth), command)
+            table = pd.read_csv(folder / f"run-{seed}.csv").assign(q1=columns[:, 0], q2=columns[:, 1])
+            table.to_csv(folder / f"run-{seed}.csv", index=False)
+    comparison = compare_motion(*(load_motion_recording(tmp_path / name) for name in gains))
+    for joint in (1, 2):
+        (change,) = (each for each in comparison.changes if (each.parameter.key, each.joint) == ("kp", joint))
+        assert change.ratio is not None
+        assert change.ratio[1] < 2.0 < change.ratio[2]
+        assert change.ratio[2] / change.ratio[1] > 1.3  # a gain of 12 % scatter in each of three runs
 
 
 def test_recordings_of_other_kinds_are_not_compared(tmp_path: Path) -> None:

@@ -23,18 +23,8 @@ from armlab.diagnosis.motion.estimate import (
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import OPTIONAL, SCALE, USUAL, place
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
-
-MIN_GAIN = 0.02  # of the squared error on windows that took no part (chosen by eye)
-MAX_P_VALUE = 0.01  # of no gain, for a finding: after Bonferroni's correction for the parameters of all joints
-MAX_JOINING_P_VALUE = 0.05  # of no gain, for a place in the model: no correction
-MAX_JUDGED_WINDOWS = 60  # for the choice; the numbers come from all windows
-TRIED = 4  # parameters that are fitted in each round, of those that a linear model gains most from
-REFIT_EVALUATIONS = 8  # of a fit that starts near its end
-ODD_FACTOR = 4.0  # times the median error: a window that something else than the servo has moved (chosen by eye)
-MAX_ODD_SHARE = 0.1  # of the windows
-MIN_MOTION = 0.01  # rad (m): windows with less travel say nothing of the usual error
-MIN_WINDOWS_FOR_ODD = 8
 
 
 @dataclass(frozen=True)
@@ -63,63 +53,66 @@ class ChosenServo:
     odd: NDArray[np.intp]
 
 
-def choose_servo(windows: Windows, nominal: Array, looks: int) -> ChosenServo:
+def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
     """The servo of one joint. nominal: (parameters,), NaN where unknown. looks: number of tests in the diagnosis.
 
     The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
     """
     free = np.array(USUAL)
-    start, nominal = _choose_damping(windows, nominal, free)
+    start, nominal = _choose_damping(windows, nominal, free, tuning)
     base = fill_unknown(nominal)
-    odd = find_odd_windows(windows, start.values)
+    odd = find_odd_windows(windows, start.values, tuning)
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
-    few = thin_windows(sound, MAX_JUDGED_WINDOWS)
-    fit = fit_servo(few, start.values, free)
-    judged = _errors_on_other_half(few, fit.values, free)
+    few = thin_windows(sound, tuning.max_judged_windows)
+    fit = fit_servo(few, start.values, free, tuning.max_evaluations)
+    judged = _errors_on_other_half(few, fit.values, free, tuning)
     waiting = np.flatnonzero(OPTIONAL).tolist()
     while waiting:
-        tried = {number: _with_parameter(few, fit, number) for number in _most_promising(few, fit, waiting)}
+        promising = _most_promising(few, fit, waiting)[: tuning.tried_parameters]
+        tried = {number: _with_parameter(few, fit, number, tuning) for number in promising}
         gains = {number: _gain(few, judged, errors) for number, (_, errors) in tried.items()}
         best = max(gains, key=lambda number: gains[number].share)
-        if gains[best].share < MIN_GAIN or gains[best].p_value > MAX_JOINING_P_VALUE:
+        if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
             break
         fit, judged = tried[best]
         waiting.remove(best)
-    gains = {number: _gain_of(few, fit, number, base, judged) for number in np.flatnonzero(fit.free).tolist()}
-    worth = {number: gain for number, gain in gains.items() if _is_finding(gain, looks)}
-    return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free), worth, odd)
+    gains = {number: _gain_of(few, fit, number, (base, judged), tuning) for number in np.flatnonzero(fit.free).tolist()}
+    worth = {number: gain for number, gain in gains.items() if _is_finding(gain, looks, tuning)}
+    return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free, tuning.max_evaluations), worth, odd)
 
 
-def _choose_damping(windows: Windows, nominal: Array, free: NDArray[np.bool_]) -> tuple[ServoFit, Array]:
+def _choose_damping(
+    windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning: MotionTuning
+) -> tuple[ServoFit, Array]:
     """The first fit, with the simulation's kd or, where that is clearly better, with all damping outside the drive.
 
     The nominal numbers that come back have the same sum of kd and damping, and the kd of the fit.
     """
-    start = find_start(windows, nominal, free)
+    start = find_start(windows, nominal, free, tuning)
     kd = nominal[place("kd")]
     if not kd:
         return start, nominal
     outside = nominal.copy()
     outside[[place("kd"), place("damping")]] = 0.0, nominal[place("damping")] + kd
-    other = find_start(windows, outside, free)
-    if other.rms**2 < (1 - MIN_GAIN) * start.rms**2:
+    other = find_start(windows, outside, free, tuning)
+    if other.rms**2 < (1 - tuning.min_gain) * start.rms**2:
         return other, outside
     return start, nominal
 
 
-def find_odd_windows(windows: Windows, values: Array) -> NDArray[np.intp]:
+def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEFAULT) -> NDArray[np.intp]:
     """Windows whose error is far above that of the others in which the joint moves: at most a tenth of them."""
     errors = joint_errors(windows, values)[0]
     sizes = np.sqrt(np.bincount(windows.window, errors**2) / np.diff(windows.begin))
-    moving = np.ptp(windows.measured, axis=1) > MIN_MOTION
-    if moving.sum() < MIN_WINDOWS_FOR_ODD:
+    moving = np.ptp(windows.measured, axis=1) > tuning.min_motion
+    if moving.sum() < tuning.min_windows_for_odd:
         return np.zeros(0, dtype=np.intp)
-    odd = np.flatnonzero(sizes > ODD_FACTOR * np.median(sizes[moving]))
-    return np.sort(odd[np.argsort(-sizes[odd])][: int(MAX_ODD_SHARE * windows.count)])
+    odd = np.flatnonzero(sizes > tuning.odd_factor * np.median(sizes[moving]))
+    return np.sort(odd[np.argsort(-sizes[odd])][: int(tuning.max_odd_share * windows.count)])
 
 
 def _most_promising(windows: Windows, fit: ServoFit, waiting: list[int]) -> list[int]:
-    """The parameters that a linear model of the errors gains most from: one replay each, and no fit."""
+    """The parameters, first those that a linear model of the errors gains most from: one replay each, and no fit."""
     guesses = np.stack([fit.values, *(first_guess(windows, fit.values, number) for number in waiting)])
     errors = joint_errors(windows, guesses)
     slopes = np.linalg.qr(jacobian(windows, fit.values, fit.free))[0]
@@ -128,19 +121,19 @@ def _most_promising(windows: Windows, fit: ServoFit, waiting: list[int]) -> list
     columns = columns - slopes @ (slopes.T @ columns)
     sizes = np.linalg.norm(columns, axis=0)
     gains = np.abs(left @ columns) / np.where(sizes > 0, sizes, np.inf)
-    return [waiting[number] for number in np.argsort(-gains)[:TRIED]]
+    return [waiting[number] for number in np.argsort(-gains)]
 
 
-def _with_parameter(windows: Windows, fit: ServoFit, number: int) -> tuple[ServoFit, Array]:
+def _with_parameter(windows: Windows, fit: ServoFit, number: int, tuning: MotionTuning) -> tuple[ServoFit, Array]:
     """The fit with one parameter more, and its squared error of each window, learned on the other half."""
     free = fit.free.copy()
     free[number] = True
-    more = fit_servo(windows, first_guess(windows, fit.values, number), free, REFIT_EVALUATIONS)
-    return more, _errors_on_other_half(windows, more.values, free)
+    more = fit_servo(windows, first_guess(windows, fit.values, number), free, tuning.refit_evaluations)
+    return more, _errors_on_other_half(windows, more.values, free, tuning)
 
 
-def _is_finding(gain: Gain, looks: int) -> bool:
-    return gain.share > MIN_GAIN and gain.p_value * looks < MAX_P_VALUE
+def _is_finding(gain: Gain, looks: int, tuning: MotionTuning) -> bool:
+    return gain.share > tuning.min_gain and gain.p_value * looks < tuning.max_p_value
 
 
 def first_guess(windows: Windows, values: Array, number: int) -> Array:
@@ -158,24 +151,25 @@ def _halves(windows: Windows) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return numbers[0::2], numbers[1::2]
 
 
-def _errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool_]) -> Array:
+def _errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool_], tuning: MotionTuning) -> Array:
     """Squared error of each window, (windows,), by parameters that were fitted on the other half."""
     squares = np.zeros(windows.count)
     first, second = _halves(windows)
     for train, test in ((first, second), (second, first)):
-        fitted = fit_servo(windows.select(train), values, free, REFIT_EVALUATIONS)
+        fitted = fit_servo(windows.select(train), values, free, tuning.refit_evaluations)
         judged = windows.select(test)
         squares[test] = np.bincount(judged.window, joint_errors(judged, fitted.values)[0] ** 2)
     return squares
 
 
-def _gain_of(windows: Windows, fit: ServoFit, number: int, base: Array, judged: Array) -> Gain:
-    """What a fitted parameter is worth. judged: squared error of each window with it."""
+def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, Array], tuning: MotionTuning) -> Gain:
+    """What a fitted parameter is worth. known: the simulation's numbers; squared error of each window with it."""
+    base, judged = known
     if not np.isfinite(base[number]):
         return _gain(windows, np.full(windows.count, np.inf), judged)
     fixed, held = fit.free.copy(), fit.values.copy()
     fixed[number], held[number] = False, base[number]
-    return _gain(windows, _errors_on_other_half(windows, held, fixed), judged)
+    return _gain(windows, _errors_on_other_half(windows, held, fixed, tuning), judged)
 
 
 def chance_of_gain(difference: Array) -> float:

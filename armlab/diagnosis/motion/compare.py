@@ -15,12 +15,7 @@ from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.choose import (
-    MAX_JUDGED_WINDOWS,
-    MIN_GAIN,
-    chance_of_gain,
-    choose_servo,
-)
+from armlab.diagnosis.motion.choose import chance_of_gain, choose_servo
 from armlab.diagnosis.motion.diagnose import reason_unusable
 from armlab.diagnosis.motion.estimate import (
     LOGARITHMIC,
@@ -32,11 +27,11 @@ from armlab.diagnosis.motion.estimate import (
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, SCALE, ServoParameter
 from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.recordings.motion import MotionRecording
 
-LEVEL = 0.01  # of a false change, after Bonferroni's correction for all numbers of all joints
-EVALUATIONS = 8
+MIN_RUNS = 3  # of each recording, for a scatter between runs
 POWER_QUANTILE = 1.2816  # of 90 % power, for the smallest change that would have been seen
 Pair = tuple[Windows, Windows]
 
@@ -84,7 +79,10 @@ class MotionComparison:
 
 
 def compare_motion(
-    old: MotionRecording, new: MotionRecording, progress: Callable[[str], None] = lambda message: None
+    old: MotionRecording,
+    new: MotionRecording,
+    progress: Callable[[str], None] = lambda message: None,
+    tuning: MotionTuning = DEFAULT,
 ) -> MotionComparison:
     """What changed from one recording to another of the same robot; all runs of both take part.
 
@@ -98,23 +96,25 @@ def compare_motion(
         if reason is not None:
             return MotionComparison(names, f"{recording.name}: {reason}", ())
     simulations = [read_servo_simulation(recording) for recording in (old, new)]
-    windows = [make_windows(each.runs, simulation) for each, simulation in zip((old, new), simulations, strict=True)]
+    windows = [
+        make_windows(each.runs, simulation, tuning) for each, simulation in zip((old, new), simulations, strict=True)
+    ]
     looks = len(PARAMETERS) * len(old.joints)
     changes: list[ServoChange] = []
     for joint, pair in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {joint + 1} of {len(old.joints)}")
         fits = [
-            choose_servo(each, simulation.nominal.values[joint], looks)
+            choose_servo(each, simulation.nominal.values[joint], looks, tuning)
             for each, simulation in zip(pair, simulations, strict=True)
         ]
         sound = [
             each.select(np.setdiff1d(np.arange(each.count), fit.odd)) for each, fit in zip(pair, fits, strict=True)
         ]
         free = fits[0].fit.free | fits[1].fit.free
-        thinned = tuple(thin_windows(each, MAX_JUDGED_WINDOWS) for each in sound)
+        thinned = tuple(thin_windows(each, tuning.max_judged_windows) for each in sound)
         first, last = (each.fit for each in fits)
         starts = (np.where(first.free, first.values, last.values), np.where(last.free, last.values, first.values))
-        changes += _compare_joint((thinned[0], thinned[1]), starts, free, joint, looks)
+        changes += _compare_joint((thinned[0], thinned[1]), starts, free, (joint, looks), tuning)
     return MotionComparison(names, "", tuple(changes), tuple(_notes(old, new)))
 
 
@@ -140,13 +140,20 @@ class _PairFit:
     covariance: Array
 
 
-def _fit_pair(pair: Pair, start: Array, change: Array, free: NDArray[np.bool_], changing: Sequence[int]) -> _PairFit:
-    """One servo for both recordings, in which some numbers change."""
+def _fit_pair(
+    pair: Pair,
+    start: tuple[Array, Array],
+    free: NDArray[np.bool_],
+    changing: Sequence[int],
+    evaluations: int,
+) -> _PairFit:
+    """One servo for both recordings, in which some numbers change. start: coordinates and changes."""
+    first_old, first_change = start
     fitted, moved = np.flatnonzero(free), np.array(changing, dtype=np.intp)
     low, high = to_coordinates(LOWEST), to_coordinates(HIGHEST)
 
     def split(part: Array) -> tuple[Array, Array]:
-        old, difference = start.copy(), np.zeros(len(start))
+        old, difference = first_old.copy(), np.zeros(len(first_old))
         old[fitted], difference[moved] = part[: len(fitted)], part[len(fitted) :]
         return old, difference
 
@@ -164,8 +171,11 @@ def _fit_pair(pair: Pair, start: Array, change: Array, free: NDArray[np.bool_], 
         return np.concatenate([np.concatenate(blocks), beside], axis=1)
 
     scale = np.where(LOGARITHMIC, 0.2, SCALE)
-    first, sizes = np.concatenate([start[fitted], change[moved]]), np.concatenate([scale[fitted], scale[moved]])
-    found = least_squares(errors, first, jac=slopes, x_scale=sizes, max_nfev=EVALUATIONS, ftol=1e-5)
+    first, sizes = (
+        np.concatenate([first_old[fitted], first_change[moved]]),
+        np.concatenate([scale[fitted], scale[moved]]),
+    )
+    found = least_squares(errors, first, jac=slopes, x_scale=sizes, max_nfev=evaluations, ftol=1e-5)
     return _PairFit(*split(found.x), _covariance(pair, slopes(found.x), errors(found.x)))
 
 
@@ -179,11 +189,42 @@ def _covariance(pair: Pair, slopes: Array, errors: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """A fit, which numbers it has, (parameters,), and the places of those that change."""
+    """A fit, which numbers it has, (parameters,), the places of those that change, and evaluations of a fit."""
 
     fit: _PairFit
     free: NDArray[np.bool_]
     changing: tuple[int, ...]
+    evaluations: int
+
+
+def _run_errors(pair: Pair, model: _Model) -> tuple[Array, Array]:
+    """Standard errors of the changes from the scatter between runs, and degrees of freedom, (changing,) each.
+
+    What the law leaves out is alike in all windows of one motion, and differs between motions. So each run is a block:
+    the model is fitted without each of the G runs of a recording in turn (jackknife; Tukey 1958),
+
+        variance = sum over recordings of (G - 1) / G sum_k (change_k - mean)^2
+
+    with degrees of freedom after Welch 1947. Recordings of fewer than MIN_RUNS runs tell nothing: zeros.
+    """
+    changing = list(model.changing)
+    variances, freedoms = [], []
+    for recording, windows in enumerate(pair):
+        runs = np.unique(windows.run)
+        if len(runs) < MIN_RUNS or not changing:
+            return np.zeros(len(changing)), np.ones(len(changing))
+        moves = []
+        for run in runs:
+            parts = [pair[0], pair[1]]
+            parts[recording] = windows.select(np.flatnonzero(windows.run != run))
+            start = (model.fit.old, model.fit.change)
+            fitted = _fit_pair((parts[0], parts[1]), start, model.free, changing, model.evaluations)
+            moves.append(fitted.change[changing])
+        variances.append((len(runs) - 1) * np.var(moves, axis=0))
+        freedoms.append(len(runs) - 1)
+    whole = variances[0] + variances[1]
+    weights = variances[0] ** 2 / freedoms[0] + variances[1] ** 2 / freedoms[1]
+    return np.sqrt(whole), np.maximum(whole**2 / np.maximum(weights, 1e-300), 1.0)
 
 
 def _other_half_errors(pair: Pair, model: _Model) -> Array:
@@ -191,7 +232,8 @@ def _other_half_errors(pair: Pair, model: _Model) -> Array:
     squares = [np.zeros(each.count) for each in pair]
     for first in (0, 1):
         train = tuple(each.select(np.arange(first, each.count, 2)) for each in pair)
-        learned = _fit_pair((train[0], train[1]), model.fit.old, model.fit.change, model.free, model.changing)
+        start = (model.fit.old, model.fit.change)
+        learned = _fit_pair((train[0], train[1]), start, model.free, model.changing, model.evaluations)
         for number, each in enumerate(pair):
             rows = np.arange(1 - first, each.count, 2)
             judged = each.select(rows)
@@ -201,16 +243,17 @@ def _other_half_errors(pair: Pair, model: _Model) -> Array:
 
 
 def _compare_joint(
-    pair: Pair, starts: Sequence[Array], free: NDArray[np.bool_], joint: int, looks: int
+    pair: Pair, starts: Sequence[Array], free: NDArray[np.bool_], place_of: tuple[int, int], tuning: MotionTuning
 ) -> list[ServoChange]:
-    """All fitted numbers of one joint, changed or not. free: numbers that the model has.
+    """All fitted numbers of one joint, changed or not. free: numbers that the model has. place_of: joint, tests in all.
 
     All numbers differ at first. The one whose two values are missed least is tied, until each of the others is missed.
     """
+    joint, looks = place_of
     first, last = (to_coordinates(start) for start in starts)
     numbers = np.flatnonzero(free).tolist()
-    every = _fit_pair(pair, first, last - first, free, numbers)
-    model = _Model(every, free, tuple(numbers))
+    every = _fit_pair(pair, (first, last - first), free, numbers, tuning.pair_evaluations)
+    model = _Model(every, free, tuple(numbers), tuning.pair_evaluations)
     judged = _other_half_errors(pair, model)
     gains: dict[int, tuple[float, float, float]] = {}
     samples = len(pair[0].position) + len(pair[1].position)
@@ -226,13 +269,17 @@ def _compare_joint(
         needless = [
             number
             for number in tied
-            if (errors[number] - judged).sum() < MIN_GAIN * errors[number].sum() or chances[number] > LEVEL
+            if (errors[number] - judged).sum() < tuning.min_gain * errors[number].sum()
+            or chances[number] > tuning.max_p_value
         ]
         if not needless:
             break
         best = min(needless, key=lambda number: float(errors[number].sum()))
         model, judged = tied[best], errors[best]
-    return [_change(pair, number, joint, model, (every, numbers), gains, looks) for number in numbers]
+    models = (model, _Model(every, free, tuple(numbers), tuning.pair_evaluations))
+    judged_models = [(each, *_run_errors(pair, each)) for each in models]
+    found, test = {number: gains[number] for number in model.changing}, (looks, tuning.max_p_value)
+    return [_change(pair, number, joint, judged_models[number not in found], found, test) for number in numbers]
 
 
 def _tie(pair: Pair, model: "_Model", number: int) -> "_Model":
@@ -241,30 +288,35 @@ def _tie(pair: Pair, model: "_Model", number: int) -> "_Model":
     start, change = model.fit.old.copy(), model.fit.change.copy()
     start[number] += change[number] / 2
     change[number] = 0.0
-    return _Model(_fit_pair(pair, start, change, model.free, changing), model.free, changing)
+    fit = _fit_pair(pair, (start, change), model.free, changing, model.evaluations)
+    return _Model(fit, model.free, changing, model.evaluations)
 
 
 def _change(
     pair: Pair,
     number: int,
     joint: int,
-    model: "_Model",
-    every: tuple[_PairFit, list[int]],
+    judged: tuple[_Model, Array, Array],
     gains: dict[int, tuple[float, float, float]],
-    looks: int,
+    test: tuple[int, float],
 ) -> ServoChange:
-    """One number: its change where it was found, else none, with the interval of the fit in which all change."""
-    changed = number in model.changing
-    source, places = (model.fit, list(model.changing)) if changed else every
-    count = int(model.free.sum())
-    column = count + places.index(number)
-    error = float(np.sqrt(source.covariance[column, column]))
-    freedom = max(pair[0].count + pair[1].count - count - len(places), 1)
+    """One number: its change where it was found, else none, with the interval of the fit in which all change.
+
+    judged: that model, its errors between runs, and their degrees of freedom. test: number of tests in all, and their
+    level. The interval is the wider one of those of windows and of runs.
+    """
+    looks, level = test
+    (model, run_errors, run_freedoms), changed = judged, number in gains
+    source, position, count = model.fit, model.changing.index(number), int(model.free.sum())
+    windows_error = float(np.sqrt(source.covariance[count + position, count + position]))
+    windows_freedom = float(max(pair[0].count + pair[1].count - count - len(model.changing), 1))
+    candidates = ((windows_error, windows_freedom), (float(run_errors[position]), float(run_freedoms[position])))
+    error, freedom = max(candidates, key=lambda each: each[0] * float(student.ppf(0.975, each[1])))
     half = float(student.ppf(0.975, freedom)) * error
     low, high = LOWEST[number], HIGHEST[number]
     old = float(np.clip(from_coordinates(source.old)[number], low, high))
     move = float(source.change[number])
-    seen = (float(student.isf(LEVEL / looks, freedom)) + POWER_QUANTILE) * error
+    seen = (float(student.isf(level / looks, freedom)) + POWER_QUANTILE) * error
     unchanged = min(2 * float(student.sf(abs(move) / max(error, 1e-300), freedom)) * looks, 1.0)
     p_value = gains[number][0] if changed else unchanged
     if LOGARITHMIC[number]:

@@ -17,7 +17,8 @@ from armlab.diagnosis.formats import (
     RivalEntry,
     kind_of_effect,
 )
-from armlab.diagnosis.motion.compare import LEVEL, MotionComparison, ServoChange, compare_motion
+from armlab.diagnosis.motion.compare import MotionComparison, ServoChange, compare_motion
+from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.diagnosis.report.html import bullets, html_document, html_table, paragraph, section
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
@@ -53,7 +54,7 @@ def make_motion_comparison(comparison: MotionComparison) -> ComparisonFile:
         old=comparison.names[0],
         new=comparison.names[1],
         recordings=comparison.names,
-        level=LEVEL,
+        level=DEFAULT.max_p_value,
         findings=tuple(_finding(each) for each in comparison.changed),
         changes=tuple(_entry(each) for each in comparison.changes),
         smallest_detectable=tuple(

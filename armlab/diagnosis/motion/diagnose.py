@@ -16,22 +16,19 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo, choose_servo
-from armlab.diagnosis.motion.estimate import MAX_START_WINDOWS, fit_servo, thin_windows
+from armlab.diagnosis.motion.estimate import fit_servo, thin_windows
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import LOWEST, PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
 
-HELD_OUT_SHARE = 1 / 3  # of each run, its end, where no run validates
-MAX_UNEXPLAINED = 0.7  # of the error of a servo without gain: above it the command did not move the joint
-AT_FLOOR = 3.0  # times the noise of the encoder: an error that needs no explanation
 NO_SERVO = "no joint follows its command as a position servo does: check the columns, or the controller is another"
-SAME_ERROR = 1.25  # ratio of errors before and after, below which the simulation counts as right
 Status = Literal["mismatch", "none", "inconclusive"]
 
 
@@ -79,10 +76,11 @@ class JointError:
     spread: float
     floor: float
 
-    @property
-    def follows(self) -> bool:
+    def follows_command(self, tuning: MotionTuning = DEFAULT) -> bool:
         """Whether the replay tells more than the command alone, or the mean of the position."""
-        return self.replay_after < max(MAX_UNEXPLAINED * min(self.command, self.spread), AT_FLOOR * self.floor)
+        return self.replay_after < max(
+            tuning.max_unexplained * min(self.command, self.spread), tuning.at_floor * self.floor
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +109,9 @@ class MotionDiagnosis:
 
 
 def diagnose_motion(
-    recording: MotionRecording, progress: Callable[[str], None] = lambda message: None
+    recording: MotionRecording,
+    progress: Callable[[str], None] = lambda message: None,
+    tuning: MotionTuning = DEFAULT,
 ) -> MotionDiagnosis:
     """Which numbers of its servos the simulation of a recording gets wrong, and how much better it replays with others.
 
@@ -122,25 +122,25 @@ def diagnose_motion(
     reason = reason_unusable(recording)
     if reason is not None:
         return MotionDiagnosis(recording, simulation, "inconclusive", reason)
-    learned, held_out = split_runs(recording)
-    windows = make_windows(learned, simulation)
+    learned, held_out = split_runs(recording, tuning.held_out_share)
+    windows = make_windows(learned, simulation, tuning)
     still = [bool(np.ptp(joint.position) < MIN_MOVED) for joint in windows]
     looks = len(windows) * len(PARAMETERS)
     chosen: list[ChosenServo | None] = []
     for number, joint in enumerate(windows):
         progress(f"fitting joint {number + 1} of {len(windows)}")
-        fitted = None if still[number] else choose_servo(joint, simulation.nominal.values[number], looks)
-        chosen.append(fitted if fitted is not None and _explains(joint, fitted) else None)
+        fitted = None if still[number] else choose_servo(joint, simulation.nominal.values[number], looks, tuning)
+        chosen.append(fitted if fitted is not None and _explains(joint, fitted, tuning) else None)
     if not any(chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("replaying held-out runs")
-    judged = make_windows(held_out, simulation)
-    concluded = _conclude(recording, simulation, (windows, judged), chosen, held_out)
+    judged = make_windows(held_out, simulation, tuning)
+    concluded = _conclude(recording, simulation, (windows, judged), chosen, held_out, tuning)
     if concluded.servos is None:
         return concluded
     return replace(
         concluded,
-        odd=tuple(_odd_stretches(learned, chosen)),
+        odd=tuple(_odd_stretches(learned, chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
 
@@ -156,25 +156,27 @@ def reason_unusable(recording: MotionRecording) -> str | None:
     return None
 
 
-def split_runs(recording: MotionRecording) -> tuple[list[MotionRun], list[MotionRun]]:
+def split_runs(
+    recording: MotionRecording, held_out_share: float = DEFAULT.held_out_share
+) -> tuple[list[MotionRun], list[MotionRun]]:
     """The runs that identify, and those that are held out: runs that validate, else the last third of each run."""
     learned, held_out = list(recording.with_role("identify")), list(recording.with_role("validate"))
     if not learned:
         raise InputError(f"{recording.name}: no run has the role identify")
     if not held_out:
-        cuts = [int((1 - HELD_OUT_SHARE) * run.samples) for run in learned]
+        cuts = [int((1 - held_out_share) * run.samples) for run in learned]
         held_out = [run.rows(slice(cut, None)) for run, cut in zip(learned, cuts, strict=True)]
         learned = [run.rows(slice(cut)) for run, cut in zip(learned, cuts, strict=True)]
     return learned, held_out
 
 
-def _explains(windows: Windows, chosen: ChosenServo) -> bool:
+def _explains(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bool:
     """Whether the command explains the motion: a servo without gain, the rest fitted anew, does much worse."""
-    few = thin_windows(windows, MAX_START_WINDOWS)
+    few = thin_windows(windows, tuning.max_start_windows)
     free, values = chosen.fit.free.copy(), chosen.fit.values.copy()
     free[place("kp")], values[place("kp")] = False, LOWEST[place("kp")]
-    passive = fit_servo(few, values, free)
-    return _rms(joint_errors(few, chosen.fit.values)[0]) < MAX_UNEXPLAINED * passive.rms
+    passive = fit_servo(few, values, free, tuning.max_evaluations)
+    return _rms(joint_errors(few, chosen.fit.values)[0]) < tuning.max_unexplained * passive.rms
 
 
 def _conclude(
@@ -183,6 +185,7 @@ def _conclude(
     windows: tuple[Sequence[Windows], Sequence[Windows]],
     chosen: Sequence[ChosenServo | None],
     held_out: Sequence[MotionRun],
+    tuning: MotionTuning,
 ) -> MotionDiagnosis:
     """Findings, replays and errors. windows: of the runs that identify, and of those that are held out."""
     learned, judged = windows
@@ -192,7 +195,7 @@ def _conclude(
         finding
         for number, each in enumerate(chosen)
         if each is not None
-        for finding in name_differences(number, each, simulation, learned[number], judged[number])
+        for finding in name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
     ]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(simulation, None, held_out)) if known else ()
@@ -200,10 +203,11 @@ def _conclude(
     errors = tuple(
         _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
-    if not any(each.follows for each in errors):
+    follows = {each.joint: each.follows_command(tuning) for each in errors}
+    if not any(follows.values()):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
-    findings = [each for each in findings if errors[each.joint - 1].follows]
-    status, reason = _status(findings, errors, chosen, known)
+    findings = [each for each in findings if follows[each.joint]]
+    status, reason = _status(findings, errors, chosen, tuning.same_error if known else None)
     tools = [
         float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
         for part in (before, after)
@@ -221,7 +225,7 @@ def _conclude(
         replayed_before=before,
         replayed_after=after,
         tool=(tools[0] if before else None, tools[-1]),
-        silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not each.follows),
+        silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not follows[each.joint]),
     )
 
 
@@ -240,26 +244,37 @@ def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo 
 
 
 def _status(
-    findings: Sequence[ServoFinding], errors: Sequence[JointError], chosen: Sequence[ChosenServo | None], known: bool
+    findings: Sequence[ServoFinding],
+    errors: Sequence[JointError],
+    chosen: Sequence[ChosenServo | None],
+    same_error: float | None,
 ) -> tuple[Status, str]:
     if findings:
         return "mismatch", ""
-    if not known:
+    if same_error is None:
         return "inconclusive", "the simulation has no controller to compare with, and no number stands out"
-    worse = [each for each in errors if each.before is not None and each.before > SAME_ERROR * each.after]
+    worse = [each for each in errors if each.before is not None and each.before > same_error * each.after]
     if worse or any(each is None for each in chosen):
         return "inconclusive", "the simulation replays the motion with an error that no number of the servos explains"
     return "none", ""
 
 
 def name_differences(
-    number: int, chosen: ChosenServo, simulation: ServoSimulation, learned: Windows, judged: Windows
+    number: int,
+    chosen: ChosenServo,
+    simulation: ServoSimulation,
+    windows: tuple[Windows, Windows],
+    tuning: MotionTuning = DEFAULT,
 ) -> list[ServoFinding]:
-    """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's."""
+    """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's.
+
+    windows: of the runs that identify, and of those that are held out.
+    """
+    learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd))
-    confused = confused_parameters(sound, fit)
-    scale = ("rotor_inertia", "inertial_parameter_error") if has_weak_load(sound, fit.values) else ()
+    confused = confused_parameters(sound, fit, tuning)
+    scale = ("rotor_inertia", "inertial_parameter_error") if has_weak_load(sound, fit.values, tuning) else ()
     if not chosen.gains:
         return []
     errors = joint_errors(judged, np.stack([_with_nominal(fit.values, chosen.nominal, each) for each in chosen.gains]))
@@ -356,10 +371,10 @@ def _errors(
 
 
 def _odd_stretches(
-    runs: Sequence[MotionRun], chosen: Sequence[ChosenServo | None]
+    runs: Sequence[MotionRun], chosen: Sequence[ChosenServo | None], tuning: MotionTuning
 ) -> list[tuple[int, str, float, float]]:
     """Joint (from 1), run, first and last instant of the windows that a joint's servo does not explain."""
-    stretches = window_stretches(runs)
+    stretches = window_stretches(runs, tuning)
     found: list[tuple[int, str, float, float]] = []
     for number, each in enumerate(chosen):
         odd: NDArray[np.intp] = each.odd if each is not None else np.zeros(0, dtype=np.intp)

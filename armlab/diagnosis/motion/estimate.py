@@ -17,16 +17,11 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import HIGHEST, INFINITE_LIMIT, KEYS, LOWEST, NEUTRAL, SCALE, place
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
 RELATIVE_STEP, SCALE_STEP = 0.01, 0.02  # of finite differences: large, because a joint that sticks is not smooth
-MAX_EVALUATIONS = 15
-FREQUENCIES_HZ = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)  # of a grid of starts: from a soft hobby servo to a stiff drive
-DAMPING_RATIOS = (0.4, 1.5)
-MAX_START_WINDOWS = 24
-MOVING_SPEED = 0.1  # rad/s (m/s): rows of the regression, above the noise of a differentiated encoder
-STARTS, START_EVALUATIONS = 2, 8  # fits on few windows, and evaluations of each
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +75,9 @@ def jacobian(windows: Windows, values: Array, free: NDArray[np.bool_]) -> Array:
     return np.asarray(((errors[0::2] - errors[1::2]) / widths[:, None]).T)
 
 
-def fit_servo(windows: Windows, start: Array, free: NDArray[np.bool_], evaluations: int = MAX_EVALUATIONS) -> ServoFit:
+def fit_servo(
+    windows: Windows, start: Array, free: NDArray[np.bool_], evaluations: int = DEFAULT.max_evaluations
+) -> ServoFit:
     """The fit of the free parameters from a start, (parameters,); the others keep their values."""
     values = np.clip(start, LOWEST, HIGHEST)
     chosen = np.flatnonzero(free)
@@ -116,17 +113,17 @@ def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) ->
     return np.asarray(inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1))
 
 
-def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_]) -> ServoFit:
+def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning: MotionTuning = DEFAULT) -> ServoFit:
     """The best of several fits of the free parameters: from the regression, a grid of gains, and the simulation.
 
     nominal: (parameters,), NaN where the simulation does not know a value.
     """
-    few = thin_windows(windows, MAX_START_WINDOWS)
-    starts = _starts(few, nominal)
+    few = thin_windows(windows, tuning.max_start_windows)
+    starts = _starts(few, nominal, tuning)
     errors = joint_errors(few, starts)
-    best = np.argsort(np.mean(errors**2, axis=1))[:STARTS]
-    fits = [fit_servo(few, starts[each], free, START_EVALUATIONS) for each in best]
-    return fit_servo(windows, min(fits, key=lambda fit: fit.rms).values, free)
+    best = np.argsort(np.mean(errors**2, axis=1))[: tuning.starts]
+    fits = [fit_servo(few, starts[each], free, tuning.start_evaluations) for each in best]
+    return fit_servo(windows, min(fits, key=lambda fit: fit.rms).values, free, tuning.max_evaluations)
 
 
 def thin_windows(windows: Windows, most: int) -> Windows:
@@ -140,15 +137,15 @@ def fill_unknown(nominal: Array) -> Array:
     return np.where(np.isnan(nominal), NEUTRAL, nominal)
 
 
-def _starts(windows: Windows, nominal: Array) -> Array:
+def _starts(windows: Windows, nominal: Array, tuning: MotionTuning) -> Array:
     """Parameter sets (starts, parameters)."""
     base = fill_unknown(nominal)
     mass = float(np.median(windows.inertia)) + base[place("armature")]
     found = [] if np.isnan(nominal).any() else [base]
-    regressed = _regress(windows, base)
+    regressed = _regress(windows, base, tuning.moving_speed)
     frictions = {0.0, float(regressed[place("friction")]), *((float(base[place("friction")]),) if len(found) else ())}
-    for frequency in FREQUENCIES_HZ:
-        for ratio in DAMPING_RATIOS:
+    for frequency in tuning.frequencies_hz:
+        for ratio in tuning.damping_ratios:
             for friction in frictions:
                 one = base.copy()
                 one[place("kp")] = mass * (2 * np.pi * frequency) ** 2
@@ -160,7 +157,7 @@ def _starts(windows: Windows, nominal: Array) -> Array:
     return np.clip(np.stack(found), LOWEST, HIGHEST)
 
 
-def _regress(windows: Windows, base: Array) -> Array:
+def _regress(windows: Windows, base: Array, moving_speed: float) -> Array:
     """kp e - damping qd - friction sgn(qd) = inertia qdd + load, on moving rows, by least squares."""
     steps = windows.measured.shape[1]
     stride = max(round(0.02 / windows.step_s), 1)
@@ -170,7 +167,7 @@ def _regress(windows: Windows, base: Array) -> Array:
     command = windows.command[:, windows.history : windows.history + steps : stride]
     error = command - windows.measured[:, ::stride]
     known = (windows.inertia[:, ::stride] + base[place("armature")]) * acceleration + windows.load[:, ::stride]
-    rows = np.abs(velocity) > MOVING_SPEED
+    rows = np.abs(velocity) > moving_speed
     found = base.copy()
     if rows.sum() < 10:
         return found

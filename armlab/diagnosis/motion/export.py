@@ -1,20 +1,21 @@
-"""The servos of a diagnosis as files of simulators: MJCF, Isaac Lab, mjlab; with what their fields cannot express.
+"""The servos of a diagnosis as MJCF, and what the fields of a simulator cannot express of them.
 
 MJCF: kp and kv in the actuator, limit as its forcerange, delay as its delay (with a buffer of commands), damping,
 friction and armature in the joint. kv is that of the simulation, or 0 where damping outside the force range explains
 the motion better. The friction loss gets a `solimpfriction` that sticks: with MuJoCo's own a loaded joint creeps.
 """
 
+import json
 import math
 from collections.abc import Iterator
 
-import numpy as np
-
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.replay import STICKING
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Servos
+from armlab.diagnosis.motion.servo_plugin import NUMBERS, STICKING
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from problem.mjcf import import_mujoco
+
+MAX_DELAY_ERROR = 0.01  # of a delay: what rounding to whole steps may change without a line
 
 
 def mjcf_text(simulation: ServoSimulation, servos: Servos) -> str:
@@ -49,8 +50,8 @@ def mjcf_text(simulation: ServoSimulation, servos: Servos) -> str:
         raise InputError(f"MuJoCo cannot write {simulation.path.name}: {' '.join(str(error).split())}") from None
 
 
-def missing_in_mjcf(simulation: ServoSimulation, servos: Servos) -> Iterator[str]:
-    """What MJCF has no field for, one line a number."""
+def lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterator[str]:
+    """What no simulator that armlab writes for has a field for, one line a number, with what to do instead."""
     for row, place in enumerate(simulation.joints):
         name = simulation.arm.joints[place].name
         offset, band = float(servos.get("offset")[row]), float(servos.get("dead_band")[row])
@@ -60,62 +61,37 @@ def missing_in_mjcf(simulation: ServoSimulation, servos: Servos) -> Iterator[str
         if band:
             yield f"{name}: send the position itself where |command - position| is below {band / 2:.4g} rad (dead band)"
         if share:
-            yield f"{name}: at each step add {share:.4g} |qfrc_bias| to frictionloss (friction that grows with load)"
+            yield (
+                f"{name}: add {share:.4g} |load| to the friction at each step; load: torque of gravity and velocities, "
+                "qfrc_bias in MuJoCo (friction that grows with load)"
+            )
         if delay < 0:
             yield f"{name}: the position was read {-1e3 * delay:.3g} ms after its stamp (no field is needed)"
+    if simulation.rate_hz is not None:
+        yield f"the servos take a command over {simulation.rate_hz:g} times a second and hold it: send it at that rate"
     if simulation.supply is not None:
-        yield f"kp and forcerange hold at {simulation.supply:g} V: scale both with the supply voltage"
+        yield f"kp and torque limit hold at {simulation.supply:g} V: scale both with the supply voltage"
 
 
-def isaac_lab_text(simulation: ServoSimulation, servos: Servos, step_s: float) -> str:
-    """Actuators for Isaac Lab (`DelayedPDActuatorCfg`): N m/rad, N m s/rad, N m, kg m2, delays in physics steps.
-
-    Fields as in isaaclab.actuators v2.3.2. Its effort limit holds for the whole PD law, so kd is its `damping` and the
-    joint's own damping its `viscous_friction`. step_s: of the physics, s.
-    """
-    lines = ["# Isaac Lab: put into ArticulationCfg(actuators={...}); delays are steps of the physics", "{"]
+def delay_steps(simulation: ServoSimulation, servos: Servos, step_s: float) -> tuple[list[int], list[str]]:
+    """Delay of each joint's command in steps of the physics, and a line for each that steps do not hold exactly."""
+    steps, lines = [], []
     for row, place in enumerate(simulation.joints):
-        delay = max(round(float(servos.get("delay")[row]) / step_s), 0)
-        fields = {
-            "joint_names_expr": repr([simulation.arm.joints[place].name]),
-            "stiffness": f"{servos.get('kp')[row]:.6g}",
-            "damping": f"{servos.get('kd')[row]:.6g}",
-            "effort_limit": _limit(servos, row),
-            "armature": f"{servos.get('armature')[row]:.6g}",
-            "friction": f"{servos.get('friction')[row]:.6g}",
-            "dynamic_friction": f"{servos.get('friction')[row]:.6g}",
-            "viscous_friction": f"{servos.get('damping')[row]:.6g}",
-            "min_delay": str(delay),
-            "max_delay": str(delay),
-        }
-        inner = ", ".join(f"{name}={value}" for name, value in fields.items())
-        lines.append(f'    "{simulation.arm.joints[place].name}": DelayedPDActuatorCfg({inner}),')
-    return "\n".join([*lines, "}", ""])
+        delay = max(float(servos.get("delay")[row]), 0.0)
+        steps.append(round(delay / step_s))
+        if abs(steps[-1] * step_s - delay) > MAX_DELAY_ERROR * delay:
+            lines.append(
+                f"{simulation.arm.joints[place].name}: the delay of {1e3 * delay:.3g} ms becomes {steps[-1]} steps of "
+                f"{1e3 * step_s:g} ms, {1e3 * steps[-1] * step_s:.3g} ms"
+            )
+    return steps, lines
 
 
-def mjlab_text(simulation: ServoSimulation, servos: Servos, step_s: float) -> str:
-    """Actuators for mjlab (`BuiltinPositionActuatorCfg` of v1.6): delays in physics steps; step_s: of the physics, s.
-
-    mjlab's damping becomes kv, inside the force limit; the joint's own damping stays in the MJCF of the verdict.
-    """
-    lines = ["# mjlab: EntityArticulationInfoCfg(actuators=(...)), with the joints of simulation.xml", "("]
+def servos_json(simulation: ServoSimulation, servos: Servos) -> str:
+    """`servos.json`: the numbers that `servo_plugin.py` reads, SI units, one entry a joint."""
+    entries = []
     for row, place in enumerate(simulation.joints):
-        delay = max(round(float(servos.get("delay")[row]) / step_s), 0)
-        fields = {
-            "target_names_expr": f"({simulation.arm.joints[place].name!r},)",
-            "stiffness": f"{servos.get('kp')[row]:.6g}",
-            "damping": f"{servos.get('kd')[row]:.6g}",
-            "effort_limit": _limit(servos, row),
-            "armature": f"{servos.get('armature')[row]:.6g}",
-            "frictionloss": f"{servos.get('friction')[row]:.6g}",
-            "delay_min_lag": str(delay),
-            "delay_max_lag": str(delay),
-        }
-        inner = ", ".join(f"{name}={value}" for name, value in fields.items())
-        lines.append(f"    BuiltinPositionActuatorCfg({inner}),")
-    return "\n".join([*lines, ")", ""])
-
-
-def _limit(servos: Servos, row: int) -> str:
-    limit = float(servos.get("limit")[row])
-    return f"{limit:.6g}" if np.isfinite(limit) and limit < INFINITE_LIMIT else "None"
+        numbers = servos.of_joint(row)
+        numbers["delay"] = max(float(servos.get("delay")[row]), 0.0)
+        entries.append({"joint": simulation.arm.joints[place].name, **{key: numbers[key] for key in NUMBERS}})
+    return json.dumps({"rate_hz": simulation.rate_hz, "servos": entries}, indent=2) + "\n"

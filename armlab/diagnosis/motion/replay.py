@@ -8,12 +8,11 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.servo import Servos
+from armlab.diagnosis.motion.servo_plugin import STICKING, set_fields
 from armlab.diagnosis.motion.simulation import ServoSimulation, actuator_of
 from armlab.diagnosis.motion.windows import held_command, smooth_motion, supply_factor
 from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco
-
-STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +35,7 @@ def with_servos(model: Any, simulation: ServoSimulation, servos: Servos) -> Any:
     Command delay, offset, dead band and load friction have no field; `replay` adds them. The friction loss sticks.
     """
     for row, joint in enumerate(simulation.joints):
-        actuator = actuator_of(model, joint)
-        kp, kd, limit = (servos.get(key)[row] for key in ("kp", "kd", "limit"))
-        model.actuator_gainprm[actuator, 0] = kp
-        model.actuator_biasprm[actuator, :3] = 0.0, -kp, -kd
-        model.actuator_forcelimited[actuator] = 1
-        model.actuator_forcerange[actuator] = -limit, limit
-        model.dof_damping[joint] = servos.get("damping")[row]
-        model.dof_frictionloss[joint] = servos.get("friction")[row]
-        model.dof_armature[joint] = servos.get("armature")[row]
-        model.dof_solimp[joint] = STICKING
+        set_fields(model, joint, actuator_of(model, joint), servos.of_joint(row))
     return model
 
 

@@ -5,7 +5,7 @@ from html import escape
 import numpy as np
 
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis
-from armlab.diagnosis.motion.export import missing_in_mjcf
+from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.words import finding_phrase, summary_of
 from armlab.diagnosis.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
@@ -96,6 +96,10 @@ def _numbers(diagnosis: MotionDiagnosis) -> str:
 
 def _files(diagnosis: MotionDiagnosis) -> str:
     assert diagnosis.servos is not None
-    words = "simulation.xml is the simulation with these numbers, as MJCF for MuJoCo. What MJCF has no field for:"
-    missing = list(missing_in_mjcf(diagnosis.simulation, diagnosis.servos)) or ["nothing"]
+    words = (
+        "simulation.xml is the simulation with these numbers, as MJCF for MuJoCo; robot.urdf and controllers.yaml are "
+    )
+    words += "for ROS 2, isaaclab_actuators.py for Isaac Lab, mjlab_actuators.py for mjlab; each says what it does not "
+    words += "hold. servo_plugin.py adds the rest to a simulation in MuJoCo. What MJCF has no field for:"
+    missing = list(lines_without_field(diagnosis.simulation, diagnosis.servos)) or ["nothing"]
     return section("files", "The simulation with these numbers", paragraph(words), bullets(missing))

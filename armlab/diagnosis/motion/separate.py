@@ -9,15 +9,13 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import ServoFit, jacobian
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, USUAL, place
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
-CLASS_FACTOR = 3.0  # of a standard error (chosen by eye)
-CLASS_CORRELATION = 0.95  # of two parameters that are both fitted
-MIN_LOAD_SHARE = 0.1  # of the drive's torque: below it gravity does not set the scale of torques (chosen by eye)
 TORQUE_SCALED = ("kp", "kd", "damping", "friction", "limit", "armature")  # one factor for all, and for the inertia
 
 
-def confused_parameters(windows: Windows, fit: ServoFit) -> dict[int, tuple[int, ...]]:
+def confused_parameters(windows: Windows, fit: ServoFit, tuning: MotionTuning = DEFAULT) -> dict[int, tuple[int, ...]]:
     """For each fitted parameter, the places of the parameters that these data do not separate from it."""
     every = np.array(USUAL) | np.array(OPTIONAL)
     every[place("limit")] = fit.values[place("limit")] < INFINITE_LIMIT
@@ -29,23 +27,23 @@ def confused_parameters(windows: Windows, fit: ServoFit) -> dict[int, tuple[int,
     for first in range(len(fitted)):
         for second in range(len(fitted)):
             size = np.sqrt(alone[first, first] * alone[second, second])
-            if first != second and abs(alone[first, second]) > CLASS_CORRELATION * size:
+            if first != second and abs(alone[first, second]) > tuning.class_correlation * size:
                 found[fitted[first]].append(fitted[second])
     for other in set(columns) - set(fitted):
         if not np.any(columns[other]):
             continue
         wider = _inverse([columns[number] for number in (*fitted, other)])
         for position, number in enumerate(fitted):
-            if wider[position, position] > CLASS_FACTOR**2 * alone[position, position] > 0:
+            if wider[position, position] > tuning.class_factor**2 * alone[position, position] > 0:
                 found[number].append(other)
     return {number: tuple(sorted(others)) for number, others in found.items()}
 
 
-def has_weak_load(windows: Windows, values: Array) -> bool:
+def has_weak_load(windows: Windows, values: Array, tuning: MotionTuning = DEFAULT) -> bool:
     """Whether gravity is too weak at a joint to set the scale of torques: the simulation's inertia alone does."""
     command = windows.command[:, windows.history : windows.history + windows.measured.shape[1]]
     drive = values[place("kp")] * (command - windows.measured)
-    return bool(np.sqrt(np.mean(windows.load**2)) < MIN_LOAD_SHARE * np.sqrt(np.mean(drive**2)))
+    return bool(np.sqrt(np.mean(windows.load**2)) < tuning.min_load_share * np.sqrt(np.mean(drive**2)))
 
 
 def _inverse(columns: list[Array]) -> Array:

@@ -220,3 +220,8 @@ class Servos:
     def get(self, key: Key) -> Array:
         """One parameter of all joints, (joints,)."""
         return np.asarray(self.values[:, place(key)])
+
+    def of_joint(self, row: int) -> dict[str, float | None]:
+        """All parameters of one joint by their keys; a limit of None is no limit."""
+        numbers: dict[str, float | None] = dict(zip(KEYS, self.values[row].tolist(), strict=True))
+        return numbers | ({"limit": None} if self.values[row, place("limit")] >= INFINITE_LIMIT else {})

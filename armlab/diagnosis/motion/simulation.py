@@ -10,6 +10,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, NEUTRAL, Servos, place
+from armlab.diagnosis.motion.servo_plugin import find_actuator
 from armlab.identification.export import SimulatorModel, mjcf_document
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
@@ -118,7 +119,7 @@ def _servos_of_mjcf(recording: MotionRecording, path: Path) -> Array:
         values[row, place("damping")] = model.dof_damping[joint]
         values[row, place("armature")] = model.dof_armature[joint]
         values[row, place("friction")] = model.dof_frictionloss[joint]
-        actuator = _actuator_of(model, joint)
+        actuator = find_actuator(model, joint)
         if actuator is None:
             continue
         gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
@@ -126,19 +127,15 @@ def _servos_of_mjcf(recording: MotionRecording, path: Path) -> Array:
             name = recording.arm.joints[joint].name
             raise InputError(f"{path}: the actuator of joint '{name}' is no position servo with gear 1")
         values[row, place("kp")], values[row, place("kd")] = gain[0], -bias[2]
+        values[row, place("delay")] = model.actuator_delay[actuator]
         if model.actuator_forcelimited[actuator]:
             values[row, place("limit")] = min(model.actuator_forcerange[actuator, 1], INFINITE_LIMIT)
     return values
 
 
-def _actuator_of(model: Any, joint: int) -> int | None:
-    found = np.flatnonzero((model.actuator_trnid[:, 0] == joint) & (model.actuator_trntype == 0))
-    return int(found[0]) if len(found) else None
-
-
 def actuator_of(model: Any, joint: int) -> int:
     """The actuator of a joint, from 0."""
-    found = _actuator_of(model, joint)
+    found = find_actuator(model, joint)
     if found is None:
         raise InputError(f"joint '{model.joint(joint).name}' has no actuator")
     return found

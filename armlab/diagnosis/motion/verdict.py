@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.formats import (
     VERDICT_SCHEMA,
     FindingEntry,
@@ -20,8 +21,11 @@ from armlab.diagnosis.formats import (
     WhereEntry,
     kind_of_effect,
 )
+from armlab.diagnosis.motion import servo_plugin
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
-from armlab.diagnosis.motion.export import isaac_lab_text, missing_in_mjcf, mjcf_text, mjlab_text
+from armlab.diagnosis.motion.export import lines_without_field, mjcf_text, servos_json
+from armlab.diagnosis.motion.robot_learning import isaac_lab_text, mjlab_text
+from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.words import summary_of
 from armlab.effects.library import effect_named
@@ -39,9 +43,16 @@ def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
         step = float(simulation.model().opt.timestep)
         texts[MODEL] = model_text(diagnosis, folder)
         texts[SIMULATION] = mjcf_text(simulation, servos)
-        texts["actuators.isaaclab.txt"] = isaac_lab_text(simulation, servos, step)
-        texts["actuators.mjlab.txt"] = mjlab_text(simulation, servos, step)
-        missing = list(missing_in_mjcf(simulation, servos))
+        texts["isaaclab_actuators.py"] = isaac_lab_text(simulation, servos, step)
+        texts["mjlab_actuators.py"] = mjlab_text(simulation, servos, step)
+        texts["servos.json"] = servos_json(simulation, servos)
+        texts["servo_plugin.py"] = Path(servo_plugin.__file__).read_text(encoding="utf-8")
+        missing = list(lines_without_field(simulation, servos))
+        try:
+            texts["robot.urdf"] = ros_urdf_text(simulation, servos)
+            texts["controllers.yaml"] = controllers_text(simulation, servos, step)
+        except InputError as error:
+            missing.append(f"no robot.urdf: {error}")
         texts["not-in-simulation.txt"] = "\n".join([*missing, ""]) if missing else "everything is in the file\n"
     return texts
 

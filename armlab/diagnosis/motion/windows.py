@@ -17,17 +17,12 @@ from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.simulation import ServoSimulation
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.recordings.recording import MotionRun
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
-LONGEST_WINDOW_S = 10.0  # s, about: longer than any servo settles
-SHORTEST_WINDOW_S = 1.0  # s: below it a window tells little but its first state
-WANTED_WINDOWS = 24  # blocks for the statistics, where the recording is long enough
-LONGEST_STEP_S = 0.0025  # s, of the integration
-HISTORY_S = 0.3  # s of commands before a window, for delays
-CUTOFF_HZ = 10.0  # of the motion that makes load and inertia: coupling torques only, the joint itself is simulated
 SLOPE_STEP = 1e-3  # rad (m), of the central difference
 
 
@@ -37,8 +32,8 @@ class Windows:
 
     command: (windows, history + steps + history), rad; the first step of a window is column `history`. inertia, load,
     slope, measured: (windows, steps). supply: the same, factor of the torque, or None. first_velocity: (windows,),
-    rad/s. begin: (windows + 1,), the first sample of each window; row, fraction: (samples,), where on the grid a
-    measured sample lies; position: (samples,), rad.
+    rad/s. run: (windows,), the run that a window was cut from. begin: (windows + 1,), the first sample of each window;
+    row, fraction: (samples,), where on the grid a measured sample lies; position: (samples,), rad.
     """
 
     step_s: float
@@ -50,6 +45,7 @@ class Windows:
     measured: Array
     supply: Array | None
     first_velocity: Array
+    run: NDArray[np.intp]
     begin: NDArray[np.int64]
     row: NDArray[np.int64]
     fraction: Array
@@ -78,6 +74,7 @@ class Windows:
             measured=self.measured[chosen],
             supply=None if self.supply is None else self.supply[chosen],
             first_velocity=self.first_velocity[chosen],
+            run=self.run[chosen],
             begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
             row=self.row[kept],
             fraction=self.fraction[kept],
@@ -85,12 +82,12 @@ class Windows:
         )
 
 
-def smooth_motion(run: MotionRun) -> Motion:
+def smooth_motion(run: MotionRun, tuning: MotionTuning = DEFAULT) -> Motion:
     """Measured positions through a zero-phase low-pass, with their derivatives, at the stamps of the run."""
     time = np.linspace(run.time[0], run.time[-1], run.samples)
     rate_hz = (run.samples - 1) / (run.time[-1] - run.time[0])
     even = np.stack([np.interp(time, run.time, column) for column in run.position.T], axis=1)
-    cutoff = min(CUTOFF_HZ, 0.2 * rate_hz)
+    cutoff = min(tuning.cutoff_hz, 0.2 * rate_hz)
     smooth = sosfiltfilt(butter(2, cutoff, fs=rate_hz, output="sos"), even, axis=0)
     velocity = np.gradient(smooth, 1 / rate_hz, axis=0)
     return Motion(smooth, velocity, np.gradient(velocity, 1 / rate_hz, axis=0))
@@ -138,28 +135,30 @@ class _Piece:
     last: int
 
 
-def make_windows(runs: Sequence[MotionRun], simulation: ServoSimulation) -> list[Windows]:
+def make_windows(
+    runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: MotionTuning = DEFAULT
+) -> list[Windows]:
     """The windows of each recorded joint; runs are cut into stretches of about the same length."""
-    pieces = _cut_runs(runs)
+    pieces = _cut_runs(runs, tuning)
     sample = min(1 / run.rate_hz for run in runs)
-    step = sample / np.ceil(sample / LONGEST_STEP_S)
-    motions = [smooth_motion(run) for run in runs]
+    step = sample / np.ceil(sample / tuning.longest_step_s)
+    motions = [smooth_motion(run, tuning) for run in runs]
     loads = [joint_loads(simulation.arm, simulation.joints, motion) for motion in motions]
     steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.first]) / step)) + 2 for p in pieces)
-    history = int(np.ceil(HISTORY_S / step))
+    history = int(np.ceil(tuning.history_s / step))
     made = []
     for joint in range(len(simulation.joints)):
         columns = [
             _column(runs[p.run], motions[p.run], loads[p.run], p, joint, simulation, (step, steps, history))
             for p in pieces
         ]
-        made.append(_stack(columns, step, history))
+        made.append(_stack(columns, np.array([p.run for p in pieces]), step, history))
     return made
 
 
-def _cut_runs(runs: Sequence[MotionRun]) -> list[_Piece]:
+def _cut_runs(runs: Sequence[MotionRun], tuning: MotionTuning) -> list[_Piece]:
     whole = sum(float(run.time[-1] - run.time[0]) for run in runs)
-    seconds = min(max(whole / WANTED_WINDOWS, SHORTEST_WINDOW_S), LONGEST_WINDOW_S)
+    seconds = min(max(whole / tuning.wanted_windows, tuning.shortest_window_s), tuning.longest_window_s)
     return [piece for number, run in enumerate(runs) for piece in _cut(run, number, seconds)]
 
 
@@ -215,7 +214,7 @@ def _column(
     }
 
 
-def _stack(columns: list[dict[str, Array | None]], step: float, history: int) -> Windows:
+def _stack(columns: list[dict[str, Array | None]], run: NDArray[np.intp], step: float, history: int) -> Windows:
     def grid(name: str) -> Array:
         return np.ascontiguousarray(np.stack([np.asarray(column[name]) for column in columns]))
 
@@ -232,6 +231,7 @@ def _stack(columns: list[dict[str, Array | None]], step: float, history: int) ->
         measured=grid("measured"),
         supply=None if columns[0]["supply"] is None else grid("supply"),
         first_velocity=np.array([float(np.asarray(column["velocity"])) for column in columns]),
+        run=run,
         begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
         row=row,
         fraction=place - row,
@@ -239,7 +239,7 @@ def _stack(columns: list[dict[str, Array | None]], step: float, history: int) ->
     )
 
 
-def window_stretches(runs: Sequence[MotionRun]) -> list[tuple[str, float, float]]:
+def window_stretches(runs: Sequence[MotionRun], tuning: MotionTuning = DEFAULT) -> list[tuple[str, float, float]]:
     """Run, first and last instant (s) of each window that `make_windows` makes of the same runs."""
-    stretches = ((runs[piece.run], piece) for piece in _cut_runs(runs))
+    stretches = ((runs[piece.run], piece) for piece in _cut_runs(runs, tuning))
     return [(run.name, float(run.time[piece.first]), float(run.time[piece.last])) for run, piece in stretches]

@@ -1,7 +1,7 @@
 """Diagnoses a recording of motion only and writes verdict, model, simulation and report into a folder."""
 
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from armlab.common.documents import ResultLines
@@ -11,21 +11,30 @@ from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.words import motion_lines
+from armlab.diagnosis.tuning import Tuning, change_tuning, parse_change
 from armlab.recordings.motion import load_motion_recording
 
 
 def diagnose_motion_recording(
-    folder: Path, out: Path, progress: Callable[[str], None] = lambda message: None
+    folder: Path,
+    out: Path,
+    progress: Callable[[str], None] = lambda message: None,
+    changes: Sequence[str] = (),
 ) -> ResultLines:
     """Diagnoses the recording in `folder`, writes all files into `out` or none, and yields lines to print.
 
-    Raises InputError, in one line, for a recording that cannot be used.
+    changes: tuning numbers like `motion.min_gain=0.05`. Raises InputError, in one line, for a recording or a number
+    that cannot be used.
     """
+    tuning = Tuning()
+    for change in changes:
+        tuning = change_tuning(tuning, *parse_change(change))
     recording = load_motion_recording(folder)
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file: give a folder")
-    diagnosis = diagnose_motion(recording, progress)
-    command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out)])
+    diagnosis = diagnose_motion(recording, progress, tuning.motion)
+    settings = [part for change in changes for part in ("--set", change)]
+    command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *settings])
     texts = motion_texts(diagnosis, out) | {"report.html": motion_page(diagnosis, command)}
     written = write_texts(texts, out)
     yield from motion_lines(diagnosis)

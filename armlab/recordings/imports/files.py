@@ -31,16 +31,19 @@ from problem.robot_file import built_in_arms, load_arm
 
 BAG_SUFFIXES = (".db3", ".mcap", ".bag")
 TEXT_SUFFIXES = (".csv", ".txt", ".dat", ".tsv", ".log", ".asc")
-BAG_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N.m"}
+BAG_COMMAND = "command"
+BAG_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N.m", "command": "rad"}
 
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How to read a file, where the file does not tell: layout of a text, topic of a bag."""
+    """How to read a file, where the file does not tell: layout of a text; topics of a bag, and the robot's joints."""
 
     separator: str | None = None
     decimal: str | None = None
     topic: str | None = None
+    commands: str | None = None
+    joints: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +61,8 @@ def read_source(path: Path, options: ReadOptions) -> Source:
         raise InputError(f"no file {path}")
     suffix = path.suffix.lower()
     if suffix in BAG_SUFFIXES or path.is_dir():
-        table = read_bag(path, options.topic)
-        return Source(table, _bag_units(table), "joint states; positions rad, efforts N.m by ROS convention")
+        table = read_bag(path, options.topic, options.commands, options.joints)
+        return Source(table, _bag_units(table), "joint states; rad, rad/s and N.m by ROS convention")
     if suffix == ".mat":
         return Source(read_mat(path), {}, "MATLAB variables")
     if suffix == ".parquet":
@@ -235,7 +238,18 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     Raises InputError for a wrong option, and for all missing ones together if `ask` is None.
     """
     separator = options["separator"]
-    reading = ReadOptions(SEPARATOR_WORDS.get(separator, separator), options["decimal"], options["topic"])
+    missing: list[str] = []
+    robot = _choose_robot(options["robot"], ask, missing)
+    chosen = tuple(_split_names(options["joints"])) if options.get("joints") else ()
+    whole = None if robot is None or chosen else load_arm(robot)  # of --joints, the reader checks them
+    joints = chosen if whole is None else tuple(joint.name for joint in whole.joints)
+    reading = ReadOptions(
+        separator=SEPARATOR_WORDS.get(separator, separator),
+        decimal=options["decimal"],
+        topic=options["topic"],
+        commands=options.get("command_topic"),
+        joints=joints,
+    )
     sources: dict[str, Source] = {}
     for path in files:
         for name, source in read_sources(path, reading).items():
@@ -243,12 +257,12 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
                 raise InputError(f"{name} is given twice: a run cannot both identify and validate")
             sources[name] = source
     first = next(iter(sources.values()))
-    missing: list[str] = []
-    robot = _choose_robot(options["robot"], ask, missing)
+    usual: dict[str, str] = {}
     if any(is_lerobot(path) for path in files):
         usual = _lerobot_columns(first, options.get("joints"))
-        options = {**options, **{name: each for name, each in usual.items() if options.get(name) is None}}
-    whole = None if robot is None or options.get("joints") else load_arm(robot)  # of --joints, the reader checks them
+    elif joints and options.get("torque") is None and _has_commands(first):
+        usual = _bag_columns(first, joints, options)
+    options = {**options, **{name: each for name, each in usual.items() if options.get(name) is None}}
     assignment = _make_assignment(first, whole, options, ask, missing)
     if missing or robot is None:
         raise InputError("; ".join(missing))
@@ -257,8 +271,8 @@ def import_files(files: Sequence[Path], out: Path, options: Mapping[str, Any], a
     if unknown:
         raise InputError(f"--validate {unknown[0]} should be one of the imported files")
     draft = assemble_draft(sources, robot, assignment, validate)
-    if options.get("joints"):
-        draft = replace(draft, others={**draft.others, "joints": _split_names(options["joints"])})
+    if chosen:
+        draft = replace(draft, others={**draft.others, "joints": list(chosen)})
     write_recording(draft, out)
     return ImportedRecording(out, sources, assignment.columns, draft)
 
@@ -276,6 +290,28 @@ def _lerobot_columns(source: Source, joints: str | None) -> dict[str, str]:
         "position": ",".join(f"{STATE}.{name}" for name in chosen),
         "reference_position": ",".join(f"{COMMAND}.{name}" for name in chosen),
     }
+
+
+def _has_commands(source: Source) -> bool:
+    return any(name.startswith(f"{BAG_COMMAND}_") and name in source.units for name in source.table.names)
+
+
+def _bag_columns(source: Source, joints: Sequence[str], options: Mapping[str, Any]) -> dict[str, str]:
+    """Columns of a bag with commands, by the names of the robot's joints.
+
+    Raises InputError where a joint has none and the columns were not listed.
+    """
+    columns = {"time": "t"}
+    for signal, prefix in (("position", "position"), ("reference_position", BAG_COMMAND)):
+        listed = [name.removeprefix(f"{prefix}_") for name in source.table.names if name.startswith(f"{prefix}_")]
+        lacking = [joint for joint in joints if joint not in listed]
+        if lacking and options.get(signal) is None:
+            raise InputError(
+                f"{source.table.file} has no {prefix} of joint {', '.join(lacking)}, only of {', '.join(listed)}: give "
+                f"--joints with those that were recorded, or --{signal.replace('_', '-')} NAME,... in their order"
+            )
+        columns[signal] = ",".join(f"{prefix}_{joint}" for joint in joints)
+    return columns
 
 
 def _describe_signal(draft: Draft, signal: str, names: Sequence[str]) -> str:

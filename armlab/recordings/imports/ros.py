@@ -1,19 +1,35 @@
-"""ROS 1 and ROS 2 bags and MCAP files: the columns of a topic of sensor_msgs/JointState messages."""
+"""ROS 1 and ROS 2 bags and MCAP files: columns of joint states, of controller states, and of the commands beside them.
+
+The states set the times. Commands of another topic are held from one to the next, as a servo holds them, and put on
+the times of the states; joints that have a topic each are put on the times of the first by linear interpolation.
+"""
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
+from armlab.recordings.imports.ros_messages import (
+    COMMAND_TYPES,
+    DEFINITIONS,
+    SINGLE_STATE,
+    STATE_TYPES,
+    JointMessage,
+    Parser,
+    parse_command,
+    parse_state,
+    stamp_of,
+)
+from armlab.recordings.recording import Finding
 from armlab.recordings.table import Table
 
-JOINT_STATE = "sensor_msgs/msg/JointState"
-JOINT_STATE_FIELDS = ("position", "velocity", "effort")
 BAG_READ_ERRORS = (
     ValueError,
     TypeError,
@@ -30,78 +46,150 @@ BAG_READ_ERRORS = (
 
 
 @dataclass(frozen=True, eq=False)
-class JointState:
-    """One joint state: times in ns, and the values of each field by the joint's name."""
+class Series:
+    """The messages of one topic as they were recorded.
 
-    recorded: int
-    stamp: int
-    values: dict[str, float]
-
-
-def read_bag(path: Path, topic: str | None = None) -> Table:
-    """Columns `t` (s, from the first message) and `position_`, `velocity_`, `effort_` plus the joint's name.
-
-    path: a .db3, .mcap or .bag file, or the folder of a ROS 2 bag. topic: needed if several topics carry
-    joint states. The stamps are those of the headers, or the times of recording where the headers have none.
-    Values that a message leaves out are NaN. Raises InputError for a file that is not a bag or has no joint states.
+    times: (messages,), ns; values: (messages, names), NaN where a message leaves one out. delay: how much later than
+    stamped the messages were recorded, the median, ns; None without stamps.
     """
-    messages = _read_messages(path, topic)
-    if not messages:
+
+    names: tuple[str, ...]
+    times: NDArray[np.int64]
+    values: Array
+    delay: int | None
+
+
+def read_bag(path: Path, topic: str | None = None, commands: str | None = None, joints: Sequence[str] = ()) -> Table:
+    """Columns `t` (s, from the first state) and `position_`, `velocity_`, `effort_`, `command_` plus the joint's name.
+
+    path: a .db3, .mcap or .bag file, or the folder of a ROS 2 bag. topic: of the states, needed if several topics carry
+    some. commands: topic of the commands, where the states hold none. joints: of the robot, for messages that name no
+    joints. The stamps are those of the headers, or the times of recording where the headers have none. Values that a
+    message leaves out are NaN. Raises InputError for a file that is not a bag, and for topics that it does not have.
+    """
+    states, command = _read_series(path, topic, commands, joints)
+    if not all(len(series.times) for series in states):
         raise InputError(f"{path} holds no joint states")
-    names = list(dict.fromkeys(name for message in messages for name in message.values))
-    values = [[message.values.get(name, np.nan) for name in names] for message in messages]
-    table = np.column_stack([_message_times(messages), np.array(values).reshape(len(messages), len(names))])
-    return Table(path.name, ("t", *names), table, 1 + np.arange(len(messages)))
+    if command is not None and not len(command.times):
+        raise InputError(f"{path} holds no message on {commands}")
+    first, findings = states[0], list[Finding]()
+    names, columns, known = list(first.names), [first.values], np.ones(len(first.times), dtype=bool)
+    for other in states[1:]:
+        columns.append(_on_times(other, first.times))
+        names += other.names
+        known &= np.isfinite(columns[-1]).all(axis=1)
+    if command is not None:
+        held, text = _commands_at(command, first)
+        columns.append(held)
+        names += command.names
+        known &= np.isfinite(held).all(axis=1)
+        findings.append(Finding("held_commands", "note", text))
+    if not known.all():
+        text = (
+            f"{int((~known).sum())} of {len(known)} states are left out: not all joints and commands had come by then"
+        )
+        findings.append(Finding("incomplete_states", "note", text))
+    table = np.column_stack([(first.times - first.times[0]) / 1e9, *columns])[known]
+    return Table(path.name, ("t", *names), table, 1 + np.flatnonzero(known), tuple(findings))
 
 
-def _read_messages(path: Path, topic: str | None) -> list[JointState]:
+def _read_series(
+    path: Path, topic: str | None, commands: str | None, joints: Sequence[str]
+) -> tuple[list[Series], Series | None]:
+    """The states, one series a topic, and the commands."""
     try:
         from apsw import Error as SqliteError  # what rosbags reads .db3 files with
         from rosbags.highlevel import AnyReader, AnyReaderError
         from rosbags.rosbag1 import ReaderError as Ros1Error
         from rosbags.rosbag2 import ReaderError as Ros2Error
         from rosbags.serde import SerdeError
-        from rosbags.typesys import Stores, get_typestore
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
     except ImportError:
         raise InputError(f"{path}: to read bags install rosbags: pip install 'armlab[recordings]'") from None
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for kind, text in DEFINITIONS.items():
+        store.register(get_types_from_msg(text, kind))
     try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            chosen = _choose_topic(reader, topic, path)
-            connections = [link for link in reader.connections if link.topic == chosen]
-            read = reader.messages(connections=connections)
-            return [_parse_message(time, reader.deserialize(raw, link.msgtype)) for link, time, raw in read]
+        with AnyReader([path], default_typestore=store) as reader:
+            if commands is not None:
+                _check_topic(reader, commands, COMMAND_TYPES, "commands", path)
+            topics = _state_topics(reader, topic, commands, path)
+            states = [_read_topic(reader, each, parse_state, joints) for each in topics]
+            if commands is None:
+                return states, None
+            if any(name.startswith("command_") for series in states for name in series.names):
+                raise InputError(f"the states on {topics[0]} hold the commands: leave out --command-topic")
+            return states, _read_topic(reader, commands, parse_command, joints)
     except (AnyReaderError, Ros1Error, Ros2Error, SerdeError, SqliteError, *BAG_READ_ERRORS) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"cannot read {path} as a bag of joint states: {reason[:200]}") from None
 
 
-def _choose_topic(reader: Any, wanted: str | None, path: Path) -> str:
-    topics = sorted({link.topic for link in reader.connections if link.msgtype == JOINT_STATE})
-    if wanted is None and len(topics) == 1:
-        return str(topics[0])
-    if not topics:
+def _state_topics(reader: Any, wanted: str | None, commands: str | None, path: Path) -> list[str]:
+    """The topic of the states; several where each joint has a controller state of its own. commands: another topic."""
+    if wanted is not None:
+        _check_topic(reader, wanted, STATE_TYPES, "joint states", path)
+        return [wanted]
+    links = [link for link in reader.connections if link.msgtype in STATE_TYPES and link.topic != commands]
+    kinds = {str(link.topic): link.msgtype for link in links}
+    if not kinds:
         carried = sorted({link.msgtype for link in reader.connections})
-        raise InputError(f"{path} holds no {JOINT_STATE}, only {', '.join(carried) or 'nothing'}")
-    if wanted is None:
-        raise InputError(f"{path} holds joint states on {', '.join(topics)}: choose one with --topic")
+        types = ", ".join(STATE_TYPES)
+        raise InputError(f"{path} holds none of {types}, only {', '.join(carried) or 'nothing'}")
+    if len(kinds) > 1 and set(kinds.values()) != {SINGLE_STATE}:
+        listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(kinds.items()))
+        raise InputError(f"{path} holds joint states on {listed}: choose one with --topic")
+    return sorted(kinds)
+
+
+def _check_topic(reader: Any, wanted: str, types: Sequence[str], what: str, path: Path) -> None:
+    topics = sorted({link.topic for link in reader.connections if link.msgtype in types})
     if wanted not in topics:
-        raise InputError(f"no joint states on topic '{wanted}' in {path}: {suggest_name(wanted, topics)}")
-    return wanted
+        raise InputError(f"no {what} on topic '{wanted}' in {path}: {suggest_name(wanted, topics)}")
 
 
-def _parse_message(recorded: int, message: Any) -> JointState:
-    stamp = int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
-    values = {}
-    for field in JOINT_STATE_FIELDS:
-        numbers = getattr(message, field)
-        if len(numbers) not in (0, len(message.name)):
-            raise InputError(f"a joint state names {len(message.name)} joints but holds {len(numbers)} of {field}")
-        values.update({f"{field}_{name}": float(value) for name, value in zip(message.name, numbers, strict=False)})
-    return JointState(recorded, stamp, values)
+def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str]) -> Series:
+    links = [link for link in reader.connections if link.topic == topic]
+    messages = []
+    for link, recorded, raw in reader.messages(connections=links):
+        message = reader.deserialize(raw, link.msgtype)
+        messages.append(JointMessage(recorded, stamp_of(message), parse(message, link.msgtype, topic, joints)))
+    names = tuple(dict.fromkeys(name for message in messages for name in message.values))
+    values = np.array([[message.values.get(name, np.nan) for name in names] for message in messages])
+    recorded = np.array([message.recorded for message in messages], dtype=np.int64)
+    stamps = np.array([message.stamp for message in messages], dtype=np.int64)
+    stamped = bool(len(stamps)) and bool(np.any(stamps != stamps[0]))
+    delay = int(np.median(recorded - stamps)) if stamped else None
+    return Series(names, stamps if stamped else recorded, values.reshape(len(messages), len(names)), delay)
 
 
-def _message_times(messages: list[JointState]) -> Array:
-    """Stamps from the first one, s; exact in the nanoseconds, which absolute times in floats are not."""
-    stamped = any(message.stamp != messages[0].stamp for message in messages)
-    times = [message.stamp if stamped else message.recorded for message in messages]
-    return np.array([(time - times[0]) / 1e9 for time in times])
+def _on_times(series: Series, times: NDArray[np.int64]) -> Array:
+    """Values (times, names): commands held, all else by linear interpolation; NaN outside of the series."""
+    order = np.argsort(series.times, kind="stable")
+    own, wanted = (series.times[order] - times[0]) / 1e9, (times - times[0]) / 1e9
+    interpolated = [np.interp(wanted, own, column[order], left=np.nan, right=np.nan) for column in series.values.T]
+    commands = [name.startswith("command_") for name in series.names]
+    return np.where(commands, _held(series.values, series.times, times), np.stack(interpolated, axis=1))
+
+
+def _held(values: Array, times: NDArray[np.int64], wanted: NDArray[np.int64]) -> Array:
+    """The last value of each column at or before the wanted times, (wanted, columns); NaN before the first."""
+    order = np.argsort(times, kind="stable")
+    held = np.full((len(wanted), values.shape[1]), np.nan)
+    for place, column in enumerate(values[order].T):
+        known = np.isfinite(column)
+        rows = np.searchsorted(times[order][known], wanted, side="right") - 1
+        held[rows >= 0, place] = column[known][rows[rows >= 0]]
+    return held
+
+
+def _commands_at(commands: Series, states: Series) -> tuple[Array, str]:
+    """The commands that held at the times of the states, (times, names), and a line on how they were put there.
+
+    Commands without stamps come by the clock of the recording: they are moved by the delay of the states' messages.
+    """
+    times, text = commands.times, "commands are held from one to the next, at the times of the states"
+    if commands.delay is None and states.delay is not None:
+        times = times - states.delay
+        text += f"; they have no stamps: times of recording, less {states.delay / 1e6:.3g} ms that states take"
+    return _held(commands.values, times, states.times), text

@@ -1,0 +1,171 @@
+"""The servos of a diagnosis in a simulation of MuJoCo: the torque that no field of MJCF holds, added at run time.
+
+A copy of this file stands beside each verdict, with the numbers in `servos.json`; it needs MuJoCo and NumPy alone:
+
+    model = mujoco.MjModel.from_xml_path("arm.xml")
+    with servo_plugin.installed(model, servo_plugin.read_servos("servos.json")):
+        data.ctrl[:] = command  # rad (m), as without the plug-in
+        mujoco.mj_step(model, data)
+
+The law of a joint, with q and qd as MuJoCo has them and c the command that held at a time:
+
+    torque = s clip(kp d(c(t - delay) + offset - q) - kd qd, -limit, limit)
+    d(e)   = sgn(e) max(|e| - dead_band / 2, 0)
+    friction loss = friction + load_friction |qfrc_bias|
+
+kp, kd, limit, damping, friction and armature are written into the model. A callback (`mujoco.set_mjcb_passive`) adds
+to `qfrc_passive` what the torque of the law has more than that of the actuator, and sets the friction loss of the next
+step. `data.ctrl` stays the user's. One plug-in serves one MjData at a time; `mj_resetData` empties its history.
+"""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
+LAW = ("kp", "kd", "limit", "delay", "offset", "dead_band", "friction", "load_friction")
+NUMBERS = (*LAW, "damping", "armature")
+SAME_TIME_S = 1e-9  # below it two instants are one
+JOINT_TRANSMISSION = 0  # mjTRN_JOINT
+
+
+def read_servos(path: str | Path) -> dict[str, Any]:
+    """The content of `servos.json`: one entry of `servos` a joint, and `rate_hz`, null where commands are not held."""
+    content: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+    return content
+
+
+def find_actuator(model: Any, joint: int) -> int | None:
+    """The first actuator that drives a joint, both from 0; None where none does."""
+    found = np.flatnonzero((model.actuator_trnid[:, 0] == joint) & (model.actuator_trntype == JOINT_TRANSMISSION))
+    return int(found[0]) if len(found) else None
+
+
+def set_fields(model: Any, joint: int, actuator: int, servo: Mapping[str, Any]) -> None:
+    """Writes what the fields of a model hold of a servo: gains and force range, friction that sticks, damping, rotor.
+
+    joint, actuator: from 0. servo: SI units; a limit of None is no limit. The actuator is not late.
+    """
+    dof, kp, kd, limit = model.jnt_dofadr[joint], servo["kp"], servo["kd"], servo["limit"]
+    model.actuator_gainprm[actuator, 0] = kp
+    model.actuator_biasprm[actuator, :3] = 0.0, -kp, -kd
+    model.actuator_forcelimited[actuator] = limit is not None
+    if limit is not None:
+        model.actuator_forcerange[actuator] = -limit, limit
+    model.actuator_delay[actuator] = 0.0
+    model.dof_damping[dof] = servo["damping"]
+    model.dof_frictionloss[dof] = servo["friction"]
+    model.dof_armature[dof] = servo["armature"]
+    model.dof_solimp[dof] = STICKING
+
+
+class ServoPlugin:
+    """The callback of the servos of a model: `mujoco.set_mjcb_passive(plugin)`, or `installed`.
+
+    model: mujoco.MjModel with a position actuator of gear 1 at each joint of servos; its fields are set. servos: as
+    `servos.json` has them. Raises ValueError for a joint that the model does not have, or without such an actuator.
+    supply: voltage over its nominal value, which scales the drives; set it where it varies.
+    """
+
+    def __init__(self, model: Any, servos: Mapping[str, Any]) -> None:
+        entries: Sequence[Mapping[str, Any]] = servos["servos"]
+        joints = [_find_joint(model, entry["joint"]) for entry in entries]
+        self.supply = 1.0
+        self._rate_hz: float | None = servos.get("rate_hz")
+        self._actuators = np.array([_servo_actuator(model, joint) for joint in joints], dtype=np.intp)
+        self._positions, self._dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        for joint, actuator, entry in zip(joints, self._actuators.tolist(), entries, strict=True):
+            set_fields(model, joint, actuator, entry)
+        self._law = {
+            key: np.array([np.inf if entry[key] is None else entry[key] for entry in entries], dtype=float)
+            for key in LAW
+        }
+        self._times: list[float] = []
+        self._commands: list[Any] = []
+        self._load = np.zeros(model.nv)
+
+    def __call__(self, model: Any, data: Any) -> None:
+        """Adds the missing torque to `data.qfrc_passive`; called by MuJoCo once for each evaluation of the forces."""
+        import mujoco
+
+        law, position, velocity = self._law, data.qpos[self._positions], data.qvel[self._dofs]
+        command = _clamped_command(model, data, self._actuators)
+        self._remember(data.time, data.ctrl[self._actuators])
+        error = self._held_commands(data.time) + law["offset"] - position
+        error -= np.clip(error, -law["dead_band"] / 2, law["dead_band"] / 2)
+        drive = np.clip(law["kp"] * error - law["kd"] * velocity, -law["limit"], law["limit"])
+        actuator = law["kp"] * (command - position) - law["kd"] * velocity
+        actuator = np.clip(actuator, -law["limit"], law["limit"])
+        data.qfrc_passive[self._dofs] += self.supply * drive - actuator
+        if law["load_friction"].any():
+            mujoco.mj_rne(model, data, 0, self._load)
+            level = law["friction"] + law["load_friction"] * np.abs(self._load[self._dofs])
+            model.dof_frictionloss[self._dofs] = level
+
+    def _remember(self, time: float, command: Any) -> None:
+        if self._times and time < self._times[-1] - SAME_TIME_S:
+            self._times, self._commands = [], []
+        if self._times and np.array_equal(command, self._commands[-1]):
+            return
+        if self._times and time < self._times[-1] + SAME_TIME_S:
+            self._commands[-1] = command.copy()
+            return
+        self._times.append(time)
+        self._commands.append(command.copy())
+        oldest = time - self._law["delay"].max() - (1 / self._rate_hz if self._rate_hz else 0.0)
+        while len(self._times) > 1 and self._times[1] < oldest - SAME_TIME_S:
+            del self._times[0], self._commands[0]
+
+    def _held_commands(self, time: float) -> Any:
+        """The command of each servo that its law sees now: late, and taken over at the rate of the controller."""
+        wanted = time - self._law["delay"]
+        if self._rate_hz:
+            wanted = np.floor(wanted * self._rate_hz + SAME_TIME_S) / self._rate_hz
+        rows = np.searchsorted(self._times, wanted + SAME_TIME_S, side="right") - 1
+        return np.array(self._commands)[np.maximum(rows, 0), np.arange(len(rows))]
+
+
+@contextmanager
+def installed(model: Any, servos: Mapping[str, Any]) -> Iterator[ServoPlugin]:
+    """The plug-in as the passive callback of MuJoCo, until the block ends; the callback of before comes back."""
+    import mujoco
+
+    plugin, before = ServoPlugin(model, servos), mujoco.get_mjcb_passive()
+    mujoco.set_mjcb_passive(plugin)
+    try:
+        yield plugin
+    finally:
+        mujoco.set_mjcb_passive(before)
+
+
+def _find_joint(model: Any, name: str) -> int:
+    known = [model.joint(number).name for number in range(model.njnt)]
+    if name not in known:
+        raise ValueError(f"the model has no joint '{name}', only {', '.join(known)}")
+    return known.index(name)
+
+
+def _servo_actuator(model: Any, joint: int) -> int:
+    actuator, name = find_actuator(model, joint), model.joint(joint).name
+    if actuator is None:
+        raise ValueError(f"joint '{name}' has no actuator: give it a position actuator")
+    kinds = int(model.actuator_gaintype[actuator]), int(model.actuator_biastype[actuator])
+    if kinds != (0, 1) or model.actuator_gear[actuator, 0] != 1 or model.actuator_dyntype[actuator] != 0:
+        raise ValueError(f"the actuator of joint '{name}' is no position actuator with gear 1")
+    return actuator
+
+
+def _clamped_command(model: Any, data: Any, actuators: Any) -> Any:
+    """The command that the actuators see: within their control range, unless MuJoCo's flag switches that off."""
+    import mujoco
+
+    command = data.ctrl[actuators]
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL):
+        return command
+    low, high = model.actuator_ctrlrange[actuators].T
+    limited = model.actuator_ctrllimited[actuators].astype(bool)
+    return np.where(limited, np.clip(command, low, high), command)

@@ -1,0 +1,117 @@
+"""The tuning numbers of a diagnosis of motion only: each with its unit, its meaning, and where its value comes from."""
+
+from dataclasses import dataclass
+
+from armlab.common.tuning import tuned
+
+
+@dataclass(frozen=True)
+class MotionTuning:
+    """Recordings of motion only: servos by replay (`armlab/diagnosis/motion`)."""
+
+    longest_window_s: float = tuned(
+        10.0, unit="s", meaning="longest window of a replay: longer than any servo settles", least=0.1
+    )
+    shortest_window_s: float = tuned(
+        1.0, unit="s", meaning="shorter windows tell little but their first state", least=0.01
+    )
+    wanted_windows: int = tuned(
+        24, unit="windows", meaning="blocks for the statistics, where the recording is long enough", least=2
+    )
+    longest_step_s: float = tuned(0.0025, unit="s", meaning="longest step of the integration", least=1e-5)
+    history_s: float = tuned(0.3, unit="s", meaning="commands before a window, for delays", least=0.3)
+    cutoff_hz: float = tuned(
+        10.0,
+        unit="Hz",
+        meaning="cut-off of the motion that makes loads and couplings; the joint itself is simulated",
+        least=0.1,
+    )
+    held_out_share: float = tuned(
+        1 / 3, unit="of each run", meaning="its end, held out where no run validates", least=0.05, most=0.9
+    )
+    frequencies_hz: tuple[float, ...] = tuned(
+        (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0),
+        unit="Hz",
+        meaning="natural frequencies of the starts of a fit: from a soft hobby servo to a stiff drive",
+        least=1e-3,
+    )
+    damping_ratios: tuple[float, ...] = tuned((0.4, 1.5), meaning="damping ratios of the starts of a fit")
+    moving_speed: float = tuned(
+        0.1,
+        unit="rad/s (m/s)",
+        meaning="rows of the regression that finds starts: above the noise of a differentiated encoder",
+    )
+    max_start_windows: int = tuned(24, unit="windows", meaning="most windows of the fits that compare starts", least=2)
+    starts: int = tuned(2, unit="starts", meaning="starts that are fitted on few windows", least=1)
+    start_evaluations: int = tuned(8, unit="evaluations", meaning="of each of these fits", least=1)
+    max_evaluations: int = tuned(15, unit="evaluations", meaning="of a fit from a start", least=1)
+    refit_evaluations: int = tuned(8, unit="evaluations", meaning="of a fit that starts near its end", least=1)
+    max_judged_windows: int = tuned(
+        60, unit="windows", meaning="most windows of the choice; the numbers come from all", least=4
+    )
+    tried_parameters: int = tuned(
+        4,
+        unit="parameters",
+        meaning="parameters that are fitted in each round, of those that a linear model gains most from",
+        least=1,
+    )
+    min_gain: float = tuned(
+        0.02,
+        unit="of the squared error",
+        meaning="least gain of a number on windows that took no part",
+        least=0.0,
+        most=1.0,
+    )
+    max_p_value: float = tuned(
+        0.01,
+        unit="probability",
+        meaning="of no gain, for a finding and for a change, after Bonferroni's correction",
+        source="convention",
+        most=1.0,
+    )
+    max_joining_p_value: float = tuned(
+        0.05,
+        unit="probability",
+        meaning="of no gain, for a place in the model, without correction",
+        source="convention",
+        most=1.0,
+    )
+    odd_factor: float = tuned(
+        4.0, unit="times the median error", meaning="a window that something else than the servo has moved", least=1.0
+    )
+    max_odd_share: float = tuned(0.1, unit="of the windows", meaning="most windows that are left out so", most=0.5)
+    min_motion: float = tuned(0.01, unit="rad (m)", meaning="windows with less travel say nothing of the usual error")
+    min_windows_for_odd: int = tuned(
+        8, unit="windows", meaning="with fewer windows in motion none is left out", least=1
+    )
+    max_unexplained: float = tuned(
+        0.7,
+        unit="of the error of a servo without gain",
+        meaning="above it the command did not move the joint",
+        most=1.0,
+    )
+    at_floor: float = tuned(
+        3.0, unit="times the encoder's noise", meaning="an error that needs no explanation", least=1.0
+    )
+    same_error: float = tuned(
+        1.25, meaning="ratio of errors before and after, below which the simulation counts as right", least=1.0
+    )
+    class_factor: float = tuned(
+        3.0,
+        unit="times a standard error",
+        meaning="growth with one more free number that makes the two a class",
+        least=1.0,
+    )
+    class_correlation: float = tuned(
+        0.95, meaning="correlation of two fitted numbers that makes them a class", most=1.0
+    )
+    min_load_share: float = tuned(
+        0.1,
+        unit="of the drive's torque",
+        meaning="gravity below it does not set the scale of torques",
+        most=1.0,
+    )
+    pair_evaluations: int = tuned(8, unit="evaluations", meaning="of a fit of two recordings", least=1)
+
+
+DEFAULT = MotionTuning()
