@@ -68,7 +68,7 @@ def _sections(command: click.Command, parent: click.Context, level: int) -> Iter
     usage = " ".join(command.collect_usage_pieces(context))
     yield f"```text\n{context.command_path} {usage}\n```"
     records = [record for each in command.get_params(context) if (record := each.get_help_record(context))]
-    yield markdown_table(("option", "meaning"), [(f"`{names}`", _escape(text)) for names, text in records])
+    yield markdown_table(("argument or option", "meaning"), [(f"`{names}`", _escape(text)) for names, text in records])
     if isinstance(command, click.Group):
         for each in command.commands.values():
             yield from _sections(each, context, level + 1)

@@ -1,8 +1,9 @@
 """Pages of the file formats, of the keys of a configuration and of the algorithms' parameters, from their models."""
 
 import inspect
+import re
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, fields
 from typing import Any
 
@@ -77,23 +78,43 @@ def _tables(schema: Mapping[str, Any], level: int = 2) -> Iterator[str]:
 
 
 def _object(schema: Mapping[str, Any]) -> Iterator[str]:
-    if "description" in schema:
-        yield _escape(schema["description"])
-    needed = schema.get("required", ())
+    """The description of an object and the table of its keys."""
+    keys = schema.get("properties", {})
+    text, meanings = split_description(schema.get("description", ""), list(keys))
+    if text:
+        yield _escape(text)
     rows = [
-        (f"`{key}`", _type(value), "" if key in needed else _default(value), _escape(value.get("description", "")))
-        for key, value in schema.get("properties", {}).items()
+        (
+            f"`{key}`",
+            _type(value),
+            "needed" if key in schema.get("required", ()) else _default(value),
+            _escape(value.get("description", meanings.get(key, ""))),
+        )
+        for key, value in keys.items()
     ]
-    rows = [(key, kind, "needed" if key.strip("`") in needed else default, text) for key, kind, default, text in rows]
-    if any(text for *_, text in rows):
+    if any(meaning for *_, meaning in rows):
         yield markdown_table(("key", "holds", "if left out", "meaning"), rows)
     elif rows:
         yield markdown_table(("key", "holds", "if left out"), [row[:3] for row in rows])
 
 
+def split_description(text: str, keys: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """What a docstring says in general, and what it says of each key: `key: meaning.` or `one, other: meaning.`"""
+    if not keys:
+        return text, {}
+    key = "`?(?:" + "|".join(sorted(map(re.escape, keys), key=len, reverse=True)) + ")`?"
+    parts = re.split(rf"(?:^|(?<=[.;])\s+|(?<=\n))({key}(?:,\s+{key})*):\s+", text)
+    said = zip(parts[1::2], parts[2::2], strict=True)
+    return parts[0].strip(), {
+        name.strip("` \n"): " ".join(meaning.split()).rstrip(";")
+        for names, meaning in said
+        for name in names.split(",")
+    }
+
+
 def _default(value: Mapping[str, Any]) -> str:
     given = value.get("default")
-    return "" if given in (None, [], {}, ()) else f"`{_plain(given)}`"
+    return "" if given is None or isinstance(given, dict | list | tuple) else f"`{_plain(given)}`"
 
 
 def _plain(value: Any) -> str:
@@ -106,7 +127,7 @@ def _type(value: Mapping[str, Any]) -> str:
         return value["$ref"].rsplit("/", 1)[-1]
     if "anyOf" in value or "oneOf" in value:
         kinds = [_type(each) for each in value.get("anyOf", value.get("oneOf", ()))]
-        return " or ".join(dict.fromkeys(kinds))
+        return " or ".join(each for each in dict.fromkeys(kinds) if each != "null")
     if "const" in value:
         return f"`{_plain(value['const'])}`"
     if "enum" in value:

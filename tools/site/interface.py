@@ -5,6 +5,7 @@ import re
 from typing import Any
 
 import armlab
+from armlab.common.arrays import Array
 from armlab.common.markdown import markdown_page
 from tools.site.pages import Pages
 
@@ -49,7 +50,9 @@ def _signature(name: str, value: Any) -> str:
         text = str(inspect.signature(value))
     except ValueError:
         return f"{name}(...)"
-    text = re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Z])", "", text.replace("'", ""))
+    text = text.replace(str(Array), "Array")
+    text = re.sub(r"\b(?:[a-z_]\w*\.)+(?=[A-Za-z])", "", text)
+    text = re.sub(r"<[^<>]*(?:<lambda>)?[^<>]*>", "...", text)  # a default that has no notation
     return f"{name}{text.replace('(self, ', '(').replace('(self)', '()')}"
 
 
