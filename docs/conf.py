@@ -37,8 +37,11 @@ copybutton_exclude = ".linenos, .gp, .go"
 
 def _show_math(translator: nodes.NodeVisitor, node: nodes.Element) -> None:
     """MathML, which browsers draw without scripts and fonts from other places."""
-    display = "block" if isinstance(node, nodes.math_block) else "inline"
-    translator.body.append(convert(node.astext(), display=display))  # type: ignore[attr-defined]
+    if isinstance(node, nodes.math_block):
+        written = f'<div class="equation-block">{convert(node.astext(), display="block")}</div>'
+    else:
+        written = convert(node.astext(), display="inline")
+    translator.body.append(written)  # type: ignore[attr-defined]
     raise nodes.SkipNode
 
 
