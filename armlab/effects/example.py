@@ -1,10 +1,12 @@
 """The log of a simulated arm with physics that its robot file lacks, to try the commands without a robot."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import yaml
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.files import write_texts
@@ -79,7 +81,7 @@ def _log(arm: Arm, effects: list[FittedEffect], number: int) -> pd.DataFrame:
     position = np.round(motion.position / ENCODER_STEP) * ENCODER_STEP
     stamps = FIRST_STAMP_NS + number * 60 * 10**9 + np.round(time * 1e9).astype(np.int64)
     joints = range(1, len(arm) + 1)
-    columns = {"timestamp_ns": stamps}
+    columns: dict[str, NDArray[Any]] = {"timestamp_ns": stamps}
     columns |= {f"q{joint}_rad": position[:, joint - 1] for joint in joints}
     columns |= {f"tau{joint}_Nm": measured[:, joint - 1] for joint in joints}
     return pd.DataFrame(columns)
