@@ -84,8 +84,10 @@ def test_commands_of_the_documents_exist():
     shown = subprocess.run(
         [sys.executable, "-m", "armlab.cli.main", "--help"], capture_output=True, text=True, check=True
     ).stdout
-    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *PAGES)]
-    named = {name for text in texts for name in re.findall(r"^armlab ([a-z-]+)", text, re.MULTILINE)}
+    text = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *PAGES))
+    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    commands = "\n".join(block for language, block in blocks if language in ("", "bash"))
+    named = set(re.findall(r"^armlab ([a-z-]+)", commands, re.MULTILINE))
     assert len(named) > 10
     assert {name for name in named if not re.search(rf"^ +{name}\b", shown, re.MULTILINE)} == set()
 
