@@ -85,7 +85,7 @@ def test_commands_of_the_documents_exist():
         [sys.executable, "-m", "armlab.cli.main", "--help"], capture_output=True, text=True, check=True
     ).stdout
     text = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *PAGES))
-    blocks = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    blocks = re.findall(r"^```([^\n]*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
     commands = "\n".join(block for language, block in blocks if language in ("", "bash"))
     named = set(re.findall(r"^armlab ([a-z-]+)", commands, re.MULTILINE))
     assert len(named) > 10
