@@ -5,7 +5,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/diagnosis/motion/joint_replay.c armlab/diagnosis/motion/joint_replay_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -82,6 +82,14 @@ prove-quick: .venv/dev ## the same with 24 cases of a development seed, not logg
 speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results/speed.json and .md
 	$(BIN)/armlab speed
 
+# --- documentation
+
+docs: .venv/dev ## the documentation site, strictly: site/index.html
+	$(BIN)/python -m tools.site site
+
+pictures: .venv/dev ## the pictures of README and tutorials: docs/pictures/
+	$(BIN)/python -m tools.site.pictures
+
 # --- checks
 
 test: .venv/dev lint regression ## every test, one thread of linear algebra a worker
@@ -107,6 +115,6 @@ hostile: .venv/dev ## damaged input for the commands: tests/hostile_outcomes.csv
 	PYTHONPATH=tests $(BIN)/python tests/hostile_commands.py
 
 clean: ## everything that was made here, the environment included
-	rm -rf .venv .armlab build *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
+	rm -rf .venv .armlab build site *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
 		armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -86,6 +86,19 @@ def fetch(name: str, out: Path | None) -> ResultLines:
     return {"recording": folder, "source": public.source, "licence": public.licence}
 
 
+@recording.command()
+@click.argument("folder", type=OutputPath())
+def example(folder: Path) -> None:
+    """Write the log of a simulated arm, to try the commands.
+
+    Two runs as CSV, the robot file, and in hidden.yaml what the robot file lacks.
+    """
+    from armlab.effects.example import write_example
+
+    for path in write_example(folder):
+        click.echo(path)
+
+
 def _column_options(command: Callable[..., None]) -> Callable[..., None]:
     for signal in reversed((*ASKED_SIGNALS, *OPTIONAL_SIGNALS)):
         flag = f"--{signal.replace('_', '-')}"

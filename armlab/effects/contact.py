@@ -14,6 +14,10 @@ EXTERNAL_CONTACT_FACTS = Effect(
     "external_contact",
     "a push during a stretch of time",
     (Parameter("start", "s"), Parameter("end", "s"), Parameter("peak", TORQUE)),
+    law=(
+        r"\Delta\tau_j = \text{peak} \; \sin\left( \pi \, \frac{t - \text{start}}{\text{end} - \text{start}} "
+        r"\right), \quad \text{start} < t < \text{end}"
+    ),
     single_event=True,
     scanned=True,
     axis="time",

@@ -82,6 +82,7 @@ class Effect:
     """Everything that is known of an effect, whatever law it follows.
 
     id: its name in verdicts and models. meaning: a line for a list. parameters: those that a finding may give.
+    law: its equation in LaTeX, in its commonest form; words are parameters, j is the joint.
     title: its name in a sentence; the id with spaces where it is left out.
     where: `joint` for an effect at one joint, `coupling` where torque and motion are at two joints, `link` for
     parameters of a link, `robot` for an effect of the whole arm (its joint is null).
@@ -106,6 +107,7 @@ class Effect:
     id: str
     meaning: str
     parameters: tuple[Parameter, ...] = ()
+    law: str = field(default="", kw_only=True)
     title: str = ""
     where: Literal["joint", "coupling", "link", "robot"] = "joint"
     usual: bool = False

@@ -27,6 +27,10 @@ JOINT_COUPLING_FACTS = Effect(
     "joint_coupling",
     "torque from the motion of another joint",
     (VISCOUS_COEFFICIENT, COULOMB_LEVEL, Parameter("inertia", INERTIA)),
+    law=(
+        r"\Delta\tau_j = \text{coefficient} \; \dot{q}_k + \text{level} \; \operatorname{sgn}(\dot{q}_k + \dot "
+        r"q_j) + \text{inertia} \; \ddot{q}_k"
+    ),
     where="coupling",
     axis="velocity",
     experiment="move the driving joint alone while the other one rests",

@@ -33,6 +33,7 @@ COULOMB_FACTS = Effect(
     "coulomb_friction",
     "constant torque against the motion",
     (COULOMB_LEVEL,),
+    law=r"\Delta\tau_j = \text{level} \; \operatorname{sgn} \dot{q}_j",
     title="Coulomb friction",
     usual=True,
     dissipates=True,
@@ -45,6 +46,7 @@ VISCOUS_FACTS = Effect(
     "viscous_friction",
     "torque proportional to velocity",
     (VISCOUS_COEFFICIENT,),
+    law=r"\Delta\tau_j = \text{coefficient} \; \dot{q}_j",
     usual=True,
     dissipates=True,
     common=True,
@@ -58,6 +60,7 @@ NONLINEAR_VISCOUS_FACTS = Effect(
         Parameter("coefficient", f"{TORQUE}/({ANGLE}/s)^exponent", positive=True),
         Parameter("exponent", "1", positive=True, plausible=POWER_EXPONENTS_SEEN),
     ),
+    law=r"\Delta\tau_j = \text{coefficient} \; |\dot{q}_j|^{\text{exponent}} \operatorname{sgn} \dot{q}_j",
     dissipates=True,
     contains=("coulomb_friction", "viscous_friction"),
     one_of="friction laws",
@@ -74,6 +77,10 @@ STRIBECK_FACTS = Effect(
         Parameter("velocity", f"{ANGLE}/s", positive=True, plausible=STRIBECK_SPEEDS_SEEN),
         Parameter("exponent", "1", positive=True, detail=True),
     ),
+    law=(
+        r"\Delta\tau_j = \left( \text{level} + (\text{static level} - \text{level}) \, e^{-(|\dot{q}_j| / "
+        r"\text{velocity})^{\text{exponent}}} \right) \operatorname{sgn} \dot{q}_j"
+    ),
     title="Stribeck friction",
     dissipates=True,
     sticks=True,
@@ -86,6 +93,10 @@ ASYMMETRIC_FACTS = Effect(
     "asymmetric_friction",
     "friction that differs by direction",
     (Parameter("positive", TORQUE), Parameter("negative", TORQUE)),
+    law=(
+        r"\Delta\tau_j = \begin{cases} \text{positive} & \dot{q}_j > 0 \\ "
+        r"-\text{negative} & \dot{q}_j < 0 \end{cases}"
+    ),
     dissipates=True,
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),
@@ -99,6 +110,7 @@ LOAD_DEPENDENT_FACTS = Effect(
     "load_dependent_friction",
     "friction that grows with the transmitted torque",
     (Parameter("coefficient", "1", positive=True, plausible=LOAD_SHARES_SEEN),),
+    law=r"\Delta\tau_j = \text{coefficient} \; |\tau_{\text{rigid},j}| \, \operatorname{sgn} \dot{q}_j",
     dissipates=True,
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),

@@ -21,6 +21,10 @@ BASE_TILT_FACTS = Effect(
     "base_tilt",
     "gravity in another direction",
     (Parameter("gravity", "m/s2"),),
+    law=(
+        r"\Delta\tau = \tau_{\text{rigid}}(q, \dot q, \ddot q; \text{gravity}) - \tau_{\text{rigid}}(q, \dot "
+        r"q, \ddot q; g_0)"
+    ),
     where="robot",
     prior_scale=0.5,
     origin="geometry",
@@ -30,6 +34,7 @@ ENCODER_OFFSET_FACTS = Effect(
     "encoder_offset",
     "a joint's zero at another place",
     (Parameter("offset", ANGLE),),
+    law=r"\Delta\tau = \tau_{\text{rigid}}(q - \text{offset} \; e_j) - \tau_{\text{rigid}}(q)",
     prior_scale=0.05,
     origin="geometry",
     experiment="check the joint's zero against its calibration mark",
@@ -38,6 +43,7 @@ GEOMETRY_ERROR_FACTS = Effect(
     "geometry_error",
     "a link of another length",
     (Parameter("offset", "m", plausible=LENGTH_ERRORS_SEEN),),
+    law=r"\Delta\tau = \tau_{\text{rigid}}(a_j + \text{offset}) - \tau_{\text{rigid}}(a_j)",
     prior_scale=0.02,
     origin="geometry",
     experiment="calibrate the geometry with a measuring arm or a laser tracker",

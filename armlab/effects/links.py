@@ -22,6 +22,7 @@ PAYLOAD_FACTS = Effect(
     "payload",
     "a body carried by a link",
     (Parameter("mass", "kg", positive=True), *PLACE_PARAMETERS),
+    law=r"\Delta\tau = Y_l(q, \dot q, \ddot q) \; \phi(\text{mass}, \text{centre}, \text{inertia})",
     where="link",
     experiment="repeat the motion without the payload",
 )
@@ -29,6 +30,7 @@ INERTIAL_ERROR_FACTS = Effect(
     "inertial_parameter_error",
     "a link that is not as the simulation has it",
     (Parameter("mass", "kg"), *PLACE_PARAMETERS),
+    law=r"\Delta\tau = Y_l(q, \dot q, \ddot q) \; \Delta\phi_l",
     where="link",
     in_links=True,
     experiment="weigh the link, or repeat the motion with a payload of known mass",

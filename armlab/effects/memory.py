@@ -43,6 +43,10 @@ PRESLIDING_FACTS = Effect(
     "presliding_hysteresis",
     "friction that follows the way since a reversal",
     (COULOMB_LEVEL, STIFFNESS),
+    law=(
+        r"\Delta\tau_j = \text{level} \; z, \quad \frac{dz}{dq_j} = \frac{\text{stiffness}}{\text{level}} \, "
+        r"(1 - z \operatorname{sgn} \dot{q}_j)"
+    ),
     dissipates=True,
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),
@@ -57,6 +61,10 @@ FRICTION_DRIFT_FACTS = Effect(
         Parameter("initial", f"{TORQUE}.s/{ANGLE}", positive=True),
         Parameter("final", f"{TORQUE}.s/{ANGLE}", positive=True),
         Parameter("time_constant", "s", positive=True, plausible=WARMING_TIMES_SEEN),
+    ),
+    law=(
+        r"\Delta\tau_j = \left( \text{initial} + (\text{final} - \text{initial}) (1 - e^{-t / \text{time "
+        r"constant}}) \right) \dot{q}_j"
     ),
     dissipates=True,
     contains=("coulomb_friction", "viscous_friction"),

@@ -9,6 +9,7 @@ from armlab.effects.contract import ANGLE, TORQUE, Effect, Parameter
 CONTROLLER_GAIN = Effect(
     "controller_gain_error",
     "gain of a position servo that differs from the simulation's",
+    law=r"\tau_j = \text{kp} \, (r_j - q_j) - \text{kd} \; \dot{q}_j",
     parameters=(
         Parameter("kp", f"{TORQUE}/{ANGLE}", positive=True),
         Parameter("kd", f"{TORQUE}.s/{ANGLE}"),
@@ -20,6 +21,7 @@ CONTROLLER_GAIN = Effect(
 COMMAND_DELAY = Effect(
     "command_delay",
     "command that takes effect late",
+    law=r"\tau_j(t) = \text{kp} \, (r_j(t - \text{seconds}) - q_j(t)) - \text{kd} \; \dot{q}_j(t)",
     parameters=(Parameter("seconds", "s", sampled=True),),
     origin="timing",
     experiment="log the time at which each joint is read; record steps and fast motion",
@@ -27,6 +29,7 @@ COMMAND_DELAY = Effect(
 DEAD_BAND = Effect(
     "controller_dead_band",
     "position servo that ignores small errors",
+    law=r"\tau_j = \text{kp} \, d(r_j - q_j), \quad d(e) = \operatorname{sgn}(e) \max(|e| - \text{width} / 2, 0)",
     parameters=(Parameter("width", ANGLE, positive=True),),
     title="dead band",
     origin="drive",
@@ -35,6 +38,7 @@ DEAD_BAND = Effect(
 COMMAND_OFFSET = Effect(
     "command_offset",
     "command that is off by a constant",
+    law=r"\tau_j = \text{kp} \, (r_j + \text{offset} - q_j) - \text{kd} \; \dot{q}_j",
     parameters=(Parameter("offset", ANGLE),),
     origin="drive",
     experiment="hold a variety of poses, each reached from both directions",

@@ -40,6 +40,10 @@ JOINT_ELASTICITY_FACTS = Effect(
     "joint_elasticity",
     "a spring in the drive train",
     (Parameter("stiffness", f"{TORQUE}/{ANGLE}", positive=True, plausible=DRIVE_TRAINS_SEEN),),
+    law=(
+        r"q_{\text{link},j} = q_j + \theta_j, \quad M_j \ddot{\theta}_j = -\tau_{\text{load},j} - "
+        r"\text{stiffness} \, (\theta_j + T \dot{\theta}_j)"
+    ),
     prior_scale=1e-3,
     origin="transmission",
     experiment="excite the joint with a chirp past its resonance, or read an encoder on the link side",
@@ -53,6 +57,7 @@ BACKLASH_FACTS = Effect(
         Parameter("negative", TORQUE, positive=True),
         Parameter("way", ANGLE, positive=True, detail=True),
     ),
+    law=r"q_{\text{link},j} = q_j + \theta_j, \quad |\theta_j| \le \text{gap} / 2",
     prior_scale=0.01,
     axis="position",
     origin="transmission",

@@ -1,6 +1,7 @@
 """The documents name files, commands and links that exist, and the examples of the README run."""
 
 import ast
+import json
 import os
 import re
 import subprocess
@@ -8,6 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+
+from tools.site.examples import read_steps, run_step
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = [
@@ -15,7 +19,11 @@ DOCUMENTS = [
     ROOT / "CONTRIBUTING.md",
     ROOT / "docs" / "architecture.md",
     ROOT / "docs" / "plugins.md",
+    ROOT / "docs" / "running.md",
 ]
+TUTORIALS = [ROOT / "docs" / "tutorials" / name for name in ("csv.md", "algorithm.md")]
+GENERATED = re.compile(r"(?:\.\./)?(?:gallery|reference)/")  # pages of the site that come from the code
+PAGES = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("tutorials/*.md")]
 FOLDERS = "problem|algorithms|bench|armlab|tests|docs|configs|results|templates|notebooks"
 
 
@@ -26,9 +34,10 @@ def test_every_file_that_a_document_names_exists(path):
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
-@pytest.mark.parametrize("path", [*DOCUMENTS, *(ROOT / "docs").glob("*.md")], ids=lambda path: path.name)
+@pytest.mark.parametrize("path", [*DOCUMENTS, *PAGES], ids=lambda path: path.name)
 def test_every_link_between_documents_leads_somewhere(path):
     links = re.findall(r"\]\(([^)#:]+)\)", path.read_text(encoding="utf-8"))
+    links = [link for link in links if not GENERATED.match(link) and link not in ("contributing.md", "changelog.md")]
     assert [link for link in links if not (path.parent / link).exists()] == []
 
 
@@ -71,26 +80,30 @@ def test_the_layers_picture_allows_every_import():
     assert {(upper, lower) for upper, lower in crossing if upper != lower and lower not in below[upper]} == set()
 
 
-def test_commands_of_the_readme_exist():
+def test_commands_of_the_documents_exist():
     shown = subprocess.run(
         [sys.executable, "-m", "armlab.cli.main", "--help"], capture_output=True, text=True, check=True
     ).stdout
-    lines = (ROOT / "README.md").read_text(encoding="utf-8")
-    named = set(re.findall(r"^(?:\.venv/bin/)?armlab ([a-z-]+)", lines, re.MULTILINE))
-    assert len(named) > 5
-    assert {name for name in named if not re.search(rf"^  {name}\b", shown, re.MULTILINE)} == set()
+    text = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *PAGES))
+    blocks = re.findall(r"^```([^\n]*)\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
+    commands = "\n".join(block for language, block in blocks if language in ("", "bash"))
+    named = set(re.findall(r"^armlab ([a-z-]+)", commands, re.MULTILINE))
+    assert len(named) > 10
+    assert {name for name in named if not re.search(rf"^ +{name}\b", shown, re.MULTILINE)} == set()
 
 
 def test_make_targets_of_the_readme_exist():
     targets = set(re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
-    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *PAGES):
         assert set(re.findall(r"(?:^|`)make ([a-z0-9-]+)", path.read_text(encoding="utf-8"), re.MULTILINE)) <= targets
 
 
-PYTHON_EXAMPLES = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+PYTHON_EXAMPLES = re.findall(
+    r"```python\n(.*?)```", (ROOT / "docs" / "python.md").read_text(encoding="utf-8"), re.DOTALL
+)
 
 
-def test_the_python_examples_of_the_readme_run(tmp_path, recording_folder):
+def test_the_python_examples_of_the_front_door_run(tmp_path, recording_folder):
     assert len(PYTHON_EXAMPLES) == 2
     recording_folder(tmp_path / "my-recording")
     (tmp_path / "mine.yaml").write_text(
@@ -103,3 +116,19 @@ def test_the_python_examples_of_the_readme_run(tmp_path, recording_folder):
         )
         assert done.returncode == 0, done.stderr
         assert done.stdout
+
+
+def test_the_examples_of_readme_and_tutorials_run(tmp_path, monkeypatch):
+    """All in one folder; a command that another document has, too, is run once."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    steps = dict.fromkeys(step for path in (*TUTORIALS, ROOT / "README.md") for step in read_steps(path))
+    assert {step.kind for step in steps} == {"file", "command", "script"}
+    printed = {step.text: run_step(step) for step in steps}
+    verdict = json.loads(Path("verdict/verdict.json").read_text(encoding="utf-8"))
+    hidden = yaml.safe_load(Path("log/hidden.yaml").read_text(encoding="utf-8"))
+    found = {(each["effect"], each["joint"]) for each in verdict["findings"]}
+    assert found == {(each["effect"], each["joints"][0]) for each in hidden}
+    assert "shrinking-search keeps its promises" in printed["armlab check shrinking-search"]
+    assert Path("corrected.xml").is_file()
+    assert Path("figures/comparison_ends.svg").is_file()

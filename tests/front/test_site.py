@@ -1,0 +1,53 @@
+"""The documentation site is built without a warning, and its generated pages say what the code says."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+
+from armlab.cli.main import main
+from armlab.effects.library import BUILT_IN, WITHOUT_FAMILY
+from tools.site.gallery import EXAMPLES
+
+ROOT = Path(__file__).parents[2]
+FACTS = [*(family.facts for family in BUILT_IN), *WITHOUT_FAMILY.values()]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    pytest.importorskip("pydata_sphinx_theme", reason="needs the extra docs")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "tools.site", str(folder / "site"), "--source", str(folder / "source")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-3000:]
+    return folder / "site"
+
+
+def test_each_effect_has_a_page_with_its_law_and_its_picture(site):
+    for effect in (each for each in FACTS if each.id != "unknown"):
+        page = (site / "gallery" / f"{effect.id}.html").read_text(encoding="utf-8")
+        assert "<math" in page
+        assert effect.experiment[1:] in page.replace("’", "'")
+        assert (f"{effect.id}.svg" in page) == (effect.id in EXAMPLES)
+
+
+def test_each_command_has_a_page_with_all_its_options(site):
+    context = click.Context(main)
+    for name in main.list_commands(context):
+        page = (site / "reference" / "commands" / f"{name}.html").read_text(encoding="utf-8")
+        for option in main.get_command(context, name).params:
+            assert isinstance(option, click.Argument) or option.opts[-1] in page
+
+
+def test_no_page_leads_to_a_page_that_does_not_exist(site):
+    for page in site.rglob("*.html"):
+        links = re.findall(r'href="(?!https?:|#|mailto:)([^"#?]+)', page.read_text(encoding="utf-8"))
+        assert [link for link in links if not (page.parent / link).exists()] == [], page.name
+
+
+def test_each_effect_has_a_law_and_an_example():
+    assert [each.id for each in FACTS if not each.law and each.id != "unknown"] == []
+    assert set(EXAMPLES) == {family.effect for family in BUILT_IN}
