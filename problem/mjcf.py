@@ -38,6 +38,21 @@ def compile_mjcf(path: Path) -> Any:
         raise InputError(f"{path}: MuJoCo cannot compile it: {reason}{hint}") from None
 
 
+def written_mjcf(spec: Any, source: Path) -> str:
+    """The text of a mujoco.MjSpec; of one that was read from an MJCF file with absolute paths of meshes and textures.
+
+    Raises InputError, in one line, where MuJoCo refuses it.
+    """
+    if source.suffix == ".xml":
+        folder = source.parent.resolve()
+        spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
+    try:
+        spec.compile()
+        return str(spec.to_xml())
+    except (ValueError, import_mujoco().FatalError) as error:
+        raise InputError(f"MuJoCo cannot write {source.name}: {' '.join(str(error).split())}") from None
+
+
 def read_mjcf(path: Path) -> Arm:
     """The arm of an MJCF file: a chain of hinges and slides on a fixed base.
 

@@ -25,7 +25,7 @@ from armlab.identification.export import (
     inertial_element,
     link_inertias,
 )
-from problem.mjcf import carried_bodies, compile_mjcf, import_mujoco
+from problem.mjcf import carried_bodies, compile_mjcf, import_mujoco, written_mjcf
 from problem.urdf import read_urdf_chain
 
 
@@ -108,17 +108,6 @@ def patched_mjcf(simulated: SimulatorModel, source: Path) -> Patched:
     spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
     spec.compiler.settotalmass = -1
     return Patched(written_mjcf(spec, source), tuple(notes))
-
-
-def written_mjcf(spec: Any, source: Path) -> str:
-    """The text of a mujoco.MjSpec that was read from a file, with absolute paths of its meshes and textures."""
-    folder = source.parent.resolve()
-    spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
-    try:
-        spec.compile()
-        return str(spec.to_xml())
-    except (ValueError, import_mujoco().FatalError) as error:
-        raise InputError(f"MuJoCo cannot write {source.name}: {' '.join(str(error).split())}") from None
 
 
 def _check_same_arm(simulated: SimulatorModel, joints: list[str], source: Path) -> None:

@@ -10,7 +10,7 @@ from click.testing import CliRunner, Result
 from recording_folders import folder_with, frame
 
 from armlab.cli.recordings import recording
-from armlab.common.errors import InputError
+from armlab.common.documents import FailedResultError
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 
@@ -38,7 +38,7 @@ def test_check_of_a_sound_recording_says_so(tmp_path: Path) -> None:
 def test_check_of_a_recording_with_an_unusable_run_ends_with_an_error_after_the_page(tmp_path: Path) -> None:
     folder = folder_with(tmp_path / "arm", "t,q1\n")
     result = call("check", folder, "--out", tmp_path / "page.html")
-    assert isinstance(result.exception, InputError)
+    assert isinstance(result.exception, FailedResultError)
     assert "run.csv: refused:" in result.output
     assert (tmp_path / "page.html").is_file()
 

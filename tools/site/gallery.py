@@ -169,7 +169,7 @@ def _effect_page(facts: Effect) -> str:
         drawn,
         "## Parameters",
         _parameter_table(facts),
-        f"All forms of the law: {_law_in_words(facts.id)}.",
+        _law_in_text(facts.id),
         "## What it is confused with",
         *_confusions(facts),
         "## The experiment that tells",
@@ -225,11 +225,13 @@ def _parameter_table(facts: Effect) -> str:
     return markdown_table(("parameter", "unit", "physics asks", "sizes on arms"), rows)
 
 
-def _law_in_words(effect: str) -> str:
+def _law_in_text(effect: str) -> str:
     """The law as the table of docs/effects.md has it, with the names of all forms."""
     table = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8").split("| effect | law |")[1]
     (cell,) = re.findall(rf"^\| `{effect}` \| (.*?) \| ", table.split("\n\n")[0], re.MULTILINE)
-    return str(cell).replace(r"\|", "|").replace("<", r"\<")
+    law = str(cell).replace(r"\|", "|").replace("<", r"\<")
+    sign = " (`f` is a smooth sign of the velocity)" if re.search(r"\bf\b", law) else ""
+    return f"Written out{sign}: {law}."
 
 
 def _confusions(facts: Effect) -> list[str]:

@@ -9,11 +9,10 @@ import json
 import math
 from collections.abc import Iterator
 
-from armlab.common.errors import InputError
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Servos
 from armlab.diagnosis.motion.servo_plugin import NUMBERS, STICKING
 from armlab.diagnosis.motion.simulation import ServoSimulation
-from problem.mjcf import import_mujoco
+from problem.mjcf import written_mjcf
 
 MAX_DELAY_ERROR = 0.01  # of a delay: what rounding to whole steps may change without a line
 
@@ -23,7 +22,6 @@ def mjcf_text(simulation: ServoSimulation, servos: Servos) -> str:
 
     Raises InputError where MuJoCo cannot write the model.
     """
-    mujoco = import_mujoco()
     spec = simulation.spec()
     names = {actuator.target: actuator for actuator in spec.actuators}
     for row, place in enumerate(simulation.joints):
@@ -40,14 +38,7 @@ def mjcf_text(simulation: ServoSimulation, servos: Servos) -> str:
         if delay > 0:
             actuator.delay = delay
             actuator.nsample = math.ceil(delay / spec.option.timestep) + 1
-    if simulation.path.suffix == ".xml":
-        folder = simulation.path.parent.resolve()
-        spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
-    try:
-        spec.compile()
-        return str(spec.to_xml())
-    except (ValueError, mujoco.FatalError) as error:
-        raise InputError(f"MuJoCo cannot write {simulation.path.name}: {' '.join(str(error).split())}") from None
+    return written_mjcf(spec, simulation.path)
 
 
 def lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterator[str]:
