@@ -54,6 +54,7 @@ def bracketed(stem: str) -> tuple[str, ...]:
         (("timestamp", *(f"actual_q_{n}" for n in range(3)), *(f"actual_current_{n}" for n in range(3))), "1,1,1"),
         (("t", *bracketed("q"), *bracketed("tau_J")), None),
         (("time_s", *(f"q{n}_rad" for n in range(1, 4)), *(f"tau{n}_Nm" for n in range(1, 4))), None),
+        (("time", *bracketed("measured_joint_position"), *bracketed("measured_torque")), None),
         (("__time", *(f"/arm/position_{n}" for n in range(3)), *(f"/arm/effort_{n}" for n in range(3))), None),
     ],
 )
@@ -62,6 +63,14 @@ def test_columns_and_units_of_drivers_need_no_flags(tmp_path: Path, names: tuple
     import_files([path], tmp_path / "new", {**NOTHING, "gains": gains}, None)
     run = load_recording(tmp_path / "new").runs[0]
     assert_allclose(run.position, frame()[POSITION])
+    assert_allclose(run.torque, frame()[TORQUE])
+
+
+def test_the_axes_of_a_kuka_controller_count_in_degrees(tmp_path: Path) -> None:
+    names = ("t", *(f"AIPos.A{n}" for n in range(1, 4)), *(f"GearTorque.A{n}" for n in range(1, 4)))
+    import_files([write_log(tmp_path / "log.csv", names)], tmp_path / "new", NOTHING, None)
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_allclose(run.position, np.radians(frame()[POSITION]))
     assert_allclose(run.torque, frame()[TORQUE])
 
 

@@ -19,6 +19,9 @@ TIME_NAMES = ("__time", "time", "timestamp", "timestamps", "stamp", "t", "robot_
 STEMS: Mapping[str, tuple[str, str | None]] = {
     "tau_j": ("torque", "N.m"),  # Franka
     "effort": ("torque", "N.m"),  # ROS joint states
+    "measured_torque": ("torque", "N.m"),  # KUKA FRI
+    "geartorque.a": ("torque", "N.m"),  # KUKA RSI: torque on the side of the gear's output
+    "macur.a": ("torque", None),  # KUKA RSI: motor current
     "actual_joint_torque": ("torque", "N.m"),
     "joint_torque": ("torque", None),
     "torque": ("torque", None),
@@ -29,6 +32,8 @@ STEMS: Mapping[str, tuple[str, str | None]] = {
     "motor_current": ("torque", None),
     "current": ("torque", None),
     "actual_q": ("position", "rad"),  # UR RTDE
+    "measured_joint_position": ("position", "rad"),  # KUKA FRI
+    "aipos.a": ("position", "deg"),  # KUKA RSI
     "position": ("position", "rad"),  # ROS joint states
     "joint_position": ("position", None),
     "joint_pos": ("position", None),
