@@ -56,6 +56,7 @@ _GROUPS = {
     "Proof": {
         "prove": "armlab.cli.proof:prove",
         "prove-setup": "armlab.cli.proof:prove_setup",
+        "prove-motion": "armlab.cli.proof:prove_motion",
         "prove-changes": "armlab.cli.proof:prove_changes",
         "conceal": "armlab.cli.proof:conceal",
         "score": "armlab.cli.proof:score",

@@ -220,3 +220,28 @@ def prove_setup(
     folder = work or Path(f".armlab/setup/{chosen}")
     cases = SetupSet(simulated, real, nulls, chosen)
     return run_proof(cases, folder, results or folder / "score", jobs)
+
+
+@click.command("prove-motion")
+@click.option("--cases", type=click.IntRange(min=0), default=300, show_default=True, help="Something is hidden.")
+@click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Nothing is hidden.")
+@click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
+@click.option("--work", type=_FOLDER, help="Folder for cases and verdicts [default: .armlab/motion/SEED].")
+@click.option("--results", type=OutputPath(), help="Folder for motion.md and motion.json [default: WORK/score].")
+@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@prints_lines
+def prove_motion(
+    cases: int, nulls: int, seed: int | None, work: Path | None, results: Path | None, jobs: int
+) -> Iterator[str]:
+    """Prove the diagnosis of recordings of motion only.
+
+    Simulates arms with position servos whose joints stick, on an engine of its own, diagnoses commands and positions
+    blindly, and scores. After an interruption the same command continues.
+    """
+    from armlab.concealed.prove import head_commit, judged_seed
+    from armlab.concealed.servo.prove import MotionSet
+    from armlab.concealed.servo.prove import prove_motion as run_proof
+
+    chosen = judged_seed(head_commit()) if seed is None else seed
+    folder = work or Path(f".armlab/motion/{chosen}")
+    return run_proof(MotionSet(cases, nulls, chosen), folder, results or folder / "score", jobs)

@@ -1,0 +1,249 @@
+"""The score of recordings of motion: names, classes, false claims, intervals and bias, from the verdicts alone.
+
+A finding stands for a class: its name, its rivals and its members. A hidden effect has its right name where a finding
+has its name, or one that no motion tells from it, at its joint; it has its right class where that name is in a class of
+four names at most. A claim is wrong where its first name is not true. What a simulation lacks because it says nothing
+of its drives is true, too: gains where kp is unknown; damping and torque limits as well where nothing is known.
+"""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.setup.score import Share
+
+MAX_CLASS = 4  # names
+LEAST_MULTIPLE = 3.0  # detection limits of an effect that counts
+SHOWN_COUNTS, SHOWN_RATE_HZ = 4096, 50.0  # of which bias is shown alone
+LACKING = {
+    "known": (),
+    "partly": ("controller_gain_error",),
+    "unknown": ("controller_gain_error", "viscous_friction", "torque_saturation"),
+}
+
+Name = tuple[str, int | None]  # effect, and joint from 1 or None for all
+
+
+@dataclass(frozen=True)
+class Number:
+    """A reported number beside the true one. error: reported less true, over the width of the interval."""
+
+    effect: str
+    parameter: str
+    held: bool
+    error: float
+
+
+@dataclass(frozen=True)
+class HiddenOutcome:
+    """What was said of one hidden effect. size: as in the answer. multiple: detection limits."""
+
+    kind: str
+    effect: str
+    joint: int | None
+    size: float
+    multiple: float
+    named: bool
+    in_class: bool
+
+    @property
+    def visible(self) -> bool:
+        """Whether it counts."""
+        return self.multiple >= LEAST_MULTIPLE
+
+
+@dataclass(frozen=True)
+class MotionOutcome:
+    """One case: what is true of it, and what was said. refused: why there is no verdict."""
+
+    case: str
+    kind: str
+    law: str
+    knowledge: str
+    counts: int
+    rate_hz: float
+    status: str
+    refused: str
+    claims: list[str]
+    wrong: list[str]
+    hidden: list[HiddenOutcome]
+    numbers: list[Number]
+    single_wrong_numbers: int
+
+
+def score_motion(work: Path, names: Sequence[str], results: Path) -> list[tuple[Share, str]]:
+    """Judges all cases, and writes motion.md and motion.json; the measures, each with what was wanted."""
+    outcomes = [_judge(work, name) for name in names]
+    measures = _measure(outcomes)
+    page = markdown_page(
+        "Recordings of motion: score",
+        markdown_table(("measure", "value", "wanted"), [(share.name, share.text, aim) for share, aim in measures]),
+        f"## Effects above {LEAST_MULTIPLE:g} detection limits",
+        markdown_table(("what is hidden", "cases", "right name", "right class"), _rows_of_kinds(outcomes)),
+        "## Numbers\n\nError: reported less true, over the width of the 95 % interval; wanted below 0.25.",
+        markdown_table(("number", "reported", "interval holds", "mean error"), _rows_of_numbers(outcomes)),
+        "## Misses and wrong claims",
+        markdown_table(("case", "law, controller", "hidden (limits)", "said"), _rows_of_misses(outcomes)),
+    )
+    content = {"measures": [{**asdict(share), "wanted": aim} for share, aim in measures]}
+    content |= {"cases": [asdict(each) for each in outcomes]}
+    write_texts({"motion.md": page, "motion.json": json.dumps(content, indent=1) + "\n"}, results)
+    return measures
+
+
+def score_lines(measures: Sequence[tuple[Share, str]]) -> Iterator[str]:
+    """The measures as lines."""
+    yield from (f"{share.name}: {share.text}{f'; wanted {aim}' if aim else ''}" for share, aim in measures)
+
+
+def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:
+    nulls = [each for each in outcomes if each.kind == "null"]
+    others = [each for each in outcomes if each.kind != "null"]
+    known = [own for each in others if each.knowledge == "known" for own in each.hidden if own.visible]
+    unknown = [own for each in others if each.knowledge != "known" for own in each.hidden if own.visible]
+    without_kp = [each for each in outcomes if each.knowledge != "known"]
+    numbers = [number for each in outcomes for number in each.numbers]
+    limits = f"above {LEAST_MULTIPLE:g} limits"
+    return [
+        (Share("nulls with a false claim", sum(bool(each.wrong) for each in nulls), len(nulls)), "at most 2 %"),
+        (Share("nulls without a verdict", sum(bool(each.refused) for each in nulls), len(nulls)), ""),
+        (Share("cases without a verdict", sum(bool(each.refused) for each in others), len(others)), ""),
+        (Share(f"{limits}: right name", sum(own.named for own in known), len(known)), ""),
+        (Share(f"{limits}: right name or class of four", sum(own.in_class for own in known), len(known)), "85 %"),
+        (Share(f"{limits}, kp unknown: in a class", sum(own.in_class for own in unknown), len(unknown)), "85 %"),
+        (
+            Share(
+                "kp unknown: single wrong number",
+                sum(each.single_wrong_numbers > 0 for each in without_kp),
+                len(without_kp),
+            ),
+            "none",
+        ),
+        (Share("cases with a wrong claim", sum(bool(each.wrong) for each in others), len(others)), ""),
+        (Share("95 % intervals that hold", sum(each.held for each in numbers), len(numbers)), "90 to 98 %"),
+    ]
+
+
+def _rows_of_kinds(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
+    seen = [own for each in outcomes for own in each.hidden if own.visible]
+    rows: list[tuple[str, ...]] = []
+    for kind in sorted({own.kind for own in seen}):
+        own = [each for each in seen if each.kind == kind]
+        counts = len(own), sum(each.named for each in own), sum(each.in_class for each in own)
+        rows.append((kind, *(str(count) for count in counts)))
+    return rows
+
+
+def _rows_of_numbers(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
+    """Each number in all cases, and in those of SHOWN_COUNTS and SHOWN_RATE_HZ."""
+    shown = [each for each in outcomes if (each.counts, each.rate_hz) == (SHOWN_COUNTS, SHOWN_RATE_HZ)]
+    rows: list[tuple[str, ...]] = []
+    for label, cases in (("", outcomes), (f", {SHOWN_COUNTS} counts, {SHOWN_RATE_HZ:g} Hz", shown)):
+        numbers = [number for each in cases for number in each.numbers]
+        for name in sorted({(each.effect, each.parameter) for each in numbers}):
+            own = [each for each in numbers if (each.effect, each.parameter) == name]
+            mean = float(np.mean([each.error for each in own]))
+            rows.append(
+                (f"{name[0]} {name[1]}{label}", str(len(own)), str(sum(each.held for each in own)), f"{mean:.2f}")
+            )
+    return rows
+
+
+def _rows_of_misses(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for each in outcomes:
+        if each.wrong or each.refused or any(own.visible and not own.in_class for own in each.hidden):
+            hidden = "; ".join(f"{own.kind}@{own.joint or '-'} ({own.multiple:.1f})" for own in each.hidden)
+            said = each.refused or "; ".join(each.claims) or each.status
+            rows.append((each.case, f"{each.law}, {each.knowledge}", hidden or "nothing", said))
+    return rows
+
+
+def _judge(work: Path, case: str) -> MotionOutcome:
+    truth = json.loads((work / "truth" / f"{case}.json").read_text(encoding="utf-8"))
+    folder = work / "verdicts" / case
+    failed = (folder / FAILURE_FILE).is_file()
+    verdict = {} if failed else json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+    return judge(truth, verdict, (folder / FAILURE_FILE).read_text(encoding="utf-8").strip() if failed else "")
+
+
+def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> MotionOutcome:
+    """Judges a verdict (verdict/1, empty where there is none) by an answer (motion-truth/1)."""
+    classes = [(finding, _class_of(finding)) for finding in verdict.get("findings", [])]
+    lacking = LACKING[truth["knowledge"]]
+    numbers = [(finding, number) for finding, _ in classes for number in _compare(finding, truth, lacking)]
+    single = [number for finding, number in numbers if len(_class_of(finding)) == 1 and not number.held]
+    return MotionOutcome(
+        case=truth["case"],
+        kind=truth["kind"],
+        law=truth["law"],
+        knowledge=truth["knowledge"],
+        counts=truth["counts"],
+        rate_hz=truth["rate_hz"],
+        status=verdict.get("status", ""),
+        refused=refused,
+        claims=[", ".join(map(_label, own)) for _, own in classes],
+        wrong=[_label(own[0]) for _, own in classes if not _is_true(own[0], truth, lacking)],
+        hidden=[
+            HiddenOutcome(
+                kind=each["kind"],
+                effect=each["effect"],
+                joint=each["joint"],
+                size=each["size"],
+                multiple=each["multiple"],
+                named=any(_names(own[0], each) for _, own in classes),
+                in_class=any(len(own) <= MAX_CLASS and any(_names(name, each) for name in own) for _, own in classes),
+            )
+            for each in truth["injected"]
+        ],
+        numbers=[number for _, number in numbers],
+        single_wrong_numbers=len(single),
+    )
+
+
+def _class_of(finding: dict[str, Any]) -> list[Name]:
+    """The names that a finding leaves open, its own first."""
+    others = [*(finding.get("class") or []), *finding.get("rivals", [])]
+    names = [(each["effect"], each["joint"]) for each in (finding, *others)]
+    return list(dict.fromkeys(names))
+
+
+def _names(name: Name, hidden: dict[str, Any]) -> bool:
+    """Whether a name is that of a hidden effect, or one that no motion tells from it."""
+    right = name[0] == hidden["effect"] or name[0] in hidden["equivalent"]
+    return right and hidden["joint"] in (None, name[1])
+
+
+def _is_true(name: Name, truth: dict[str, Any], lacking: Sequence[str]) -> bool:
+    parts = [(each["part"], each["joint"]) for each in truth["injected"]]
+    return name[0] in lacking or name in parts or any(_names(name, each) for each in truth["injected"])
+
+
+def _compare(finding: dict[str, Any], truth: dict[str, Any], lacking: Sequence[str]) -> Iterator[Number]:
+    """The numbers of a finding whose own name is true, beside the true ones."""
+    effect, joint = finding["effect"], finding["joint"]
+    own = [each for each in truth["injected"] if each["effect"] == effect and each["joint"] in (None, joint)]
+    if joint is None or not (own or effect in lacking) or any(each["falling"] for each in own):
+        return
+    drive = truth["drives"][joint - 1]
+    true = {**drive.get(effect, {}), **(own[0]["parameters"] if own else {})}
+    if "viscous_friction" in lacking:  # kd is in one column with it, and no part of the simulation
+        true = {name: value for name, value in true.items() if name != "kd"}
+        if effect == "viscous_friction":
+            true["coefficient"] += drive["controller_gain_error"]["kd"]
+    for name, reported in finding["parameters"].items():
+        interval = reported["ci95"]
+        if name in true and interval is not None and np.ndim(interval) == 1 and interval[1] > interval[0]:
+            low, high = interval
+            yield Number(effect, name, low <= true[name] <= high, (reported["value"] - true[name]) / (high - low))
+
+
+def _label(name: Name) -> str:
+    return f"{name[0]}@{name[1] or '-'}"
