@@ -9,7 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.concealed.servo.engine import STEP_S, Body, Servo, ServoArm, mass_and_bias
 
-Law = Literal["pd", "pid", "cascade"]
+Law = Literal["pd", "pid", "cascade", "PI cascade"]
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ AXIS_SHARES = ((0.5, 0.5, 0.0), (0.3, 0.5, 0.2))  # of the first joint, of the o
 
 
 def draw_arm(rng: np.random.Generator, law: Law) -> tuple[ServoArm, Array]:
-    """An arm and its home position (joints,), rad."""
+    """An arm and its home position (joints,), rad. A `cascade` is a PD; a `PI cascade` has an integral gain, too."""
     joints = int(rng.integers(ARMS.joints[0], ARMS.joints[1] + 1))
     bodies = draw_bodies(rng, joints)
     home = rng.uniform(-0.8, 0.8, joints)
@@ -102,15 +102,10 @@ def _draw_servo(rng: np.random.Generator, law: Law, inertia: float, gravity: flo
     wind_up = float(rng.uniform(*ARMS.wind_up)) * limit
     if law == "pid":
         return replace(servo, ki=corner * kp, integral_limit=wind_up)
-    if law == "cascade":  # a PID whose integral never reaches its limit, with kp = kd position_gain + ki
-        ki = corner * kd
-        return replace(servo, cascaded=True, position_gain=(kp - ki) / kd, ki=ki, integral_limit=10 * limit)
-    return servo
-
-
-def declared_integral_gain(servo: Servo) -> float:
-    """Integral gain of the PID that a drive is, N m/(rad s)."""
-    return servo.ki * servo.position_gain if servo.cascaded else servo.ki
+    if law == "pd":
+        return servo
+    ki = corner * kd if law == "PI cascade" else 0.0
+    return replace(servo, cascaded=True, position_gain=(kp - ki) / kd, ki=ki, integral_limit=wind_up)
 
 
 def write_mjcf(arm: ServoArm, actuators: bool) -> str:

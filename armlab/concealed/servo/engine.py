@@ -31,7 +31,8 @@ class Body:
 class Servo:
     """The drive and the friction of a joint.
 
-    PID: tau = kp e - kd qd + i, di/dt = ki e. Cascade: tau = kd s + i, s = position_gain e - qd, di/dt = ki s.
+    PID: tau = kp e - kd qd + i, di/dt = ki e. Cascade: tau = kd s + i, s = position_gain e - qd, di/dt = ki s, and its
+    kp is the stiffness kd position_gain + ki.
     |i| <= integral_limit, |tau| <= limit - limit_slope |qd| where the drive does work, and limit where it brakes. e is
     the delayed command plus the offset, less the position as the encoder reads it, without half the dead band.
 
@@ -91,7 +92,7 @@ def simulate(arm: ServoArm, command: Array, period: float, first: Array) -> Arra
     pointers = (ffi.from_buffer("double *", each) for each in (command, first, out))
     given = (joints, _bodies(arm), _servos(arm), settings, steps, count)
     if lib.simulate(*given, *pointers) != 0:
-        raise ArithmeticError("friction was not solved to rounding")
+        raise ArithmeticError("a step of the arm has no solution: its mass matrix is not positive definite")
     return out
 
 

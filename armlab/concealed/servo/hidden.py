@@ -105,19 +105,16 @@ def servo_parameters(servo: Servo) -> dict[str, Parameters]:
 
 
 def _change_gain(servo: Servo, hidden: Hidden) -> Servo:
-    factor = 1 + hidden.sign * hidden.size
-    position_gain = (factor * servo.kp - servo.ki) / servo.kd if servo.cascaded else 0.0
-    return replace(servo, kp=factor * servo.kp, position_gain=position_gain)
+    return _with_gains(servo, servo.kp * (1 + hidden.sign * hidden.size), servo.kd)
 
 
 def _change_drive_damping(servo: Servo, hidden: Hidden) -> Servo:
-    """kd of a cascade changes without kp and the integral gain of the PID that it is."""
-    kd = servo.kd * (1 + hidden.sign * hidden.size)
-    if not servo.cascaded:
-        return replace(servo, kd=kd)
-    integral = servo.ki * servo.position_gain
-    ki = (servo.kp - np.sqrt(max(servo.kp**2 - 4 * kd * integral, 0.0))) / 2  # kp = kd integral / ki + ki
-    return replace(servo, kd=kd, ki=float(ki), position_gain=float(integral / ki))
+    return _with_gains(servo, servo.kp, servo.kd * (1 + hidden.sign * hidden.size))
+
+
+def _with_gains(servo: Servo, kp: float, kd: float) -> Servo:
+    position_gain = (kp - servo.ki) / kd if servo.cascaded else 0.0
+    return replace(servo, kp=kp, kd=kd, position_gain=position_gain)
 
 
 def _scaled(field: str) -> Callable[[Servo, Hidden], Servo]:

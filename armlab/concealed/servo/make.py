@@ -10,7 +10,7 @@ import pandas as pd
 import yaml
 
 from armlab.common.settings import to_plain_data
-from armlab.concealed.servo.arms import declared_integral_gain, write_mjcf
+from armlab.concealed.servo.arms import write_mjcf
 from armlab.concealed.servo.engine import ServoArm
 from armlab.concealed.servo.hidden import Hidden, servo_parameters
 from armlab.concealed.servo.oracle import Oracle, find_size, record
@@ -97,7 +97,7 @@ def write_case(made: MadeCase, observation: Path, truth: Path) -> None:
 def _controller(case: ServoCase, arm: ServoArm) -> dict[str, Any]:
     """What the recording says of the drives, as the simulation file has them."""
     servos = arm.servos
-    integral = [declared_integral_gain(servo) for servo in servos]
+    integral = [servo.ki for servo in servos]
     return {
         "type": "pd",
         "kp": [servo.kp if case.knowledge == "known" else None for servo in servos],

@@ -4,7 +4,7 @@ The oracle knows the law, the state at the start and the noise. It replays the c
 with encoders that have no steps. Its noise is what the record differs from the replay of the truth: steps of the
 encoder in the record and within the loop of the drive, and late stamps. s is the standard deviation of that noise at a
 joint, and k = 1 + 2 sum of its autocorrelations. D is the difference of the replays on the identification runs, over
-s sqrt(k), without its part along the changes that kp, damping and friction of the joints concerned make.
+s sqrt(k), without its part along what changes of kp, damping and friction of the joints concerned do to these joints.
 
     multiple = |D| / (z(1 - level / (2 tests)) + z(power))
 """
@@ -96,33 +96,43 @@ class Oracle:
 
     def multiple(self, hidden: Hidden, with_it: ServoArm, without: ServoArm) -> float:
         """Detection limits of a difference between two arms."""
-        added = self.weighted(self.smooth(with_it), self.smooth(without))
-        matrix = np.stack([self._column(joint, field) for joint, field in self._free(hidden)], axis=1)
-        rest = added - matrix @ np.linalg.lstsq(matrix, added, rcond=None)[0]
+        before = self.own if without is self.arm else self.smooth(without)
+        after = self.own if with_it is self.arm else self.smooth(with_it)
+        added = self._weighted(after, before)
+        columns = [_only(joint, self._changes[field]) for joint, field in self._free(hidden)]
+        matrix = np.stack([column.ravel() for column in columns], axis=1)
+        rest = added.ravel() - matrix @ np.linalg.lstsq(matrix, added.ravel(), rcond=None)[0]
         tests = len(KINDS) * self.arm.joints
         needed = norm.ppf(1 - ORACLE.level / (2 * tests)) + norm.ppf(ORACLE.power)
         return float(np.linalg.norm(rest) / needed)
 
-    def weighted(self, first: Sequence[Array], second: Sequence[Array]) -> Array:
-        """Difference of replays over the noise, in one row."""
-        return np.concatenate([((a - b) / self.noise).ravel() for a, b in zip(first, second, strict=True)])
+    def _weighted(self, first: Sequence[Array], second: Sequence[Array]) -> Array:
+        """Difference of replays over the noise, (samples of all runs, joints)."""
+        return np.concatenate([(a - b) / self.noise for a, b in zip(first, second, strict=True)])
 
     def _free(self, hidden: Hidden) -> list[tuple[int, str]]:
+        """Joints and fields of their servos that every fit has free."""
         everywhere = hidden.kind in ("delay", "payload")
         own = "damping" if hidden.kind == "damping of the drive" else FREE_IN_EVERY_FIT.get(hidden.kind)
         joints = range(self.arm.joints) if everywhere else [hidden.joint]
         return [(joint, field) for joint in joints for field in FREE_IN_EVERY_FIT.values() if field != own]
 
-    def _column(self, joint: int, field: str) -> Array:
-        if (joint, field) not in self._columns:
-            kind = next(kind for kind, own in FREE_IN_EVERY_FIT.items() if own == field)
-            changed = Hidden(kind, joint, size=ORACLE.step).apply(self.arm)
-            self._columns[joint, field] = self.weighted(self.smooth(changed), self.own)
-        return self._columns[joint, field]
-
     @cached_property
-    def _columns(self) -> dict[tuple[int, str], Array]:
-        return {}
+    def _changes(self) -> dict[str, Array]:
+        """What a change of a field at all joints at once makes of each joint's position, weighted."""
+        out = {}
+        for kind, field in FREE_IN_EVERY_FIT.items():
+            arm = self.arm
+            for joint in range(arm.joints):
+                arm = Hidden(kind, joint, size=ORACLE.step).apply(arm)
+            out[field] = self._weighted(self.smooth(arm), self.own)
+        return out
+
+
+def _only(joint: int, change: Array) -> Array:
+    out = np.zeros_like(change)
+    out[:, joint] = change[:, joint]
+    return out
 
 
 def find_size(oracle: Oracle, hidden: Hidden, wanted: float) -> tuple[Hidden, float]:

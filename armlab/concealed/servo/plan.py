@@ -60,9 +60,11 @@ class ServoCase:
 
     @property
     def law(self) -> Law:
-        """Of the drives."""
+        """Of the drives. No recording can state a cascade with an integral gain: only unknown drives are such."""
         law = LAW_CYCLE[self.index % len(LAW_CYCLE)]
-        return "pd" if self.development and law == "cascade" else law
+        if law != "cascade":
+            return law
+        return "pd" if self.development else "PI cascade" if self.knowledge == "unknown" else law
 
     @property
     def knowledge(self) -> Knowledge:

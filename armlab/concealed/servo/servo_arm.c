@@ -7,7 +7,8 @@
  *     q' = q_m + h/2 v'
  *
  * v_m = 3/2 v - 1/2 v(before). Friction is set-valued: at v'_i = 0 any f_i between -F_i and F_i. The problem is strictly
- * convex; projected Gauss-Seidel solves it to rounding.
+ * convex. Sweeps of projected Gauss-Seidel guess which joints stick and which way the others slide, and the linear
+ * system of the guess gives the exact solution as soon as it agrees with it.
  */
 #include <math.h>
 #include <stdint.h>
@@ -135,22 +136,67 @@ static double clip(double x, double limit)
     return x > limit ? limit : x < -limit ? -limit : x;
 }
 
+/* Solves S x = r for `size` unknowns of a symmetric positive definite S, (size, size), which is overwritten. */
+static void solve_definite(int size, double *S, double *r)
+{
+    for (int k = 0; k < size; k++)
+        for (int i = k + 1; i < size; i++) {
+            double factor = S[i * size + k] / S[k * size + k];
+            for (int j = k; j < size; j++)
+                S[i * size + j] -= factor * S[k * size + j];
+            r[i] -= factor * r[k];
+        }
+    for (int k = size - 1; k >= 0; k--) {
+        for (int j = k + 1; j < size; j++)
+            r[k] -= S[k * size + j] * r[j];
+        r[k] /= S[k * size + k];
+    }
+}
+
+/* The solution where joints stick and slide as in x: 1 and the solution in x if it agrees with that, 0 if not. */
+static int solve_as_guessed(int joints, const double *A, const double *b, const double *level, double *x)
+{
+    int sliding[MAX_JOINTS], slides[MAX_JOINTS], size = 0;
+    double S[MAX_JOINTS * MAX_JOINTS], r[MAX_JOINTS], full[MAX_JOINTS] = {0};
+    for (int i = 0; i < joints; i++) {
+        slides[i] = x[i] != 0 || level[i] == 0;
+        if (slides[i])
+            sliding[size++] = i;
+    }
+    for (int i = 0; i < size; i++) {
+        r[i] = b[sliding[i]] - sign(x[sliding[i]]) * level[sliding[i]];
+        for (int j = 0; j < size; j++)
+            S[i * size + j] = A[sliding[i] * joints + sliding[j]];
+    }
+    solve_definite(size, S, r);
+    for (int i = 0; i < size; i++) {
+        if (level[sliding[i]] > 0 && r[i] * x[sliding[i]] <= 0)
+            return 0;
+        full[sliding[i]] = r[i];
+    }
+    for (int i = 0; i < joints; i++) {
+        double held = b[i];
+        for (int j = 0; j < joints; j++)
+            held -= A[i * joints + j] * full[j];
+        if (!slides[i] && fabs(held) > level[i] * (1 + 1e-9))
+            return 0;
+    }
+    memcpy(x, full, joints * sizeof *x);
+    return 1;
+}
+
 /* Solves A x = b - f with f_i in level_i Sgn(x_i); x holds the start. Returns the sweeps, -1 where it does not end. */
 static int solve_friction(int joints, const double *A, const double *b, const double *level, double *x)
 {
     for (int sweep = 1; sweep <= MAX_SWEEPS; sweep++) {
-        double change = 0, size = 0;
         for (int i = 0; i < joints; i++) {
             double free = b[i];
             for (int j = 0; j < joints; j++)
                 if (j != i)
                     free -= A[i * joints + j] * x[j];
-            double next = fabs(free) <= level[i] ? 0.0 : (free - sign(free) * level[i]) / A[i * joints + i];
-            change = fmax(change, fabs(next - x[i]));
-            size = fmax(size, fabs(next));
-            x[i] = next;
+            x[i] = fabs(free) <= level[i] * (1 + 1e-12) ? 0.0 : (free - sign(free) * level[i]) / A[i * joints + i];
         }
-        if (change <= 1e-13 + 1e-12 * size)
+        if (solve_as_guessed(joints, A, b, level, x))
             return sweep;
     }
     return -1;

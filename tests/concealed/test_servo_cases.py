@@ -1,0 +1,142 @@
+"""Cases of motion only: plans, sizes, files, and how verdicts are judged."""
+
+import json
+
+import numpy as np
+import pytest
+
+from armlab.concealed.servo.hidden import KINDS, Hidden
+from armlab.concealed.servo.make import make_case, write_case
+from armlab.concealed.servo.oracle import Oracle, find_size
+from armlab.concealed.servo.plan import ServoCase, draw_cases
+from armlab.concealed.servo.score import judge
+from armlab.recordings.motion import load_motion_recording
+
+
+def small_case(kind, law="pd"):
+    """A known case of two joints."""
+    cases = (ServoCase(1990, kind, index) for index in range(1000))
+    return next(each for each in cases if each.drawn[0].joints == 2 and each.knowledge == "known" and each.law == law)
+
+
+def test_a_set_hides_every_kind_before_one_comes_twice():
+    known = [ServoCase(1990, "one", index) for index in range(84)]
+    drawn = {each.draw_hidden(0, 0).kind for each in known if each.knowledge == "known"}
+    assert drawn == set(KINDS)
+
+
+def test_held_out_motions_are_two_or_three_and_two_or_more_are_left():
+    for case in draw_cases(1990, 0, 6):
+        roles = [run.role for run in case.runs]
+        assert 4 <= len(roles) <= 8
+        assert roles.count("validate") in (2, 3)
+        assert roles.count("identify") >= 2
+
+
+@pytest.mark.parametrize("kind", ["friction", "gain", "offset"])
+def test_a_hidden_size_is_of_about_the_wanted_detection_limits(kind):
+    case = small_case("one")
+    oracle = Oracle(case, case.drawn[0])
+    sized, multiple = find_size(oracle, Hidden(kind, 1), 6.0)
+    assert multiple == pytest.approx(6.0, rel=0.25)
+    assert 0 < sized.size < KINDS[kind].largest
+
+
+def test_an_arm_without_a_difference_has_no_detection_limit_of_one():
+    case = small_case("one")
+    arm = case.drawn[0]
+    assert Oracle(case, arm).multiple(Hidden("offset", 0), arm, arm) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_payload_adds_its_mass_and_the_moments_of_a_point():
+    arm = small_case("one").drawn[0]
+    before, after = arm.bodies[-1], Hidden("payload", 0, size=0.5).apply(arm).bodies[-1]
+    assert after.mass == pytest.approx(1.5 * before.mass)
+    moment = before.mass * np.array(before.centre) + 0.5 * before.mass * np.array([2 * before.centre[0], 0, 0])
+    np.testing.assert_allclose(after.mass * np.array(after.centre), moment)
+    assert after.inertia[0] >= before.inertia[0]
+
+
+def test_a_written_case_is_a_recording_of_motion_and_its_answer_stays_outside(tmp_path):
+    case = small_case("one")
+    made = make_case(case)
+    write_case(made, tmp_path / "observation", tmp_path / "truth.json")
+    recording = load_motion_recording(tmp_path / "observation")
+    assert len(recording.joints) == 2
+    assert [run.role for run in recording.runs] == [run.role for run in case.runs]
+    truth = json.loads((tmp_path / "truth.json").read_text())
+    assert [each["kind"] for each in truth["injected"]] == [each.kind for each in made.hidden]
+    named = {path.name for path in (tmp_path / "observation").iterdir()}
+    assert named == {"arm.xml", "recording.yaml", *(f"run-{each + 1}.csv" for each in range(len(case.runs)))}
+
+
+TRUTH = {
+    "case": "a",
+    "kind": "one",
+    "law": "pd",
+    "knowledge": "known",
+    "counts": 4096,
+    "rate_hz": 50.0,
+    "injected": [
+        {
+            "kind": "friction",
+            "effect": "coulomb_friction",
+            "equivalent": [],
+            "part": "",
+            "joint": 2,
+            "size": 0.5,
+            "falling": False,
+            "parameters": {"level": 0.3},
+            "multiple": 5.0,
+        }
+    ],
+    "drives": [
+        {
+            "controller_gain_error": {"kp": 5.0, "kd": 0.2},
+            "coulomb_friction": {"level": 0.3},
+            "viscous_friction": {"coefficient": 0.1},
+        }
+    ]
+    * 2,
+}
+
+
+def finding(effect, joint, rivals=(), **parameters):
+    """A finding as a verdict has it; parameters: value, low, high."""
+    numbers = {name: {"value": each[0], "ci95": list(each[1:]), "unit": ""} for name, each in parameters.items()}
+    others = [{"effect": name, "joint": place} for name, place in rivals]
+    return {"effect": effect, "joint": joint, "rivals": others, "parameters": numbers}
+
+
+def test_a_right_name_counts_with_its_number():
+    verdict = {"findings": [finding("coulomb_friction", 2, level=(0.32, 0.29, 0.35))]}
+    outcome = judge(TRUTH, verdict)
+    assert (outcome.hidden[0].named, outcome.hidden[0].in_class, outcome.wrong) == (True, True, [])
+    assert outcome.numbers[0].held
+    assert outcome.numbers[0].error == pytest.approx(0.02 / 0.06)
+
+
+def test_a_right_name_at_another_joint_is_a_wrong_claim():
+    outcome = judge(TRUTH, {"findings": [finding("coulomb_friction", 1)]})
+    assert (outcome.hidden[0].in_class, outcome.wrong) == (False, ["coulomb_friction@1"])
+
+
+def test_a_name_among_four_is_a_right_class_and_among_five_is_none():
+    rivals = [("coulomb_friction", 2), ("payload", 2), ("rotor_inertia", 2), ("command_delay", 2)]
+    four, five = (judge(TRUTH, {"findings": [finding("viscous_friction", 2, rivals[:n])]}) for n in (3, 4))
+    assert (four.hidden[0].named, four.hidden[0].in_class) == (False, True)
+    assert not five.hidden[0].in_class
+    assert four.wrong == ["viscous_friction@2"]
+
+
+def test_a_gain_is_no_wrong_claim_where_kp_is_unknown_but_a_single_wrong_number_is_counted():
+    verdict = {"findings": [finding("controller_gain_error", 1, kp=(6.0, 5.8, 6.2))]}
+    outcome = judge({**TRUTH, "knowledge": "partly"}, verdict)
+    assert outcome.wrong == []
+    assert outcome.single_wrong_numbers == 1
+    assert judge(TRUTH, verdict).wrong == ["controller_gain_error@1"]
+
+
+def test_damping_is_that_of_joint_and_drive_where_nothing_is_known_of_the_drive():
+    verdict = {"findings": [finding("viscous_friction", 1, coefficient=(0.31, 0.29, 0.33))]}
+    assert judge({**TRUTH, "knowledge": "unknown"}, verdict).numbers[0].held
