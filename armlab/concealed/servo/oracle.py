@@ -48,7 +48,7 @@ def replay(case: ServoCase, arm: ServoArm, run: MotionRun, smooth: bool) -> Arra
     time = np.arange(len(fine)) * STEP_S
     late = case.read_gap_s * np.arange(arm.joints)
     instants = np.arange(round(REST_S * case.rate_hz), len(run.command)) / case.rate_hz
-    read = [np.interp(instants - late[joint], time, fine[:, joint]) for joint in range(arm.joints)]
+    read = [np.interp(instants + late[joint], time, fine[:, joint]) for joint in range(arm.joints)]
     return np.stack(read, axis=1)
 
 

@@ -92,8 +92,12 @@ class ServoCase:
 
     @property
     def read_gap_s(self) -> float:
-        """Between the readings of two joints, which are read one after another; only where the recording says it."""
-        return 0.0 if self.knowledge == "unknown" else float(self.stream("read").uniform(*ARMS.read_gap_s))
+        """Between the readings of two joints, the first at the stamp; only where the recording says it.
+
+        All joints are read within an interval of the samples.
+        """
+        gap = 0.0 if self.knowledge == "unknown" else float(self.stream("read").uniform(*ARMS.read_gap_s))
+        return min(gap, 1 / (self.rate_hz * self.drawn[0].joints))
 
     @property
     def jitter_s(self) -> float:
