@@ -1,6 +1,7 @@
 """Diagnoses of recordings of motion only: named servos, honest nulls, files that reproduce the replay, bad input."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -15,7 +16,7 @@ from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
+from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.joint_replay import replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
@@ -63,6 +64,19 @@ def test_held_out_replay_comes_near_the_encoder(diagnosis: MotionDiagnosis) -> N
         assert each.replay_after < 0.1 * each.replay_before
     assert diagnosis.tool[0] is not None
     assert diagnosis.tool[1] < 0.1 * diagnosis.tool[0]
+
+
+def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis: MotionDiagnosis) -> None:
+    first, second = diagnosis.chosen
+    assert first is not None
+    values = first.fit.values.copy()
+    values[place("kp")] = 0.01
+    spoilt = replace(first, fit=replace(first.fit, values=values))
+    named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
+    held_out = split_runs(diagnosis.recording)[1]
+    servos, _, kept = replay_named(diagnosis.simulation, (spoilt, second), named, diagnosis.replayed_before, held_out)
+    assert kept == [[], named[1]]
+    np.testing.assert_array_equal(servos.values[0], diagnosis.simulation.nominal.values[0])
 
 
 def test_intervals_are_narrow_and_near_the_truth(diagnosis: MotionDiagnosis) -> None:

@@ -189,17 +189,14 @@ def _conclude(
 ) -> MotionDiagnosis:
     """Findings, replays and errors. windows: of the runs that identify, and of those that are held out."""
     learned, judged = windows
-    values = np.stack([_values_after(simulation, number, each) for number, each in enumerate(chosen)])
-    servos = Servos(values)
-    findings = [
-        finding
+    named = [
+        [] if each is None else name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
         for number, each in enumerate(chosen)
-        if each is not None
-        for finding in name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
     ]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(simulation, None, held_out)) if known else ()
-    after = tuple(replay(simulation, servos, held_out))
+    servos, after, named = replay_named(simulation, chosen, named, before, held_out)
+    findings = [finding for own in named for finding in own]
     errors = tuple(
         _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
@@ -229,10 +226,37 @@ def _conclude(
     )
 
 
-def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo | None) -> Array:
-    """Numbers of a joint for the simulation after: those of the simulation where nothing better is known."""
+def replay_named(
+    simulation: ServoSimulation,
+    chosen: Sequence[ChosenServo | None],
+    named: Sequence[list[ServoFinding]],
+    before: tuple[Replayed, ...],
+    held_out: Sequence[MotionRun],
+) -> tuple[Servos, tuple[Replayed, ...], list[list[ServoFinding]]]:
+    """The servos with what is named, their replay of the held-out runs, and the names of each joint that hold there.
+
+    A joint whose replay its names make worse, the worst first, gets back the numbers of the simulation.
+    """
+    named = list(named)
+    while True:
+        values = [_values_after(simulation, number, each, bool(named[number])) for number, each in enumerate(chosen)]
+        servos = Servos(np.stack(values))
+        after = tuple(replay(simulation, servos, held_out))
+        ratios = joint_rms(after) / joint_rms(before) if before else np.ones(len(named))
+        ratios = np.where([bool(own) for own in named], ratios, 0.0)
+        worst = int(np.argmax(ratios))
+        if ratios[worst] <= 1:
+            return servos, after, named
+        named[worst] = []
+
+
+def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo | None, named: bool) -> Array:
+    """Numbers of a joint for the simulation after: those of the simulation where nothing better is known.
+
+    named: whether one of the fitted ones is a finding.
+    """
     nominal = simulation.nominal.values[number]
-    if chosen is not None and (chosen.gains or not np.isfinite(nominal).all()):
+    if chosen is not None and (named or not np.isfinite(nominal).all()):
         return chosen.fit.values
     if not np.isfinite(nominal).all():
         name = simulation.arm.joints[simulation.joints[number]].name
@@ -268,6 +292,7 @@ def name_differences(
 ) -> list[ServoFinding]:
     """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's.
 
+    None raises the error on held-out windows above that with the simulation's number in its place.
     windows: of the runs that identify, and of those that are held out.
     """
     learned, judged = windows
@@ -282,7 +307,7 @@ def name_differences(
     found = []
     for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
         parameter, nominal = PARAMETERS[place_of], float(chosen.nominal[place_of])
-        if low[place_of] <= nominal <= high[place_of]:
+        if low[place_of] <= nominal <= high[place_of] or (np.isfinite(nominal) and _rms(error) < after):
             continue
         ends_of = (float(low[place_of]), float(high[place_of]))
         kd = float(simulation.nominal.get("kd")[number])
