@@ -1,8 +1,8 @@
 """Commands on concealed cases: make and score them, the proof, the value of each guard, and the closed loop."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
 import click
 
@@ -11,6 +11,7 @@ from armlab.cli.output import prints_lines, prints_result
 from armlab.common.documents import ResultLines
 
 _FOLDER = click.Path(path_type=Path)
+_Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
 @click.command()
@@ -165,13 +166,39 @@ def prove(
     return run_proof(proof, folder, scores, jobs)
 
 
+def _seed_and_folder(seed: int | None, work: Path | None, kind: str) -> tuple[int, Path]:
+    """The seed of a sealed set, which follows from the commit, and its folder, where they are not given."""
+    from armlab.concealed.prove import head_commit, judged_seed
+
+    chosen = judged_seed(head_commit()) if seed is None else seed
+    return chosen, work or Path(f".armlab/{kind}/{chosen}")
+
+
+def _sealed_set_options(kind: str, contents: str) -> Callable[[_Command], _Command]:
+    """Seed, folders and processes of a sealed set."""
+    options = (
+        click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit]."),
+        click.option(
+            "--work", type=_FOLDER, help=f"Folder for {contents} and verdicts [default: .armlab/{kind}/SEED]."
+        ),
+        click.option(
+            "--results", type=OutputPath(), help=f"Folder for {kind}.md and {kind}.json [default: WORK/score]."
+        ),
+        click.option("--jobs", type=int, default=-1, show_default=True, help="Processes."),
+    )
+
+    def decorate(command: _Command) -> _Command:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
 @click.command("prove-changes")
 @click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Pairs, nothing changed.")
 @click.option("--changed", type=click.IntRange(min=0), default=120, show_default=True, help="Pairs, one thing changed.")
-@click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
-@click.option("--work", type=_FOLDER, help="Folder for pairs and verdicts [default: .armlab/changes/SEED].")
-@click.option("--results", type=OutputPath(), help="Folder for changes.md and changes.json [default: WORK/score].")
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@_sealed_set_options("changes", "pairs")
 @prints_lines
 def prove_changes(
     nulls: int, changed: int, seed: int | None, work: Path | None, results: Path | None, jobs: int
@@ -182,10 +209,8 @@ def prove_changes(
     an interruption the same command continues (extra `engines`).
     """
     from armlab.concealed.pairs.prove import PairSet, prove_pairs
-    from armlab.concealed.prove import head_commit, judged_seed
 
-    chosen = judged_seed(head_commit()) if seed is None else seed
-    folder = work or Path(f".armlab/changes/{chosen}")
+    chosen, folder = _seed_and_folder(seed, work, "changes")
     return prove_pairs(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs)
 
 
@@ -193,10 +218,7 @@ def prove_changes(
 @click.option("--simulated", type=click.IntRange(min=0), default=300, show_default=True, help="Simulated recordings.")
 @click.option("--real", type=click.IntRange(min=0), default=200, show_default=True, help="Public recordings.")
 @click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Nothing is wrong.")
-@click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
-@click.option("--work", type=_FOLDER, help="Folder for cases and verdicts [default: .armlab/setup/SEED].")
-@click.option("--results", type=_FOLDER, help="Folder for setup.md and setup.json [default: WORK/score].")
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@_sealed_set_options("setup", "cases")
 @prints_lines
 def prove_setup(
     simulated: int,
@@ -212,12 +234,10 @@ def prove_setup(
     Puts mistakes into simulated and public recordings, diagnoses them blindly, and scores: physics, too, where some is
     hidden. After an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.prove import head_commit, judged_seed
     from armlab.concealed.setup.prove import SetupSet
     from armlab.concealed.setup.prove import prove_setup as run_proof
 
-    chosen = judged_seed(head_commit()) if seed is None else seed
-    folder = work or Path(f".armlab/setup/{chosen}")
+    chosen, folder = _seed_and_folder(seed, work, "setup")
     cases = SetupSet(simulated, real, nulls, chosen)
     return run_proof(cases, folder, results or folder / "score", jobs)
 
@@ -225,10 +245,7 @@ def prove_setup(
 @click.command("prove-motion")
 @click.option("--cases", type=click.IntRange(min=0), default=300, show_default=True, help="Something is hidden.")
 @click.option("--nulls", type=click.IntRange(min=0), default=300, show_default=True, help="Nothing is hidden.")
-@click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit].")
-@click.option("--work", type=_FOLDER, help="Folder for cases and verdicts [default: .armlab/motion/SEED].")
-@click.option("--results", type=OutputPath(), help="Folder for motion.md and motion.json [default: WORK/score].")
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@_sealed_set_options("motion", "cases")
 @prints_lines
 def prove_motion(
     cases: int, nulls: int, seed: int | None, work: Path | None, results: Path | None, jobs: int
@@ -238,10 +255,8 @@ def prove_motion(
     Simulates arms with position servos whose joints stick, on an engine of its own, diagnoses commands and positions
     blindly, and scores. After an interruption the same command continues.
     """
-    from armlab.concealed.prove import head_commit, judged_seed
     from armlab.concealed.servo.prove import MotionSet
     from armlab.concealed.servo.prove import prove_motion as run_proof
 
-    chosen = judged_seed(head_commit()) if seed is None else seed
-    folder = work or Path(f".armlab/motion/{chosen}")
+    chosen, folder = _seed_and_folder(seed, work, "motion")
     return run_proof(MotionSet(cases, nulls, chosen), folder, results or folder / "score", jobs)

@@ -4,19 +4,17 @@ An interrupted set continues in its folder.
 """
 
 import hashlib
-import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from joblib import Parallel, delayed
 
-from armlab.common.errors import InputError
+from armlab.concealed.folders import claim_folder
 from armlab.concealed.prove import answer, is_answered, report_progress
 
-SETTINGS_FILE = "settings.json"
 OBSERVATION = "observation"  # in a draft, what the program sees
 TRUTH_FILE = "truth.json"  # in a draft, the answer
 
@@ -49,7 +47,7 @@ class SetMaker(Generic[Plan]):
 
         settings: a dataclass that tells sets apart. InputError for a folder of another set.
         """
-        _claim_folder(settings, work)
+        claim_folder(settings, work)
         missing = [plan for plan in plans if not (work / "observations" / plan.name).is_dir()]
         made = Parallel(n_jobs=jobs, return_as="generator_unordered")(
             delayed(_make)(self.make, plan, work) for plan in missing
@@ -64,15 +62,6 @@ class SetMaker(Generic[Plan]):
     def _ask(self, plan: Plan, work: Path) -> str:
         answer(self.question(plan, (work / "observations" / plan.name).resolve()), work / "verdicts" / plan.name)
         return plan.name
-
-
-def _claim_folder(settings: Any, work: Path) -> None:
-    content = json.dumps(asdict(settings), indent=1) + "\n"
-    note = work / SETTINGS_FILE
-    if note.is_file() and note.read_text(encoding="utf-8") != content:
-        raise InputError(f"{work} holds another set (see {note}): choose another folder")
-    work.mkdir(parents=True, exist_ok=True)
-    note.write_text(content, encoding="utf-8")
 
 
 def _make(make: Callable[[Plan, Path], None], plan: Plan, work: Path) -> str:

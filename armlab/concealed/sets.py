@@ -4,10 +4,9 @@ The manifest holds the SHA-256 of every file. Its own SHA-256 is printed before 
 """
 
 import hashlib
-import json
 import shutil
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,6 +14,7 @@ from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
 from armlab.concealed.case_files import write_case
+from armlab.concealed.folders import claim_folder
 from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, SetTier, Tier, read_model, write_model
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan
 from armlab.concealed.sizing import simulate_case
@@ -58,7 +58,6 @@ def file_digest(path: Path) -> str:
 
 
 TIERS: tuple[Tier, ...] = ("clean", "realistic")
-SETTINGS_FILE = "settings.json"
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def conceal_cases(settings: SetSettings, out: Path, jobs: int) -> Iterator[str]:
 
     Raises InputError for a folder that holds another set.
     """
-    _claim_folder(settings, out)
+    claim_folder(settings, out, ("observations", "truth"))
     missing = [number for number in range(settings.cases) if not _is_done(out, settings.plan(number).name)]
     if missing:
         (out / MANIFEST_FILE).unlink(missing_ok=True)
@@ -111,19 +110,6 @@ def seal_set(settings: SetSettings, out: Path) -> tuple[list[str], str]:
         )
         write_model(manifest, out / MANIFEST_FILE)
     return names, file_digest(out / MANIFEST_FILE)
-
-
-def _claim_folder(settings: SetSettings, out: Path) -> None:
-    """Writes the settings into the folder before the cases are made, so that another set is refused there."""
-    content = json.dumps(asdict(settings), indent=1) + "\n"
-    note = out / SETTINGS_FILE
-    if note.is_file() and note.read_text(encoding="utf-8") != content:
-        raise InputError(f"{out} holds another concealed set (see {note}): choose another folder")
-    if out.exists() and not note.is_file() and any(out.iterdir()):
-        raise InputError(f"{out} exists and holds no concealed set: choose another folder")
-    for part in ("observations", "truth"):
-        (out / part).mkdir(parents=True, exist_ok=True)
-    note.write_text(content, encoding="utf-8")
 
 
 def _is_done(out: Path, name: str) -> bool:

@@ -136,7 +136,7 @@ def test_a_folder_of_another_seed_is_refused(tmp_path: Path) -> None:
     out = tmp_path / "loop"
     (out / "cases").mkdir(parents=True)
     (out / "settings.json").write_text('{"cases": 1, "seed": 1}\n')
-    assert "other settings" in refusal(seal_loop, LoopSettings(1, 2), out)
+    assert "another set" in refusal(seal_loop, LoopSettings(1, 2), out)
 
 
 def test_answers_that_were_changed_after_the_seal_are_refused(tmp_path: Path) -> None:

@@ -78,7 +78,7 @@ def test_an_incomplete_set_has_no_seal(copy: Path) -> None:
 
 
 def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
-    with pytest.raises(InputError, match="holds another concealed set"):
+    with pytest.raises(InputError, match="holds another set"):
         make_set(SetSettings(3, 1006), copy, 1)
 
 

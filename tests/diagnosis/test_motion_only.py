@@ -28,6 +28,7 @@ from armlab.diagnosis.motion.windows import make_windows
 from armlab.diagnosis.motion.words import motion_lines
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
+from armlab.recordings.recording import MotionRun
 
 SECONDS = 20.0
 TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1}
@@ -159,10 +160,9 @@ def test_the_exported_mjcf_replays_as_the_found_servos(diagnosis: MotionDiagnosi
     np.testing.assert_allclose(delayed.actuator_delay, diagnosis.servos.get("delay"), rtol=1e-5)
 
 
-def rest(run: object, count: int) -> dict[str, np.ndarray]:
+def rest(run: MotionRun, count: int) -> dict[str, np.ndarray]:
     """The other signals of a run, cut to a length."""
-    signals = getattr(run, "signals")  # noqa: B009
-    return {name: each[:count] for name, each in signals.items() if name not in ("position", "reference_position")}
+    return {name: each[:count] for name, each in run.signals.items() if name not in ("position", "reference_position")}
 
 
 def test_verdict_model_simulation_and_page_are_written(diagnosis: MotionDiagnosis, tmp_path: Path) -> None:

@@ -169,8 +169,8 @@ def test_click_completes_commands_and_options_in_a_shell():
     words = {"_ARMLAB_COMPLETE": "bash_complete", "COMP_WORDS": "armlab diagnose --js", "COMP_CWORD": "2"}
     script = "from armlab.cli.main import main; main(prog_name='armlab')"
     command = [sys.executable, "-c", script]
-    done = subprocess.run(command, env={"PYTHONPATH": str(Path(armlab.__file__).parents[1]), **words},
-                          capture_output=True, text=True, check=False)  # fmt: skip
+    place = {"PYTHONPATH": str(Path(armlab.__file__).parents[1])}
+    done = subprocess.run(command, env=place | words, capture_output=True, text=True, check=False)
     assert done.stdout.strip() == "plain,--json"
 
 

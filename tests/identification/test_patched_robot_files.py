@@ -92,7 +92,7 @@ def mujoco_torque(path: Path, motion: Motion) -> Array:
 
 
 def predicted(path: Path, motion: Motion) -> Array:
-    return read_model(path).torque(motion)  # type: ignore[attr-defined, no-any-return]
+    return read_model(path).torque(motion)
 
 
 @pytest.fixture
@@ -131,8 +131,8 @@ def test_names_frames_meshes_limits_and_remarks_of_a_urdf_stay(urdf: Path, tmp_p
     assert "measured in March" in text
     root = ElementTree.fromstring(text)
     assert [each.get("name") for each in root.findall("link")] == ["base_link", "upper", "lower", "gripper", "tool0"]
-    assert root.find("link/visual/geometry/mesh").get("filename") == "../own/meshes/upper.stl"  # type: ignore[union-attr]
-    assert root.find("joint/limit").attrib == {"lower": "-2", "upper": "2", "effort": "50", "velocity": "3"}  # type: ignore[union-attr]
+    assert root.find("link/visual/geometry/mesh").get("filename") == "../own/meshes/upper.stl"
+    assert root.find("joint/limit").attrib == {"lower": "-2", "upper": "2", "effort": "50", "velocity": "3"}
     gripper = root.find("link[@name='gripper']/inertial/mass")
     assert gripper is not None
     assert gripper.get("value") == "0.5"

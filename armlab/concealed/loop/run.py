@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
+from armlab.concealed.folders import claim_folder
 from armlab.concealed.formats import LoopManifest, write_model
 from armlab.concealed.loop.case import MAX_ATTEMPTS, Tools, play_case
 from armlab.concealed.loop.recordings import draw_case
@@ -55,9 +56,6 @@ def _draw_answer(seed: int, case: int, attempt: int) -> dict[str, Any]:
     }
 
 
-SETTINGS_FILE = "settings.json"
-
-
 @dataclass(frozen=True)
 class LoopSettings:
     """Number of cases and seed of a closed loop."""
@@ -68,7 +66,7 @@ class LoopSettings:
 
 def seal_loop(settings: LoopSettings, out: Path) -> str:
     """Seals the answers before anything is diagnosed, and returns their SHA-256; InputError for a folder of others."""
-    _claim_folder(settings, out)
+    claim_folder(settings, out, ("cases", "observations", "truth", "verdicts"))
     return seal_answers(out / "truth", settings.seed, settings.cases, MAX_ATTEMPTS)
 
 
@@ -105,15 +103,3 @@ def _play_and_write(seed: int, number: int, out: Path, tools: Tools) -> dict[str
 
 def _result_path(out: Path, number: int) -> Path:
     return out / "cases" / f"{number:04d}.json"
-
-
-def _claim_folder(settings: LoopSettings, out: Path) -> None:
-    note = out / SETTINGS_FILE
-    content = json.dumps(asdict(settings)) + "\n"
-    if note.is_file() and note.read_text(encoding="utf-8") != content:
-        raise InputError(f"{out} holds a closed loop of other settings (see {note}): choose another folder")
-    if not note.is_file() and out.exists() and any(out.iterdir()):
-        raise InputError(f"{out} exists and holds no closed loop: choose another folder")
-    for part in ("cases", "observations", "truth", "verdicts"):
-        (out / part).mkdir(parents=True, exist_ok=True)
-    note.write_text(content, encoding="utf-8")
