@@ -146,9 +146,9 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     named = name_effects(prefer_one_body(find_friction_curves(prune(searched))))
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
-    model, effects = unclaim_implausible(*claim_expected_parts(named.model, named.effects, prediction))
-    tuning = model.design.settings.tuning
+    tuning = named.model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
+    model, effects = unclaim_implausible(*claim_expected_parts(named.model, named.effects, prediction), remains)
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
     model, claims = links_that_data_tell(model, make_claims(model, effects, named.links, prediction), remains)

@@ -48,9 +48,15 @@ def _doubtful_friction(model: FittedModel, effects: dict[int, Evidence]) -> dict
     return {group: why for group, why in doubts.items() if facts[group].contains or facts[group].usual}
 
 
-def unclaim_implausible(model: FittedModel, effects: dict[int, Evidence]) -> tuple[FittedModel, dict[int, Evidence]]:
-    """The effects whose numbers can be believed; the log says why not. The others stay as present, not claimed."""
-    doubts = doubtful_names(model, effects)
+def unclaim_implausible(
+    model: FittedModel, effects: dict[int, Evidence], left: Sequence[Structure]
+) -> tuple[FittedModel, dict[int, Evidence]]:
+    """The effects whose numbers can be believed; the log says why not. The others stay as present, not claimed.
+
+    left: what is structured beyond chance. A shift in time below one sampling interval is told by a model alone that
+    leaves none: beside what is unknown it is how the log was made.
+    """
+    doubts = doubtful_names(model, effects, exact=not left)
     steps = list(model.steps)
     for group, why in doubts.items():
         candidate = model.solver.groups[group].candidate
@@ -58,8 +64,8 @@ def unclaim_implausible(model: FittedModel, effects: dict[int, Evidence]) -> tup
     return replace(model, steps=tuple(steps)), {group: each for group, each in effects.items() if group not in doubts}
 
 
-def doubtful_names(model: FittedModel, effects: dict[int, Evidence]) -> dict[int, str]:
-    """Why the numbers of a name cannot be believed, for each group of which that is so."""
+def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: bool = False) -> dict[int, str]:
+    """Why the numbers of a name cannot be believed, for each group of which that is so; exact: of a model that is."""
     if not effects or not model.design.settings.guards.physics_signs:
         return {}
     wide, observed = extend_with_shapes(model), model.design.observed
@@ -71,7 +77,7 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence]) -> dict[int
         covariance = wide.covariance(group)
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
         known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
-        reason = reason_implausible(candidate, values, observed, known=known, tuning=tuning)
+        reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
         if reason is not None:
@@ -139,11 +145,13 @@ def reason_implausible(
     observed: Observed,
     *,
     known: bool,
+    exact: bool,
     tuning: PlausibilityTuning,
 ) -> str | None:
     """Why these parameters are not believed, in a few words; None where they are.
 
-    known: whether the evidence is overwhelming, so that a parameter may be outside its plausible range.
+    known: whether the evidence is overwhelming, so that a parameter may be outside its plausible range. exact: whether
+    the model leaves nothing structured, so that a shift may be shorter than a sampling interval.
     """
     facts = {each.name: each for each in candidate.facts.parameters}
     kind: Kind = getattr(candidate, "kind", "revolute")
@@ -151,7 +159,7 @@ def reason_implausible(
         parameter = facts.get(each.name)
         if parameter is None or isinstance(each.value, tuple):
             continue
-        reason = _reason_below_sampling(parameter, each.value, observed)
+        reason = None if exact else _reason_below_sampling(parameter, each.value, observed)
         reason = reason or _reason_unknown(parameter, each, tuning)
         reason = reason or (None if known else _reason_out_of_range(parameter, each, kind))
         if candidate.facts.axis == "cycle" and each.name == "order":

@@ -8,7 +8,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.fitted_model import FittedModel, initial_link_widths
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.solver import State
@@ -20,9 +20,16 @@ HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identifi
 
 
 def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Structure, ...]:
-    """What surrogates predict of each joint's residual, friction and offsets fitted that may not be claimed."""
+    """What surrogates predict of each joint's residual.
+
+    Friction and offsets are fitted that may not be claimed, and links as far off as those of a simulation are: what
+    they explain is not unknown.
+    """
     usual = {number for number, unusual in enumerate(model.solver.unusual) if not unusual}
-    state = State(tuple(sorted({*model.state.groups, *usual})), model.state.widths)
+    widths = model.state.widths
+    if widths is not None:
+        widths = tuple(max(pair) for pair in zip(widths, initial_link_widths(model.design) or widths, strict=True))
+    state = State(tuple(sorted({*model.state.groups, *usual})), widths)
     residual = model.residual(model.solver.fit(state))
     return tuple(_surest_structure(model, residual[:, joint], joint, noise) for joint in range(residual.shape[1]))
 

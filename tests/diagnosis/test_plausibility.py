@@ -1,6 +1,7 @@
 """Numbers that no engineer believes, and intervals that say nothing, are no findings."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,9 +41,12 @@ class ObservedStandIn:
         return self.positions
 
 
-def reason(candidate: Candidate, *values: tuple[str, float, Interval], known: bool = False) -> str | None:
+def reason(
+    candidate: Candidate, *values: tuple[str, float, Interval], known: bool = False, exact: bool = False
+) -> str | None:
     named = tuple(ParameterValue(name, value, interval, "") for name, value, interval in values)
-    return reason_implausible(candidate, named, ObservedStandIn(), known=known, tuning=PlausibilityTuning())  # type: ignore[arg-type]
+    observed: Any = ObservedStandIn()
+    return reason_implausible(candidate, named, observed, known=known, exact=exact, tuning=PlausibilityTuning())
 
 
 def test_a_coefficient_that_may_be_zero_is_no_finding() -> None:
@@ -61,8 +65,12 @@ def test_friction_does_not_warm_within_seconds_unless_the_evidence_is_overwhelmi
 
 
 @pytest.mark.parametrize("shift", [TimeDelay.at(ARM, 1), TorqueSkew.at(ARM, 2)])
-def test_a_shift_below_one_sampling_interval_is_never_a_finding(shift: Candidate) -> None:
-    assert "sampling interval" in str(reason(shift, ("seconds", 0.0006, (0.0005, 0.0007)), known=True))
+def test_a_shift_below_one_sampling_interval_is_a_finding_of_a_model_alone_that_leaves_nothing(
+    shift: Candidate,
+) -> None:
+    short = ("seconds", 0.0006, (0.0005, 0.0007))
+    assert "sampling interval" in str(reason(shift, short, known=True))
+    assert reason(shift, short, exact=True) is None
     assert reason(shift, ("seconds", 0.004, (0.003, 0.005))) is None
 
 
