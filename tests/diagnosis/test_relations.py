@@ -8,7 +8,7 @@ from told_recordings import frame, recording_in
 
 from armlab.diagnosis.relations.bench import bench_relations, relations_page
 from armlab.diagnosis.relations.relations import QUICK, RELATIONS, Desk, Outcome, check_relation
-from armlab.diagnosis.relations.variants import every_other_second, resampled, rewritten, thinned
+from armlab.diagnosis.relations.variants import every_other_second, half, one_run, resampled, rewritten, thinned
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 
@@ -23,7 +23,7 @@ def desk() -> Desk:
     return Desk()
 
 
-@pytest.mark.parametrize("name", [*QUICK, "X against X, rows thinned", "units, order, names, clock"])
+@pytest.mark.parametrize("name", [*QUICK, "X against X, rows thinned", "run against run", "units, order, names, clock"])
 def test_relation_holds_on_a_small_recording(name: str, recording: Recording, desk: Desk) -> None:
     outcome = check_relation(name, recording, desk)
     assert outcome.holds, outcome.detail
@@ -44,6 +44,15 @@ def test_odd_and_even_seconds_share_no_row(recording: Recording) -> None:
     stamps = [{(run.file, float(time)) for run in each.runs for time in run.time} for each in (even, odd)]
     assert not stamps[0] & stamps[1]
     assert len(even.runs) == len(odd.runs) == 8
+
+
+def test_halves_and_single_runs_share_no_row(recording: Recording) -> None:
+    first, second = half(recording, 0).runs[0], half(recording, 1).runs[0]
+    assert first.time[-1] < second.time[0]
+    assert first.samples == second.samples == recording.runs[0].samples // 2
+    alone = [one_run(recording, run) for run in recording.runs]
+    assert [[run.name for run in each.runs] for each in alone] == [[run.name] for run in recording.runs]
+    assert all(run.role == "identify" for each in alone for run in each.runs)
 
 
 def test_a_broken_relation_stands_in_the_table() -> None:

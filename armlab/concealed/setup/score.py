@@ -11,12 +11,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from scipy.stats import fisher_exact
+
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.statistics import wilson_interval
 from armlab.concealed.score.cases import FAILURE_FILE
 
 MAX_CLASS = 3  # names
+CHANCE = "hidden physics: probability of such a difference by chance"
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ def score_setup(work: Path, names: Sequence[str], results: Path) -> tuple[list[S
     """Judges all cases and writes setup.md and setup.json."""
     outcomes = [_judge(work, name) for name in names]
     shares = _measure(outcomes)
-    rows = [(each.name, each.text) for each in shares]
+    rows = [*((each.name, each.text) for each in shares), (CHANCE, f"{physics_chance(outcomes):.2g}")]
     missed = [
         (each.source, each.kind, "; ".join(each.mistakes), str(each.seen), "; ".join(each.named) or each.status)
         for each in outcomes
@@ -79,7 +82,9 @@ def score_setup(work: Path, names: Sequence[str], results: Path) -> tuple[list[S
 
 def score_lines(scored: tuple[list[Share], list[SetupOutcome]]) -> Iterator[str]:
     """The measures as lines."""
-    yield from (f"{each.name}: {each.text}" for each in scored[0])
+    shares, outcomes = scored
+    yield from (f"{each.name}: {each.text}" for each in shares)
+    yield f"{CHANCE}: {physics_chance(outcomes):.2g}"
 
 
 def _measure(outcomes: Sequence[SetupOutcome]) -> list[Share]:
@@ -93,10 +98,27 @@ def _measure(outcomes: Sequence[SetupOutcome]) -> list[Share]:
         out.append(Share(f"{source}: cases with a false setup finding", sum(each.false > 0 for each in own), len(own)))
     nulls = [each for each in outcomes if each.source == "null"]
     out.append(Share("nothing wrong: cases with a setup finding", sum(each.false > 0 for each in nulls), len(nulls)))
-    for name, own in (("beside a mistake", [each for each in outcomes if each.mistakes]), ("alone", nulls)):
-        total = sum(each.physics for each in own)
-        out.append(Share(f"hidden physics named, {name}", sum(each.physics_right for each in own), total))
+    for name, (hits, total) in _physics(outcomes).items():
+        out.append(Share(f"hidden physics named, {name}", hits, total))
     return out
+
+
+def _physics(outcomes: Sequence[SetupOutcome]) -> dict[str, tuple[int, int]]:
+    """How many hidden effects are named, and how many there are, beside a mistake and alone."""
+    groups = {
+        "beside a mistake": [each for each in outcomes if each.mistakes],
+        "alone": [each for each in outcomes if each.source == "null"],
+    }
+    return {
+        name: (sum(each.physics_right for each in own), sum(each.physics for each in own))
+        for name, own in groups.items()
+    }
+
+
+def physics_chance(outcomes: Sequence[SetupOutcome]) -> float:
+    """How probable it is that names beside a mistake differ by so much from those alone by chance (Fisher 1935)."""
+    table = [(hits, total - hits) for hits, total in _physics(outcomes).values()]
+    return float(fisher_exact(table).pvalue)
 
 
 def _judge(work: Path, name: str) -> SetupOutcome:

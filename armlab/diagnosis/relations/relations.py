@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,7 +17,9 @@ from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.relations.variants import (
     every_other_second,
     fewer_rows,
+    half,
     loaded_joint,
+    one_run,
     resampled,
     rewritten,
     thinned,
@@ -98,18 +101,39 @@ def odd_against_even(recording: Recording, desk: Desk) -> tuple[bool | None, str
     """The odd seconds of a recording compared with the even ones have no change."""
     reason = "too short to be cut into seconds"
     for seconds in STRETCH_S:
-        parts = [every_other_second(recording, first, seconds) for first in (0, 1)]
-        if min(len(each.runs) for each in parts) < 2:
+        even, odd = (every_other_second(recording, first, seconds) for first in (0, 1))
+        if min(len(even.runs), len(odd.runs)) < 2:
             continue
-        try:
-            holds, detail = _no_change(desk.compare(*parts))
-        except DataError as error:  # stretches in motion that are too short for a diagnosis
-            reason = str(error)
-            continue
+        holds, detail = _no_change_of_parts(even, odd, desk)
         if holds is not None:
             return holds, f"stretches of {seconds:g} s: {detail}"
         reason = detail
     return None, reason
+
+
+def first_against_second_half(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
+    """The first halves of all runs compared with the second ones have no change."""
+    return _no_change_of_parts(half(recording, 0), half(recording, 1), desk)
+
+
+def run_against_run(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
+    """Each run compared with each other one has no change: all are of one robot on one day."""
+    alone = [one_run(recording, run) for run in recording.runs]
+    pairs = list(combinations(alone, 2))
+    if not pairs:
+        return None, "one run"
+    answers = [_no_change_of_parts(old, new, desk) for old, new in pairs]
+    holds = [answer for answer, _ in answers if answer is not None]
+    names = [f"{old.runs[0].name} to {new.runs[0].name}" for old, new in pairs]
+    detail = "; ".join(f"{name}: {detail}" for name, (_, detail) in zip(names, answers, strict=True))
+    return all(holds) if holds else None, detail
+
+
+def _no_change_of_parts(old: Recording, new: Recording, desk: Desk) -> tuple[bool | None, str]:
+    try:
+        return _no_change(desk.compare(old, new))
+    except DataError as error:  # too short for a diagnosis
+        return None, str(error)
 
 
 def mirrored(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
@@ -223,6 +247,8 @@ RELATIONS: dict[str, Relation] = {
     "X against X, resampled": against_resampled,
     "X against X, noise of 1e-9": against_noise,
     "odd against even seconds": odd_against_even,
+    "first against second half": first_against_second_half,
+    "run against run": run_against_run,
     "A to B mirrors B to A": mirrored,
     "found model explains its recording": own_model_explains,
     "units, order, names, clock": same_however_written,

@@ -59,6 +59,18 @@ def every_other_second(recording: Recording, first: int, seconds: float) -> Reco
     return with_runs(recording, out)
 
 
+def half(recording: Recording, part: int) -> Recording:
+    """The first (part 0) or the second (1) half of each run."""
+    halves = [(run, part * (run.samples // 2)) for run in recording.runs]
+    kept = [run.rows(slice(start, start + run.samples // 2)) for run, start in halves]
+    return with_runs(recording, [replace(run, part=part + 1) for run in kept])
+
+
+def one_run(recording: Recording, run: Run) -> Recording:
+    """One run alone: blocks of it validate."""
+    return with_runs(recording, [replace(run, role="identify")])
+
+
 def fewer_rows(recording: Recording) -> Recording:
     """The first part of each run."""
     return with_runs(recording, [run.rows(slice(0, int(FEWER_SHARE * run.samples))) for run in recording.runs])

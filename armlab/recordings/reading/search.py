@@ -5,7 +5,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from armlab.common.arrays import Array
 from armlab.recordings.reading import mistakes as table
 from armlab.recordings.reading.judge import Gain, Judge, Trial, is_accepted
 from armlab.recordings.reading.reading import Mistake, Reading
@@ -44,6 +46,8 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
         for first in _distinct(singles, tuning.beam):
             if first.loss > limit or first.reading.mistakes == best.reading.mistakes[:1]:
                 continue
+            if _gain_at_bad(start, first, tuning) < tuning.min_refined_gain:
+                continue
             other, more = _extend(judge, start, first, search_singles(judge, first))
             if other is not first and other.loss < best.loss - tuning.min_gain and is_accepted(judge, start, other):
                 best, beside = other, more
@@ -67,7 +71,20 @@ def reading_floor(trial: Trial, tuning: ReadingTuning) -> float:
 
 
 def _is_bad(trial: Trial, tuning: ReadingTuning) -> bool:
-    return float(np.max(np.mean(trial.free, axis=0))) > math.log(tuning.good_error)
+    return bool(_bad_joints(trial.free, tuning).any())
+
+
+def _bad_joints(losses: Array, tuning: ReadingTuning) -> NDArray[np.bool_]:
+    """Which joints may hide a further mistake, of losses (blocks, joints)."""
+    return np.asarray(np.mean(losses, axis=0) > math.log(tuning.good_error))
+
+
+def _gain_at_bad(before: Trial, after: Trial, tuning: ReadingTuning) -> float:
+    """How far the losses of bad joints fall, nats, in the view where they fall further: a pair has to begin there."""
+    views = [(before.free, after.free)]
+    if before.near is not None and after.near is not None:
+        views.append((before.near, after.near))
+    return max(float(np.sum(np.mean(old - new, axis=0)[_bad_joints(old, tuning)])) for old, new in views)
 
 
 def _extend(judge: Judge, start: Trial, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
