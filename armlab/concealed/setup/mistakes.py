@@ -8,7 +8,9 @@ import numpy as np
 import pandas as pd
 import yaml
 
+from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, to_plain_data
+from armlab.recordings.units import SIGNAL_QUANTITIES
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
@@ -95,6 +97,15 @@ class _Files:
     def arm(self) -> Arm:
         return RobotFile.model_validate(_tuples(self.robot)).build()
 
+    def si_factors(self, signal: str) -> Array:
+        """From the numbers of a signal to SI units, (channels,) or one for all."""
+        given = (self.settings.get("units") or {}).get(signal)
+        return (
+            np.ones(1)
+            if given is None
+            else np.array([SIGNAL_QUANTITIES[signal].units[each].factor for each in np.ravel(given)])
+        )
+
     def scale(self, signal: str, joint: int | None, factor: float) -> None:
         """Numbers of one joint, or of all, times a factor: rows of the transmission where there is one."""
         matrix = (self.settings.get("transmission") or {}).get(signal)
@@ -112,9 +123,12 @@ class _Files:
 
 
 def inject(folder: Path, mistakes: tuple[Injected, ...], true_arm: Arm | None = None) -> None:
-    """Puts mistakes into the files of a folder. true_arm: whose gravity a compensated torque leaves out."""
+    """Puts mistakes into the files of a folder. true_arm: whose gravity a compensated torque leaves out.
+
+    Gravity comes off first, while the files still say how they are to be read.
+    """
     files = _read(folder)
-    for mistake in mistakes:
+    for mistake in sorted(mistakes, key=lambda each: each.effect != "gravity_compensated_torque"):
         _put(files, mistake, true_arm)
     _write(files)
 
@@ -177,13 +191,25 @@ def _change_torque_or_time(files: _Files, mistake: Injected, true_arm: Arm | Non
             table[time] *= mistake.size
             files.settings.pop("sample_rate_hz", None)
         elif mistake.effect == "gravity_compensated_torque":
-            position = table[list(columns["position"])].to_numpy()
-            still = np.zeros_like(position)
-            table[list(torques)] -= rigid_body_torque(true_arm or files.arm, Motion(position, still, still))
+            table[list(torques)] -= _gravity_of_channels(files, table, true_arm or files.arm)
         else:
             late = torques if mistake.joint is None else [torques[mistake.joint - 1]]
             for name in late:
                 table[name] = np.interp(table[time] - mistake.size, table[time], table[name])
+
+
+def _gravity_of_channels(files: _Files, table: pd.DataFrame, arm: Arm) -> Array:
+    """The torque of gravity as the torque's channels hold it, (rows, channels)."""
+    settings = files.settings
+    given, columns, ones = settings.get("transmission") or {}, settings["columns"], np.ones(len(arm))
+    matrices = [np.array(given.get(name) or np.diag(ones)) for name in ("position", "torque")]
+    signal = "torque" if columns.get("torque") else "current"
+    to_joint, to_torque = (files.si_factors(name) for name in ("position", signal))
+    position = (table[list(columns["position"])].to_numpy() * to_joint) @ matrices[0].T
+    position += np.array(given.get("offset") or 0 * ones)
+    still = np.zeros_like(position)
+    loads = rigid_body_torque(arm, Motion(position, still, still))
+    return np.asarray(np.linalg.solve(matrices[1], loads.T).T / np.array(settings.get("gains") or ones) / to_torque)
 
 
 def _read(folder: Path) -> _Files:

@@ -220,10 +220,14 @@ class Fitter:
         return out
 
     def implausible(self, reading: Reading) -> frozenset[int]:
-        """Joints (from 0) that would be faster, or slower at their fastest, than joints of arms are."""
-        speed = np.abs(self.columns(reading).motion.velocity).max(axis=0)
-        low, high = self.tuning.slowest_speed, self.tuning.fastest_speed
-        return frozenset(np.flatnonzero((speed < low) | (speed > high)).tolist())
+        """Joints (from 0) that would be faster, or slower at their fastest, than joints of arms are, or hardly turn."""
+        motion, tuning = self.columns(reading).motion, self.tuning
+        speed = np.abs(motion.velocity).max(axis=0)
+        turning = np.array([joint.kind == "revolute" for joint in reading.arm.joints])
+        hardly = turning & (np.ptp(motion.position, axis=0) < tuning.little_travel)
+        return frozenset(
+            np.flatnonzero((speed < tuning.slowest_speed) | (speed > tuning.fastest_speed) | hardly).tolist()
+        )
 
     def torque_gains(self, reading: Reading) -> list[tuple[float, float]]:
         """Factor between the torque of each joint and that of the links as given, and the share that it explains."""

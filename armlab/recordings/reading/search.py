@@ -46,7 +46,7 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
         for first in _distinct(singles, tuning.beam):
             if first.loss > limit or first.reading.mistakes == best.reading.mistakes[:1]:
                 continue
-            if _gain_at_bad(start, first, tuning) < tuning.min_refined_gain:
+            if not _may_begin_pair(start, first, tuning):
                 continue
             other, more = _extend(judge, start, first, search_singles(judge, first))
             if other is not first and other.loss < best.loss - tuning.min_gain and is_accepted(judge, start, other):
@@ -79,8 +79,18 @@ def _bad_joints(losses: Array, tuning: ReadingTuning) -> NDArray[np.bool_]:
     return np.asarray(np.mean(losses, axis=0) > math.log(tuning.good_error))
 
 
+def _may_begin_pair(start: Trial, first: Trial, tuning: ReadingTuning) -> bool:
+    """Whether a second mistake is looked for beside one that may not be named alone.
+
+    It lowers the error of a bad joint, or it is sure in both views; else the reading explains the arm as it is.
+    """
+    gain = Gain.between(start, first)
+    sure = min(gain.near_sigmas, gain.free_sigmas) >= tuning.min_sigmas
+    return sure or _gain_at_bad(start, first, tuning) >= tuning.min_refined_gain
+
+
 def _gain_at_bad(before: Trial, after: Trial, tuning: ReadingTuning) -> float:
-    """How far the losses of bad joints fall, nats, in the view where they fall further: a pair has to begin there."""
+    """How far the losses of bad joints fall, nats, in the view where they fall further."""
     views = [(before.free, after.free)]
     if before.near is not None and after.near is not None:
         views.append((before.near, after.near))

@@ -1,0 +1,34 @@
+"""Mistakes are put into the files as people make them, whatever the channels of a recording are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from told_recordings import ARM, POSITION, frame, recording_in
+
+from armlab.concealed.setup.mistakes import Injected, inject
+from armlab.recordings.load import load_recording
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
+
+GRAVITY_OFF = Injected("gravity_compensated_torque")
+
+
+@pytest.mark.parametrize("others", [(), (Injected("encoder_offset", 2, size=0.5),)])
+def test_gravity_comes_off_at_the_joints_of_motor_channels(tmp_path: Path, others: tuple[Injected, ...]) -> None:
+    run = frame(0, 4)
+    run[POSITION] = np.rad2deg(run[POSITION])
+    geared = {
+        "units": {"time": "s", "position": "deg", "torque": "mN.m"},
+        "transmission": {
+            "position": [[0.1, 0, 0], [0, -0.1, 0], [0, 0.1, 0.1]],
+            "offset": [0.0, 0.3, 0.0],
+            "torque": [[100, 0, 0], [0, -80, 60], [0, 0, 50]],
+        },
+    }
+    right = load_recording(recording_in(tmp_path / "right", run, **geared)).runs[0]
+    folder = recording_in(tmp_path / "wrong", run, **geared)
+    inject(folder, (*others, GRAVITY_OFF), ARM)
+    still = np.zeros_like(right.position)
+    expected = right.torque - rigid_body_torque(ARM, Motion(right.position, still, still))
+    np.testing.assert_allclose(load_recording(folder).runs[0].torque, expected, rtol=0, atol=1e-9)
