@@ -54,7 +54,7 @@ class Tested:
     """A group fitted beside others. values: (columns,); covariance: by the scatter of stretches of time.
 
     p_value: of no change, for this group alone. evidence: log of the Bayes factor. inflation: of the covariance under
-    independent errors.
+    independent errors. degrees: of freedom of the covariance.
     """
 
     group: int
@@ -63,6 +63,7 @@ class Tested:
     p_value: float
     evidence: float
     inflation: float
+    degrees: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +90,11 @@ class ChangeTable:
         pairs = [np.column_stack([each.rows.members, each.rows.stretches]) for each in self.mixed.joints]
         owners = np.unique(np.concatenate(pairs), axis=0)[:, 0]
         return max(int(np.bincount(owners, minlength=len(self.contrast)).min()) - 1, 1)
+
+    def degrees_with(self, share: float) -> float:
+        """The same where a share of a variance is that between runs, of which there are few (Satterthwaite 1946)."""
+        spare = max(_runs_to_spare(each.rows.runs, each.rows.members) for each in self.mixed.joints)
+        return self.degrees if spare < 1 else 1 / (share**2 / spare + (1 - share) ** 2 / self.degrees)
 
     def evidence(self, chosen: Sequence[int]) -> Array:
         """Log evidence of each group beside chosen ones, errors taken as independent: (groups,)."""
@@ -129,25 +135,32 @@ class ChangeTable:
         """Tests of chosen groups, all fitted together."""
         inside = self.columns_with(chosen)
         values, inverse = self.mixed.fit(inside)
-        robust = inverse @ (self.mixed.scatter(inside, values) + np.diag(self.mixed.precision[inside])) @ inverse
+        scatter, between = self.mixed.scatter(inside, values)
+        robust = inverse @ (scatter + np.diag(self.mixed.precision[inside])) @ inverse
+        of_runs = inverse @ between @ inverse
         out, at = [], len(self.common)
         for number in chosen:
-            place = slice(at, at + len(self.groups[number].columns))
-            out.append(self._judge(number, values[place], inverse[place, place], robust[place, place]))
-            at = place.stop
+            own = slice(at, at + len(self.groups[number].columns))
+            out.append(self._judge(number, values[own], inverse[own, own], robust[own, own], of_runs[own, own]))
+            at = own.stop
         return tuple(out)
 
-    def _judge(self, number: int, values: Array, model: Array, robust: Array) -> Tested:
-        """One factor makes the covariance under independent errors as large as the stretches say."""
+    def _judge(self, number: int, values: Array, model: Array, robust: Array, of_runs: Array) -> Tested:
+        """One factor makes the covariance under independent errors as large as the stretches say.
+
+        of_runs: the part of the covariance robust that is known by the differences between runs alone.
+        """
         scales, count = self.groups[number].scales, len(values)
         precision: Array = np.asarray(np.linalg.inv(model), dtype=np.float64)
-        inflation = max(float(np.trace(precision @ robust)) / count, 1.0)
+        spread = float(np.trace(precision @ robust))
+        inflation = max(spread / count, 1.0)
+        degrees = self.degrees_with(min(float(np.trace(precision @ of_runs)) / spread, 1.0))
         data = (precision - np.diag(scales**-2.0)) / inflation
         evidence = _log_bayes_factor(data, precision @ values / inflation, scales)
         rank = max(int(np.sum(np.linalg.eigvalsh(scales[:, None] * data * scales) > 1)), 1)
         wald = float(values @ precision @ values) / inflation
-        p_value = float(fisher.sf(wald / rank, rank, self.degrees))
-        return Tested(number, values, model * inflation, p_value, evidence, inflation)
+        p_value = float(fisher.sf(wald / rank, rank, degrees))
+        return Tested(number, values, model * inflation, p_value, evidence, inflation, degrees)
 
     def is_sure(self, tested: Tested) -> bool:
         """Whether a change is no chance among all that is compared."""
@@ -252,24 +265,35 @@ def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array 
     slow = _slow_waves(pooled)
     level = np.sign(observed.kept("velocity")[:, joint]) if friction is None else friction
     level = level / max(float(np.sqrt(np.mean(level**2))), 1e-300)
+    runs = np.repeat(np.arange(len(pooled.owner)), [len(each.torque) for each in observed.signals])[rows]
+    members = pooled.members[rows]
+    wave = np.arange(slow.shape[1]) % (pooled.tuning.drift_waves + 1) > 0
+    drifts = [(slow[rows], wave)]
+    if _runs_to_spare(runs, members) > 0:
+        drifts.append((slow[rows][:, ~wave], wave[~wave]))
     return weigh_rows(
         JointRows(
             columns=np.column_stack(parts.values[joint])[rows],
             index=np.concatenate(parts.numbers[joint]),
             target=pooled.design.target[rows, joint],
-            random=(slow[rows], slow[rows] * level[rows, None]),
-            waves=np.tile(np.arange(slow.shape[1]) % (pooled.tuning.drift_waves + 1) > 0, 2),
+            random=tuple(part * factor for part, _ in drifts for factor in (1.0, level[rows, None])),
+            waves=np.concatenate([np.tile(kind, 2) for _, kind in drifts]),
             stretches=pooled.stretches[rows],
-            runs=np.repeat(np.arange(len(pooled.owner)), [len(each.torque) for each in observed.signals])[rows],
-            members=pooled.members[rows],
+            runs=runs,
+            members=members,
         )
     )
+
+
+def _runs_to_spare(runs: NDArray[np.intp], members: NDArray[np.intp]) -> int:
+    """Runs beyond the first one of each recording: they tell how far runs of one recording differ."""
+    return len(np.unique(runs)) - len(np.unique(members))
 
 
 def _slow_waves(pooled: Pooled) -> Array:
     """A constant and slow cosines of each run, falling as their frequency grows: (rows, runs * waves).
 
-    A run differs from the next one by about as much as its beginning from its end.
+    A run differs from the next one by at least as much as its beginning from its end.
     """
     waves, start, orders = [], 0, np.arange(1, pooled.tuning.drift_waves + 1)
     for signals in pooled.observed.signals:

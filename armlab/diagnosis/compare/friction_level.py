@@ -4,13 +4,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.compare.changes import ChangeTable, Tested
 from armlab.diagnosis.compare.mixed import JointRows
 from armlab.diagnosis.compare.numbers import (
-    CONFIDENCE,
     Change,
     common_values,
     half_width_factor,
@@ -47,11 +45,10 @@ def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]
     last = pooled.recordings - 1
     by_run, of_run = _levels(whole, mean, rows.runs, rows.members)
     by_stretch, of_stretch = _levels(whole, mean, rows.stretches * pooled.recordings + rows.members, rows.members)
-    errors = [half_width_factor(table) * _error_of_difference(by_stretch, of_stretch, last)]
+    errors = [half_width_factor(table.degrees) * _error_of_difference(by_stretch, of_stretch, last)]
     spare = sum(int(np.sum(of_run == each)) - 1 for each in (0, last))
     if min(np.sum(of_run == 0), np.sum(of_run == last)) > 1:
-        factor = float(student.ppf((1 + CONFIDENCE) / 2, spare))
-        errors.append(factor * _error_of_difference(by_run, of_run, last))
+        errors.append(half_width_factor(spare) * _error_of_difference(by_run, of_run, last))
     size, half = float(np.sqrt(np.mean(mean**2))), max(errors)
     levels = tuple(size * float(by_run[of_run == each].mean()) for each in range(pooled.recordings))
     change = levels[-1] - levels[0]

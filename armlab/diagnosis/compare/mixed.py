@@ -2,9 +2,9 @@
 
     torque = columns @ values + drift + noise
 
-at each joint. The drift is a slow change of offset and of friction within each run, its size found by restricted
-likelihood (Patterson and Thompson 1971). A level that wanders within a run wanders between runs, too, and is no
-evidence of a change.
+at each joint. The drift is a slow change of offset and of friction within each run and between runs, its size found by
+restricted likelihood (Patterson and Thompson 1971). A level that wanders within a run wanders between runs, too, and is
+no evidence of a change.
 """
 
 from collections.abc import Sequence
@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_array
 
 from armlab.common.arrays import Array
 
@@ -61,6 +62,16 @@ class WeightedRows:
     def weigh(self, values: Array) -> Array:
         """The inverse covariance times values (rows, ...)."""
         return _weigh(values, self.drift, self.factor, self.variance)
+
+    @cached_property
+    def along_drift(self) -> Array:
+        """Products of the random columns with the weighted ones, (count, own)."""
+        return np.asarray(self.drift.T @ self.weighted)
+
+    def stretch_sums(self, stretches: int) -> csr_array:
+        """The matrix (stretches, rows) that adds up the rows of each stretch."""
+        rows = np.arange(len(self.rows.stretches))
+        return csr_array((np.ones(len(rows)), (self.rows.stretches, rows)), shape=(stretches, len(rows)))
 
 
 def weigh_rows(rows: JointRows) -> WeightedRows:
@@ -158,29 +169,28 @@ class MixedModel:
         rows = self.joints[joint].rows
         return np.asarray(rows.target - rows.columns @ full[rows.index])
 
-    def scatter(self, chosen: NDArray[np.intp], values: Array) -> Array:
+    def scatter(self, chosen: NDArray[np.intp], values: Array) -> tuple[Array, Array]:
         """What the stretches of time say of the variance of the weighted errors' products with chosen columns.
 
         Sum over stretches of the squared products, whose errors may be of any kind within a stretch (Liang and Zeger
-        1986), and the share of the drift, which ties stretches: (chosen, chosen).
+        1986), and the share of the drift, which ties stretches: (chosen, chosen). The second is the part of it by which
+        runs differ as a whole.
         """
         where = np.full(self.size, -1)
         where[chosen] = np.arange(len(chosen))
         products = np.zeros((self.stretches, len(chosen)))
-        drift = np.zeros((len(chosen), len(chosen)))
+        drift, between = np.zeros((2, len(chosen), len(chosen)))
         for joint, each in enumerate(self.joints):
             used = np.flatnonzero(where[each.rows.index] >= 0)
             place = where[each.rows.index[used]]
             noise = each.variance * each.weigh(self.errors(joint, chosen, values))
-            weighted = each.weighted[:, used]
-            own = np.zeros((self.stretches, len(used)))
-            np.add.at(own, each.rows.stretches, weighted * noise[:, None])
-            products[:, place] += own
-            drift[np.ix_(place, place)] += (
-                each.rows.columns[:, used].T @ weighted - each.variance * weighted.T @ weighted
-            )
+            products[:, place] += each.stretch_sums(self.stretches) @ (each.weighted[:, used] * noise[:, None])
+            along = each.along_drift[:, used]
+            constant = along[~each.rows.waves]
+            drift[np.ix_(place, place)] += each.variance * along.T @ along
+            between[np.ix_(place, place)] += each.variance * constant.T @ constant
         count = int(np.sum(np.any(products != 0, axis=1)))
-        return np.asarray(products.T @ products * count / max(count - 1, 1) + drift)
+        return np.asarray(products.T @ products * count / max(count - 1, 1) + drift), between
 
     def held_out_errors(self, chosen: NDArray[np.intp], folds: int) -> list[Array]:
         """Errors (rows,) of each joint where chosen columns and drift were fitted to the other folds of stretches.

@@ -65,7 +65,7 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     rivals = find_rivals(table, chosen, tested)
     weights = np.exp(-np.array([0.0, *(deficit for _, deficit in rivals)]))
     changes = tuple(list_changes(pooled, table, found, tested))
-    factor = half_width_factor(table)
+    factor = half_width_factor(tested.degrees)
     difference, covariance = between_ends(table, tested)
     covariance = as_wide_as_runs(covariance, between_runs(table, chosen, tested.group))
     if group.laws or group.shaped is not None:

@@ -67,14 +67,14 @@ class Movement:
     half_widths: Array
 
 
-def half_width_factor(table: ChangeTable) -> float:
+def half_width_factor(degrees: float) -> float:
     """From a standard error to half an interval."""
-    return float(student.ppf((1 + CONFIDENCE) / 2, table.degrees))
+    return float(student.ppf((1 + CONFIDENCE) / 2, degrees))
 
 
-def detectable_factor(table: ChangeTable) -> float:
+def detectable_factor(table: ChangeTable, tested: Tested) -> float:
     """From a standard error to the smallest change that is named: the level of the test, corrected."""
-    return float(student.isf(table.tuning.level / 2 / len(table.groups), table.degrees))
+    return float(student.isf(table.tuning.level / 2 / len(table.groups), tested.degrees))
 
 
 def recording_values(table: ChangeTable, tested: Tested) -> Array:
@@ -139,7 +139,7 @@ def list_movements(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], 
                 unit=candidate.unit(name),
                 values=np.array(values, dtype=float),
                 covariance=covariance,
-                half_widths=half_width_factor(table) * np.sqrt(np.maximum(np.diag(covariance), 0)),
+                half_widths=half_width_factor(tested.degrees) * np.sqrt(np.maximum(np.diag(covariance), 0)),
             )
 
 
@@ -229,7 +229,7 @@ def _parameters(
             continue
         levels: tuple[float, ...] | None = None
         ratio: tuple[float, float, float] | None = None
-        half = half_width_factor(table) * error
+        half = half_width_factor(tested.degrees) * error
         if law.known:
             change = value - float(np.asarray(start[name]))
             levels = tuple(float(np.asarray(law.parameters(each)[name])) for each in own)
@@ -248,7 +248,7 @@ def _parameters(
             ratio=ratio,
             unit=candidate.unit(name),
             p_value=min(tested.p_value * len(table.groups), 1.0),
-            detectable=detectable_factor(table) * error,
+            detectable=detectable_factor(table, tested) * error,
             changed=table.is_sure(tested),
         )
 

@@ -72,7 +72,7 @@ def runs_differ_as_much(table: ChangeTable, found: Sequence[Tested], tested: Tes
         return False
     difference, covariance = between_ends(table, tested)
     wide = as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
-    return bool(np.all(np.abs(difference) < half_width_factor(table) * np.sqrt(np.diag(wide))))
+    return bool(np.all(np.abs(difference) < half_width_factor(tested.degrees) * np.sqrt(np.diag(wide))))
 
 
 def _reason_no_body(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:
