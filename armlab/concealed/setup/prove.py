@@ -55,7 +55,8 @@ def _make(case: SetupCase, draft: Path) -> None:
     seen = []
     if mistakes:
         inject(wrong, mistakes, true_arm)
-        seen = [_is_seen(right, draft, mistakes, place) for place in range(len(mistakes))]
+        together = _is_seen(right, wrong)
+        seen = [together and _is_seen_alone(right, draft, mistakes, place) for place in range(len(mistakes))]
     truth = {**asdict(case), "mistakes": [asdict(each) for each in mistakes], "seen": seen, "physics": physics}
     truth["arm_joints"] = len(arm)
     (draft / TRUTH_FILE).write_text(json.dumps(truth, indent=1) + "\n", encoding="utf-8")
@@ -66,14 +67,19 @@ def _question(case: SetupCase, observation: Path) -> list[str]:
     return ["diagnose", str(observation), *([] if case.has_physics else ["--only-setup"])]
 
 
-def _is_seen(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: int) -> bool:
+def _is_seen_alone(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: int) -> bool:
     """Whether a mistake alone can be seen."""
     alone = draft / f"alone-{place}"
     shutil.copytree(right, alone)
     inject(alone, (mistakes[place],))
+    seen = _is_seen(right, alone)
+    shutil.rmtree(alone)
+    return seen
+
+
+def _is_seen(right: Path, wrong: Path) -> bool:
+    """Whether a recording as it stands can be told from itself read rightly; two mistakes may cancel each other."""
     try:
-        return can_be_seen(load_recording(right), load_recording(alone))
+        return can_be_seen(load_recording(right), load_recording(wrong))
     except (InputError, DataError):
         return True  # a recording that cannot even be read is seen to be wrong
-    finally:
-        shutil.rmtree(alone)

@@ -219,6 +219,11 @@ class Fitter:
             )
         return out
 
+    def too_fast(self, reading: Reading) -> int:
+        """How many joints would be faster than joints are, most of the time that they move."""
+        speed = np.quantile(np.abs(self.columns(reading).motion.velocity), USUAL, axis=0)
+        return int(np.sum(speed > self.tuning.fastest_speed))
+
     def implausible(self, reading: Reading) -> frozenset[int]:
         """Joints (from 0) that would be faster, or slower at their fastest, than joints of arms are, or hardly turn."""
         motion, tuning = self.columns(reading).motion, self.tuning
@@ -359,6 +364,7 @@ class _Task:
 
 
 SMALLEST = 1e-100
+USUAL = 0.75  # quantile of the speeds: more than a spike
 MAX_NEWTON_STEPS = 40  # for each weight of the barriers
 NEWTON_TOLERANCE = 1e-2  # of the weight of the barriers
 BARRIER_FALL = 0.1

@@ -73,6 +73,7 @@ class Judge:
         known = reading.inertial is not None
         widths = (tuning.near_width, tuning.free_width) if known else (tuning.unknown_width,)
         beyond = self.fitter.beyond_limits(reading) * tuning.limit_loss / reading.joints
+        beyond = beyond + self.fitter.too_fast(reading) * tuning.speed_loss / reading.joints
         scores = self.fitter.scores(reading, widths, physical)
         losses = [each.losses(tuning.smallest_error) + beyond for each in scores]
         return Trial(reading, losses[0] if known else None, losses[-1])

@@ -39,18 +39,17 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
         return Found(start, start, looks=judge.looks[0])
     singles = search_singles(judge, start)
     best, beside = _extend(judge, start, start, singles)
-    if best is start or _is_bad(best, tuning):
-        limit = start.loss - tuning.min_refined_gain
-        if best is not start:
-            limit = min(limit, singles[0].loss + tuning.near_best)
-        for first in _distinct(singles, tuning.beam):
-            if first.loss > limit or first.reading.mistakes == best.reading.mistakes[:1]:
-                continue
-            if not _may_begin_pair(start, first, tuning):
-                continue
-            other, more = _extend(judge, start, first, search_singles(judge, first))
-            if other is not first and other.loss < best.loss - tuning.min_gain and is_accepted(judge, start, other):
-                best, beside = other, more
+    limit = start.loss - tuning.min_refined_gain
+    if best is not start:
+        limit = min(limit, singles[0].loss + tuning.near_best)
+    for first in _distinct(singles, tuning.beam):
+        if first.loss > limit or first.reading.mistakes == best.reading.mistakes[:1]:
+            continue
+        if not _may_begin_pair(start, first, tuning):
+            continue
+        other, more = _extend(judge, start, first, search_singles(judge, first))
+        if other is not first and other.loss < best.loss - tuning.min_gain and is_accepted(judge, start, other):
+            best, beside = other, more
     if best is start:
         return Found(start, start, tried=tuple(singles[: tuning.beam]), looks=judge.looks[0])
     best = _merge_same(judge, start, best)
@@ -68,10 +67,6 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
 def reading_floor(trial: Trial, tuning: ReadingTuning) -> float:
     """The least loss that any reading can have."""
     return math.log(tuning.smallest_error) * trial.reading.joints
-
-
-def _is_bad(trial: Trial, tuning: ReadingTuning) -> bool:
-    return bool(_bad_joints(trial.free, tuning).any())
 
 
 def _bad_joints(losses: Array, tuning: ReadingTuning) -> NDArray[np.bool_]:

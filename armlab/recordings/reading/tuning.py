@@ -78,7 +78,9 @@ class ReadingTuning:
     min_clock_factor: float = tuned(1.05, meaning="a clock that is less wrong is not looked for", least=1.001)
     clock_steps: int = tuned(13, unit="values", meaning="clocks that are tried", least=3)
     far_travel: float = tuned(15.0, unit="rad", meaning="a joint that travels further may be read before its gear")
-    little_travel: float = tuned(0.05, unit="rad", meaning="a joint that travels less may be read behind its gear")
+    little_travel: float = tuned(
+        0.1, unit="rad", meaning="a joint that travels less may be read behind its gear, and no reading makes it so"
+    )
     min_gain: float = tuned(
         0.5,
         unit="nats",
@@ -124,6 +126,9 @@ class ReadingTuning:
         0.01, unit="rad/s (m/s)", meaning="no reading makes a joint slower than this at its fastest"
     )
     fastest_speed: float = tuned(30.0, unit="rad/s (m/s)", meaning="no reading makes a joint faster than this")
+    speed_loss: float = tuned(
+        1.0, unit="nats", meaning="loss of a reading for each joint that is faster than that a quarter of the time"
+    )
     min_slope_likeness: float = tuned(
         0.9, meaning="correlation and slope from which on a recorded velocity confirms the clock", most=0.999
     )
