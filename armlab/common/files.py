@@ -2,7 +2,8 @@
 
 import os
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from armlab.common.errors import InputError
@@ -29,32 +30,44 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
 def write_texts(texts: Mapping[str, str | bytes], folder: Path) -> tuple[Path, ...]:
     """Write all texts (or bytes) under their names into a folder, or none of them; returns their paths.
 
-    They are written into a draft folder first and then moved by renames. Other files of the folder stay.
-    Raises InputError if a file cannot be written.
+    Other files of the folder stay. Raises InputError if a file cannot be written.
+    """
+    folder = folder.absolute()
+    with all_or_none(folder) as draft:
+        for name, text in texts.items():
+            (draft / name).parent.mkdir(parents=True, exist_ok=True)
+            (draft / name).write_bytes(text.encode() if isinstance(text, str) else text)
+    return tuple(folder / name for name in texts)
+
+
+@contextmanager
+def all_or_none(folder: Path) -> Iterator[Path]:
+    """A draft folder whose files are moved into a folder at the end by renames, or none of them.
+
+    Other files of the folder stay. Raises InputError if a file cannot be written.
     """
     folder = folder.absolute()
     exists = folder.is_dir()
     draft = (folder if exists else folder.parent) / f".armlab.{os.getpid()}"
     try:
-        for name, text in texts.items():
-            (draft / name).parent.mkdir(parents=True, exist_ok=True)
-            (draft / name).write_bytes(text.encode() if isinstance(text, str) else text)
+        draft.mkdir(parents=True, exist_ok=True)
+        yield draft
         if not exists:
             draft.replace(folder)
         else:
-            _move_files(draft, texts, folder)
+            _move_files(draft, folder)
     except OSError as error:
         raise InputError(f"cannot write into {folder}: {error.strerror}") from None
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-    return tuple(folder / name for name in texts)
 
 
-def _move_files(draft: Path, names: Iterable[str], folder: Path) -> None:
-    places = {name: folder / name for name in names}
-    for place in places.values():
+def _move_files(draft: Path, folder: Path) -> None:
+    files = [path for path in draft.rglob("*") if path.is_file()]
+    places = [folder / path.relative_to(draft) for path in files]
+    for place in places:
         place.parent.mkdir(parents=True, exist_ok=True)
         if place.is_dir():
             raise InputError(f"{place} is a folder, where a file should be written")
-    for name, place in places.items():
-        (draft / name).replace(place)
+    for path, place in zip(files, places, strict=True):
+        path.replace(place)

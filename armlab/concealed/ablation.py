@@ -9,6 +9,7 @@ from typing import Any
 
 from joblib import Parallel, delayed
 
+from armlab.common.files import write_texts
 from armlab.concealed.prove import FINISHED_MARK, make_development_proof
 from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.score.scoring import compute_score
@@ -62,9 +63,7 @@ def ablate(
         for guard in (verdicts / GUARD_ORDER_FILE).read_text(encoding="utf-8").splitlines():
             score = compute_score(folder, verdicts / guard, sealed)[2]
             found.setdefault(guard, {})[name] = score["tiers"]
-    results.mkdir(parents=True, exist_ok=True)
-    (results / "guards.json").write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-    (results / "guards.md").write_text(render_page(settings, found), encoding="utf-8")
+    write_texts({"guards.json": json.dumps(found, indent=1) + "\n", "guards.md": render_page(settings, found)}, results)
     (work / FINISHED_MARK).touch()
     yield f"wrote {results / 'guards.md'}"
 

@@ -106,15 +106,21 @@ def choose_items(table: ScoreRows) -> pd.DataFrame:
     return first[first.groupby(["group", "tier"]).cumcount() < CASES_PER_GROUP]
 
 
-def write_gallery(cases: Sequence[JudgedCase], table: ScoreRows, out: Path) -> None:
-    """Writes gallery.md and the pictures that it shows."""
+def write_gallery(cases: Sequence[JudgedCase], table: ScoreRows, out: Path) -> frozenset[str]:
+    """Writes gallery.md and the pictures that it shows, whose names it returns."""
     folder = out / GALLERY_FOLDER
     folder.mkdir(parents=True, exist_ok=True)
-    for old in folder.glob("*-joint-*.png"):
-        old.unlink()
     known, shown = {case.name: case for case in cases}, choose_items(table)
     files = [_draw_item(known[item["case"]], item, folder) for item in to_records(shown)]
     (out / GALLERY_PAGE).write_text(_render_gallery(known, table, shown.assign(file=files)), encoding="utf-8")
+    return frozenset(files)
+
+
+def remove_other_pictures(out: Path, shown: frozenset[str]) -> None:
+    """Removes pictures of an earlier score that the gallery does not show."""
+    for old in (out / GALLERY_FOLDER).glob("*-joint-*.png"):
+        if old.name not in shown:
+            old.unlink()
 
 
 def tally_outcomes(table: ScoreRows) -> str:

@@ -5,10 +5,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from armlab.common.files import all_or_none
 from armlab.concealed.formats import SetManifest
 from armlab.concealed.score.cases import JudgedCase, read_cases
 from armlab.concealed.score.figures import draw_figures
-from armlab.concealed.score.gallery import write_gallery
+from armlab.concealed.score.gallery import remove_other_pictures, write_gallery
 from armlab.concealed.score.measures import (
     Measure,
     compute_measures,
@@ -31,15 +32,15 @@ def score_set(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> di
     is no verdict at all.
     """
     cases, table, result = compute_score(folder, verdicts, sealed)
-    tiers = sorted(result["tiers"])
-    out.mkdir(parents=True, exist_ok=True)
-    (out / SCORE_FILE).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
     missed = list_misses(cases, table)
-    missed.to_csv(out / "misses.csv", index=False)
-    _write_tables(table, tiers, out)
-    write_gallery(cases, table, out)
-    drawn = [path.stem for path in draw_figures(table, out)]
-    (out / "score.md").write_text(render_page(table, result, missed, drawn), encoding="utf-8")
+    with all_or_none(out) as draft:
+        (draft / SCORE_FILE).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        missed.to_csv(draft / "misses.csv", index=False)
+        _write_tables(table, sorted(result["tiers"]), draft)
+        shown = write_gallery(cases, table, draft)
+        drawn = [path.stem for path in draw_figures(table, draft)]
+        (draft / "score.md").write_text(render_page(table, result, missed, drawn), encoding="utf-8")
+    remove_other_pictures(out, shown)
     return result
 
 
