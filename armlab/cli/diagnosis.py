@@ -195,15 +195,22 @@ def real(
 @click.command("real-motion")
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=click.Path(path_type=Path), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--peer", type=click.Choice(["sysid"]), help="Run mujoco.sysid beside armlab on the SO-101, too.")
+@click.option("--peer-windows", type=click.IntRange(min=1), help="Windows for both, of about 10 s [default: 24].")
 @prints_lines
-def real_motion(results: Path, recordings: Path) -> Iterator[str]:
+def real_motion(results: Path, recordings: Path, peer: str | None, peer_windows: int | None) -> Iterator[str]:
     """Diagnose public recordings of position servos.
 
     An SO-101 arm against its public MJCF, and an XL330 servo at four gains, pair by pair. Writes motion.md.
     """
+    from armlab.common.errors import InputError
+    from armlab.diagnosis.motion.peer import WINDOWS
     from armlab.diagnosis.motion.real import bench_real_motion
 
-    return bench_real_motion(results, recordings, tell_progress)
+    if peer is None and peer_windows is not None:
+        raise InputError("--peer-windows has no part without --peer sysid: give both")
+    windows = None if peer is None else peer_windows or WINDOWS
+    return bench_real_motion(results, recordings, tell_progress, peer_windows=windows)
 
 
 @click.command()

@@ -12,8 +12,9 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.diagnosis.motion.compare import MotionComparison, compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_summary
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
+from armlab.diagnosis.motion.peer import NO_FIELD, PeerComparison, compare_with_sysid, import_sysid
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay, tool_rms
-from armlab.diagnosis.motion.servo import Servos, place
+from armlab.diagnosis.motion.servo import KEYS, PARAMETERS, Servos, place
 from armlab.diagnosis.motion.words import finding_phrase, summary_of
 from armlab.recordings.motion import MotionRecording, load_motion_recording
 from armlab.recordings.public_motion import SO101_CONTACT, XL330_GAINS, fetch_motion_recording
@@ -22,18 +23,29 @@ ONE_GAIN = 7.8  # N m/rad: duty a rad at P = 16 (2.66, Duclusaud 2025) times the
 
 
 def bench_real_motion(
-    results: Path, recordings: Path, progress: Callable[[str], None] = lambda message: None
+    results: Path,
+    recordings: Path,
+    progress: Callable[[str], None] = lambda message: None,
+    *,
+    peer_windows: int | None = None,
 ) -> Iterator[str]:
     """Diagnoses the SO-101 and compares the XL330 at its four gains; writes motion.md and yields lines to print.
 
-    recordings: folder for the recordings, which are fetched into it. Raises InputError for files that are not at hand.
+    recordings: folder for the recordings, which are fetched into it. peer_windows: of the SO-101, on which mujoco.sysid
+    is run beside armlab; None leaves that out. Raises InputError for files that are not at hand.
     """
+    if peer_windows is not None:
+        import_sysid()
     arm = _open("so101", recordings)
     diagnosis = diagnose_motion(arm, progress)
     alone = _replay_one_gain(diagnosis)
     lines = [summary_of(diagnosis), *(finding_phrase(each) for each in diagnosis.findings)]
     table = _replay_table(diagnosis, alone)
     yield from (*lines, table)
+    beside: list[str] = []
+    if peer_windows is not None:
+        beside = peer_section(compare_with_sysid(diagnosis, peer_windows, progress))
+        yield from beside
     pairs = []
     servos = {gain: _open(f"xl330-kp-{gain}", recordings) for gain in XL330_GAINS}
     for old, new in combinations(XL330_GAINS, 2):
@@ -52,6 +64,7 @@ def bench_real_motion(
         "Root mean square of simulated minus measured position on the held-out runs, mrad; at the tool mm. Whole arm, "
         f"whole runs. One gain: the simulation with kp {ONE_GAIN} N m/rad and kv 0, nothing else changed.",
         table,
+        *beside,
         "## XL330 with a pendulum, gain register P = 100, 200, 400, 800",
         "Nothing but P was changed. Factor: of kp, with its 95 % interval.",
         markdown_table(("pair", "true factor", "factor found", "other changes named"), pairs),
@@ -99,6 +112,65 @@ def _replay_table(diagnosis: MotionDiagnosis, alone: tuple[Replayed, ...]) -> st
     )
     joints = [f"joint {number + 1}" for number in range(len(diagnosis.errors))]
     return markdown_table(("run", "prediction", *joints, "tool"), rows)
+
+
+def peer_section(comparison: PeerComparison) -> list[str]:
+    """The part of the page on armlab and mujoco.sysid: what they were given, errors and times, numbers found."""
+    task, sysid = comparison.task, comparison.sysid
+    joints = [f"joint {number + 1}" for number in range(len(task.free))]
+    peer, judged = comparison.peer, joint_rms(comparison.peer.replayed)
+    fits = {
+        "armlab, diagnosis": comparison.diagnosis,
+        "armlab, the same fit": comparison.alone,
+        "mujoco.sysid": peer,
+    }
+    errors = [
+        (
+            name,
+            *_cells(joint_rms(fit.replayed)),
+            f"{1e3 * tool_rms(fit.replayed):.2f}",
+            f"{fit.seconds:.3g}",
+            "" if fit.processor_seconds is None else f"{fit.processor_seconds:.3g}",
+        )
+        for name, fit in fits.items()
+    ]
+    errors += [
+        (
+            f"{name} / mujoco.sysid",
+            *(f"{each:.2f}" for each in joint_rms(fit.replayed) / judged),
+            f"{tool_rms(fit.replayed) / tool_rms(peer.replayed):.2f}",
+            f"{fit.seconds / peer.seconds:.3g}",
+            ""
+            if fit.processor_seconds is None or peer.processor_seconds is None
+            else f"{fit.processor_seconds / peer.processor_seconds:.3g}",
+        )
+        for name, fit in fits.items()
+        if fit is not peer
+    ]
+    found = [task.start, *(fit.servos for fit in fits.values())]
+    numbers = [
+        (
+            f"joint {row + 1}",
+            f"{PARAMETERS[column].key}, {PARAMETERS[column].unit}",
+            *(f"{servos.values[row, column]:.4g}" for servos in found),
+        )
+        for row, column in np.argwhere(task.free).tolist()
+    ]
+    missing = " and ".join(PARAMETERS[KEYS.index(key)].effect.replace("_", " ") for key in NO_FIELD)
+    return [
+        "### mujoco.sysid beside armlab",
+        f"`armlab, diagnosis` is the one above: all {len(task.stretches)} windows, with the choice of the numbers, "
+        f"intervals and replays. The other two are given {int(task.free.sum())} of the numbers that it fitted, "
+        f"{len(task.windows)} of its windows ({task.seconds:.0f} s), spread evenly over those that it does not call "
+        f"odd, the public MJCF as the start, and the same bounds; {missing} have no field in MuJoCo and are left out. "
+        "mujoco.sysid fits all joints at once through the whole arm, on all processors; "
+        f"`armlab/diagnosis/motion/peer.py` says with which settings. It took {sysid.iterations} iterations, and was "
+        f"within 1 % of its last cost after {sysid.reached:.3g} s. Replay of all held-out runs: mrad; at the tool mm; "
+        "time in s.",
+        markdown_table(("fit", *joints, "tool", "time", "processor time"), errors),
+        "Numbers, with the start.",
+        markdown_table(("joint", "number", "start", *fits), numbers),
+    ]
 
 
 def _command_error(replayed: Replayed) -> Array:
