@@ -65,7 +65,7 @@ real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judge
 	$(BIN)/armlab real --leave-one-out
 
 real-motion: .venv/dev ## diagnose the public recordings of position servos: results/real/motion.md
-	$(BIN)/armlab real-motion
+	$(BIN)/armlab real-motion --peer sysid
 
 relations: .venv/dev ## relations that need no truth, on real and simulated recordings: results/relations/
 	$(BIN)/armlab conceal --cases 8 --seed 1800 --out .armlab/relations-set

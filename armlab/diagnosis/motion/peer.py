@@ -2,11 +2,12 @@
 
 Both minimise the squares of simulated minus measured position, rad, over windows that start from the measured state.
 armlab replays each joint alone, the others where they were measured; mujoco.sysid replays the whole arm and fits the
-numbers of all joints at once. It has what its documentation recommends (its optimiser `mujoco`: Gauss-Newton with
-batched, multithreaded rollouts), and where its defaults would be worse for it, what armlab's fit has: coordinates and
-their scales (`to_coordinates`), a tolerance of 1e-5, errors that are not divided by the size of a window's motion, a
-friction loss that sticks. Its models are copied, not compiled anew for each column of the Jacobian. A number that no
-field of MuJoCo holds is left out for both.
+numbers of all joints at once. It has what its documentation recommends: its optimiser `mujoco`, Gauss-Newton with
+batched, multithreaded rollouts. Where its defaults would be worse for it, it has what armlab's fit has: coordinates and
+their scales (`to_coordinates`), large finite differences, a tolerance of 1e-5, errors that are not divided by the size
+of a window's motion, a friction loss that sticks. Its models are copied, not compiled anew for each column of the
+Jacobian. A delay shifts the simulated position; an offset is a constant torque of the drive. A number that no field of
+MuJoCo holds is left out for both.
 """
 
 import copy
@@ -34,7 +35,8 @@ from problem.mjcf import import_mujoco
 
 WINDOWS = 24  # all of the SO-101's would take mujoco.sysid most of an hour on two processors
 NO_FIELD = ("dead_band", "load_friction")
-SAME_COST = 1.01  # a cost within 1 % of the last one: steps after it need not be charged
+DIFFERENCE = 1e-3  # of a coordinate: the default of 1.5e-8 stalls on joints that stick
+SAME_COST = 1.01  # times the last cost: what comes after it need not be charged
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +82,12 @@ class TimedFit:
 
 @dataclass(frozen=True, eq=False)
 class SysidFit:
-    """What mujoco.sysid found. reached: seconds until its cost was within 1 % of the last one."""
+    """What mujoco.sysid found. reached: seconds until its cost was within 1 % of the last one. ended: its own words."""
 
     servos: Servos
     iterations: int
     reached: float
+    ended: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +208,7 @@ def fit_with_sysid(task: ServoTask, tuning: MotionTuning = DEFAULT) -> SysidFit:
         modify_residual=position_errors,
         resample_true=False,
     )
-    began, costs = time.perf_counter(), [(0.0, np.inf)]
+    began, costs, printed = time.perf_counter(), [(0.0, np.inf)], io.StringIO()
 
     def note_cost(trace: Sequence[Any]) -> None:
         costs.append((time.perf_counter() - began, float(trace[-1].objective - trace[-1].reduction)))
@@ -216,13 +219,15 @@ def fit_with_sysid(task: ServoTask, tuning: MotionTuning = DEFAULT) -> SysidFit:
         optimizer="mujoco",
         verbose=False,
         x_scale=scale,
+        eps=DIFFERENCE,
         xtol=1e-5,
         max_iters=tuning.max_evaluations,
         iter_callback=note_cost,
-        output=io.StringIO(),
+        output=printed,
     )
     reached = next(seconds for seconds, cost in costs if cost <= SAME_COST * costs[-1][1])
-    return SysidFit(_servos_of(task, found), len(costs) - 2, reached)
+    words = next(line for line in printed.getvalue().splitlines() if line.startswith("Terminated"))
+    return SysidFit(_servos_of(task, found), len(costs) - 2, reached, words.split(": ")[1].split(".")[0])
 
 
 def _bare_model(simulation: ServoSimulation) -> tuple[Any, Any]:
@@ -256,7 +261,7 @@ def _servos_of(task: ServoTask, parameters: Any) -> Servos:
 
 
 def _with_values(model: Any, task: ServoTask, parameters: Any) -> Any:
-    """The model with the numbers of a step of the optimiser; a command offset is a constant torque of the drive."""
+    """The model with the numbers of a step of the optimiser."""
     servos = _servos_of(task, parameters)
     with_servos(model, task.simulation, servos)
     drives = [actuator_of(model, joint) for joint in task.simulation.joints]

@@ -116,12 +116,12 @@ def _replay_table(diagnosis: MotionDiagnosis, alone: tuple[Replayed, ...]) -> st
 
 def peer_section(comparison: PeerComparison) -> list[str]:
     """The part of the page on armlab and mujoco.sysid: what they were given, errors and times, numbers found."""
-    task, sysid = comparison.task, comparison.sysid
+    task, sysid, alone = comparison.task, comparison.sysid, comparison.alone
     joints = [f"joint {number + 1}" for number in range(len(task.free))]
     peer, judged = comparison.peer, joint_rms(comparison.peer.replayed)
     fits = {
         "armlab, diagnosis": comparison.diagnosis,
-        "armlab, the same fit": comparison.alone,
+        "armlab, the same fit": alone,
         "mujoco.sysid": peer,
     }
     errors = [
@@ -164,9 +164,10 @@ def peer_section(comparison: PeerComparison) -> list[str]:
         f"{len(task.windows)} of its windows ({task.seconds:.0f} s), spread evenly over those that it does not call "
         f"odd, the public MJCF as the start, and the same bounds; {missing} have no field in MuJoCo and are left out. "
         "mujoco.sysid fits all joints at once through the whole arm, on all processors; "
-        f"`armlab/diagnosis/motion/peer.py` says with which settings. It took {sysid.iterations} iterations, and was "
-        f"within 1 % of its last cost after {sysid.reached:.3g} s. Replay of all held-out runs: mrad; at the tool mm; "
-        "time in s.",
+        f"`armlab/diagnosis/motion/peer.py` says with which settings. It ended after {sysid.iterations} iterations "
+        f"({sysid.ended}), and was within 1 % of its last cost after {sysid.reached:.3g} s. The fit of armlab takes "
+        f"{alone.seconds / peer.seconds:.2g} of its time, and {alone.seconds / sysid.reached:.2g} of its time to that "
+        "cost. Replay of all held-out runs: mrad; at the tool mm; time in s.",
         markdown_table(("fit", *joints, "tool", "time", "processor time"), errors),
         "Numbers, with the start.",
         markdown_table(("joint", "number", "start", *fits), numbers),
