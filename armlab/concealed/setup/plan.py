@@ -9,6 +9,7 @@ import numpy as np
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan, random_stream
 from armlab.concealed.setup.mistakes import EFFECTS, Injected, draw_mistake
 from problem.arm import Arm
+from problem.robot_file import load_arm
 
 Source = Literal["simulated", "real", "null"]
 Kind = Literal["alone", "pair", "beside physics", "none", "near miss"]
@@ -48,6 +49,11 @@ class SetupCase:
     def has_physics(self) -> bool:
         """Whether physics is hidden in it."""
         return self.kind == "beside physics" or (self.source == "null" and self.index % 2 == 1)
+
+    @property
+    def right_gravity(self) -> tuple[float, float, float]:
+        """Gravity in the base frame as it is, m/s2."""
+        return load_arm(self.recording).gravity if self.recording else self.plan().true_arm.gravity
 
     def plan(self) -> Plan:
         """The simulated recording."""

@@ -7,18 +7,22 @@ other way round.
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from scipy.stats import fisher_exact
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.statistics import wilson_interval
 from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.setup.plan import SetupCase
+from armlab.recordings.reading.singles import angle_between
 
 MAX_CLASS = 3  # names
+GRAVITY_DEG = 3.0
 CHANCE = "hidden physics: probability of such a difference by chance"
 
 
@@ -26,7 +30,8 @@ CHANCE = "hidden physics: probability of such a difference by chance"
 class SetupOutcome:
     """One case: what is true of it, and what was said. right: of each mistake. false: findings that are not true.
 
-    physics_right: hidden physics that is named, of `physics`.
+    physics_right: hidden physics that is named, of `physics`. gravity_off: degrees between the direction of gravity
+    that was found and the right one, None where none was found or none was turned.
     """
 
     case: str
@@ -40,6 +45,7 @@ class SetupOutcome:
     status: str
     physics: int
     physics_right: int
+    gravity_off: float | None
 
 
 @dataclass(frozen=True)
@@ -96,6 +102,9 @@ def _measure(outcomes: Sequence[SetupOutcome]) -> list[Share]:
         out.append(Share(f"{source}: named rightly, of those that can be seen", sum(seen), len(seen)))
         out.append(Share(f"{source}: can be seen", sum(unseen), len(unseen)))
         out.append(Share(f"{source}: cases with a false setup finding", sum(each.false > 0 for each in own), len(own)))
+    found = [each.gravity_off for each in outcomes if each.gravity_off is not None]
+    near = f"direction of gravity within {GRAVITY_DEG:g} degrees, where it is found"
+    out.append(Share(near, sum(off <= GRAVITY_DEG for off in found), len(found)))
     nulls = [each for each in outcomes if each.source == "null"]
     out.append(Share("nothing wrong: cases with a setup finding", sum(each.false > 0 for each in nulls), len(nulls)))
     for name, (hits, total) in _physics(outcomes).items():
@@ -147,7 +156,16 @@ def _judge(work: Path, name: str) -> SetupOutcome:
         status=refused or verdict.get("status", ""),
         physics=len(truth["physics"]),
         physics_right=sum(each in named for each in truth["physics"]),
+        gravity_off=_gravity_off(truth, setup),
     )
+
+
+def _gravity_off(truth: dict[str, Any], setup: Sequence[dict[str, Any]]) -> float | None:
+    found = [each["parameters"]["gravity"]["value"] for each in setup if each["effect"] == "base_tilt"]
+    if not found or not any(each["effect"] == "base_tilt" for each in truth["mistakes"]):
+        return None
+    case = SetupCase(*(truth[field.name] for field in fields(SetupCase)))
+    return angle_between(np.array(found[0]), np.array(case.right_gravity))
 
 
 def _class_of(finding: dict[str, Any]) -> list[tuple[str, str]]:
