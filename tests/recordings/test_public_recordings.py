@@ -25,6 +25,8 @@ from armlab.recordings.public import (
     is_available,
     local_copies,
 )
+from armlab.recordings.reading.answer import read_rightly
+from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
 from armlab.recordings.recording_file import FILE_NAME
 from problem.arm import Arm, link_poses
@@ -244,3 +246,16 @@ def test_every_public_recording_has_a_built_in_robot_and_a_command() -> None:
 
 def test_an_unknown_public_recording_names_the_nearest(tmp_path: Path) -> None:
     assert "did you mean 'kuka-kr300'?" in refusal(fetch_recording, "kuka-kr30", tmp_path)
+
+
+@needs_copies("unisa-ur10")
+def test_the_ur10_with_the_zeros_of_its_driver_is_read_a_quarter_turn_off(tmp_path: Path) -> None:
+    """Joint 2 is told; the multiples of 90 degrees of joint 4 are not, and no single value is given for them."""
+    folder = fetch_recording("unisa-ur10", tmp_path / "as-driven")
+    settings = yaml.safe_load((folder / FILE_NAME).read_text())
+    del settings["transmission"]
+    (folder / FILE_NAME).write_text(yaml.safe_dump(settings))
+    answer = read_rightly(load_recording(folder), None, ReadingTuning())
+    found = [(each.mistake.effect, each.mistake.joint, each.mistake.value("offset")) for each in answer.findings]
+    assert found == [("encoder_offset", 2, pytest.approx(np.pi / 2))]
+    assert 4 in answer.undecided
