@@ -1,4 +1,4 @@
-"""The commands `identify`, `predict`, `coverage`, `payload` and `gains`: options only, no logic."""
+"""The commands of identification and the studies of it: options only, no logic."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from armlab.cli.options import FiniteNumber, OutputPath
-from armlab.cli.output import prints_lines, prints_result
+from armlab.cli.output import prints_lines, prints_result, tell_progress
 from armlab.common.documents import ResultLines
 
 METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likelihood", "instrumental", "physical")
@@ -74,6 +74,22 @@ def coverage(experiments: int, seed: int, results: Path) -> Iterator[str]:
     from armlab.identification.coverage import write_coverage
 
     return write_coverage(experiments, seed, results)
+
+
+@click.command("real-conditioning")
+@click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
+@click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--only", multiple=True, help="Name of a public recording [default: all five arms].")
+@prints_lines
+def real_conditioning(results: Path, recordings: Path, only: tuple[str, ...]) -> Iterator[str]:
+    """Test on real arms whether a small condition number helps.
+
+    Identifies each public recording from many windows and predicts the runs that validate. Writes conditioning.md,
+    two tables and a picture.
+    """
+    from armlab.identification.conditioning.study import study_conditioning
+
+    return study_conditioning(results, recordings, only, tell_progress)
 
 
 def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -65,6 +65,7 @@ _GROUPS = {
         "real": "armlab.cli.diagnosis:real",
         "real-motion": "armlab.cli.diagnosis:real_motion",
         "real-concealed": "armlab.cli.diagnosis:real_concealed",
+        "real-conditioning": "armlab.cli.identification:real_conditioning",
         "relations": "armlab.cli.diagnosis:relations",
         "coverage": "armlab.cli.identification:coverage",
     },

@@ -1,7 +1,7 @@
 """Statistics that more than one part needs."""
 
 import numpy as np
-from scipy.stats import binomtest
+from scipy.stats import binomtest, rankdata
 
 from armlab.common.arrays import Array
 
@@ -25,3 +25,16 @@ def wilson_interval(hits: int, number: int, level: float = 0.95) -> tuple[float,
         return 0.0, 1.0
     interval = binomtest(hits, number).proportion_ci(confidence_level=level, method="wilson")
     return float(interval.low), float(interval.high)
+
+
+def spearman_correlations(one: Array, other: Array) -> Array:
+    """Spearman's correlations (a, b) between columns of (n, a) and of (n, b); NaN for a column that is constant."""
+    return np.asarray(standard_ranks(one).T @ standard_ranks(other))
+
+
+def standard_ranks(values: Array) -> Array:
+    """Ranks of each column (n, k), centred and of unit length; NaN for a column that is constant."""
+    ranks = rankdata(values, axis=0)
+    centred = ranks - ranks.mean(axis=0)
+    lengths = np.linalg.norm(centred, axis=0)
+    return np.asarray(centred / np.where(lengths > 0, lengths, np.nan))

@@ -12,6 +12,7 @@ import bench.studies.does_it_help.judgement as judgement
 import bench.studies.does_it_help.study as study
 import bench.studies.does_it_help.trajectories as trajectories
 from armlab.common.arrays import Array
+from armlab.common.statistics import spearman_correlations
 from bench.studies.best_known.records import RECORDS_FILE, read_records
 from bench.studies.does_it_help.identification import NOISE_KINDS, MeasurementNoise, identification_errors
 from bench.studies.does_it_help.judgement import (
@@ -23,7 +24,6 @@ from bench.studies.does_it_help.judgement import (
     correlation_ceiling,
     criterion_values,
     group_resample,
-    spearman_correlations,
 )
 from bench.studies.does_it_help.trajectories import PROBLEM_SETTINGS, make_specimens, random_feasible
 from problem.excitation import ExcitationProblem

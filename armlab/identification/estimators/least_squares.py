@@ -51,10 +51,10 @@ def pseudo_inverse(gram: Array) -> Array:
 
 
 def least_squares(matrix: Array, torque: Array) -> Array:
-    """Solution of least squares with columns scaled to unit length, (columns,)."""
+    """Solution of least squares with columns scaled to unit length, (columns,); (columns, k) for k torques at once."""
     lengths = column_lengths(matrix)
     basis, triangle = np.linalg.qr(matrix / lengths)
-    return np.asarray(np.linalg.lstsq(triangle, basis.T @ torque, rcond=RANK_TOLERANCE)[0] / lengths)
+    return np.asarray((np.linalg.lstsq(triangle, basis.T @ torque, rcond=RANK_TOLERANCE)[0].T / lengths).T)
 
 
 @dataclass(frozen=True)

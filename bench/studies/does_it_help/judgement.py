@@ -7,9 +7,9 @@ from types import MappingProxyType
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.stats import rankdata
 
 from armlab.common.arrays import Array
+from armlab.common.statistics import spearman_correlations
 from armlab.common.streams import named_generator
 from bench.studies.does_it_help.identification import NOISE_KINDS, identification_errors
 from bench.studies.does_it_help.trajectories import Specimen, random_feasible
@@ -122,13 +122,6 @@ def correlation_ceiling(frame: pd.DataFrame, kind: str, error: str) -> float:
     return float(np.sqrt(2 * agreement / (1 + agreement)))
 
 
-def spearman_correlations(criteria: Array, errors: Array) -> Array:
-    """Spearman's correlations (c, e) between columns of criteria (n, c) and of errors (n, e)."""
-    one = _standard_ranks(criteria)
-    other = _standard_ranks(errors)
-    return np.asarray(one.T @ other)
-
-
 def group_resample(groups: Sequence[str], rng: np.random.Generator) -> NDArray[np.intp]:
     """Indices of the members of groups that are drawn with replacement."""
     names = np.asarray(groups)
@@ -156,10 +149,3 @@ def _subset_correlations(subset: str, frame: pd.DataFrame, seed: int) -> pd.Data
     ]
     names = ["subset", "noise", "error", "criterion", "correlation", "low", "high", "trajectories"]
     return pd.DataFrame(rows, columns=names)
-
-
-def _standard_ranks(values: Array) -> Array:
-    """Ranks of each column (n, k), centred and of unit length."""
-    ranks = rankdata(values, axis=0)
-    centred = ranks - ranks.mean(axis=0)
-    return np.asarray(centred / np.linalg.norm(centred, axis=0))
