@@ -6,7 +6,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -63,6 +63,9 @@ real: .venv/dev ## identify and diagnose the public recordings of real arms: res
 
 real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
 	$(BIN)/armlab real --leave-one-out
+
+real-conditioning: .venv/dev ## does a small condition number help on real arms: results/real/conditioning.md
+	$(BIN)/armlab real-conditioning
 
 real-motion: .venv/dev ## diagnose the public recordings of position servos: results/real/motion.md
 	$(BIN)/armlab real-motion --peer sysid

@@ -22,6 +22,7 @@ from armlab.identification.conditioning.windows import Windows, block_rows
 from armlab.identification.identifier import Identifier
 from armlab.identification.real.study import Recipe
 from armlab.identification.regression import Regression
+from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import run_error
 from armlab.recordings.recording import Recording, Transmission
 
@@ -123,13 +124,14 @@ def test_the_mean_over_arms_leaves_out_an_arm_without_a_value() -> None:
     assert mean.value == pytest.approx([0.6])
     assert mean.error == pytest.approx([0.3 / np.sqrt(2)])
     assert mean.p == pytest.approx([0.1])
+    assert np.isnan(average([correlations(np.nan)], Windows(4)).value[0])
 
 
 @pytest.mark.parametrize("samples", [60, 61])
 def test_simulated_noise_has_the_spectrum_of_what_the_fit_leaves(samples: int) -> None:
     rng = np.random.default_rng(5)
     data = Regression(rng.normal(size=(2 * samples, 4)), rng.normal(size=2 * samples), 2, (samples,), 100.0, 0.1)
-    values = np.linalg.lstsq(data.matrix, data.torque, rcond=None)[0]
+    values = np.asarray(np.linalg.lstsq(data.matrix, data.torque, rcond=None)[0], dtype=np.float64)
     drawn = simulated_torques(data, values, simulations=3, rng=rng)
     noise = (drawn - (data.matrix @ values)[:, None]).T.reshape(3, samples, 2)
     raised = np.sqrt(2 * samples / (2 * samples - 4))
@@ -159,11 +161,17 @@ def test_the_preferred_windows_are_those_with_the_least_criterion() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "p", "word"),
-    [(0.5, 0.01, "helps"), (-0.5, 0.01, "misleads"), (0.5, 0.2, "cannot tell"), (np.nan, np.nan, "cannot tell")],
+    ("low", "high", "p", "word"),
+    [
+        (0.1, 0.7, 0.01, "helps"),
+        (-0.7, -0.1, 0.01, "misleads"),
+        (0.1, 0.7, 0.2, "cannot tell"),
+        (-0.1, 0.7, 0.01, "cannot tell"),
+        (np.nan, np.nan, np.nan, "cannot tell"),
+    ],
 )
-def test_a_verdict_needs_a_small_p(value: float, p: float, word: str) -> None:
-    assert verdict(value, p) == word
+def test_a_verdict_needs_a_small_p_and_an_interval_without_zero(low: float, high: float, p: float, word: str) -> None:
+    assert verdict(low, high, p) == word
 
 
 @pytest.mark.usefixtures("small")
@@ -187,3 +195,16 @@ def test_the_study_writes_page_tables_and_picture_and_logs_its_look(
 def test_an_unknown_arm_is_refused_in_one_line(tmp_path: Path) -> None:
     message = refusal(lambda: list(study.study_conditioning(tmp_path, tmp_path, ["ur10"], lambda message: None)))
     assert message.startswith("unknown arm 'ur10'")
+
+
+@pytest.mark.usefixtures("small")
+def test_a_window_has_the_error_and_the_condition_number_of_its_own_rows(recording: Recording) -> None:
+    found = study_arm(RECIPE, recording, simulations=2).lengths[0]
+    structure_, _, data = Identifier(recording.arm, method="ordinary").prepare(recording.with_role("identify"))
+    rows = np.concatenate(block_rows(data.samples, data.joints)[:10])
+    sizes = np.linalg.svd(data.matrix[rows], compute_uv=False)
+    assert found.criteria["fitted_cond_si"].iloc[0] == pytest.approx(sizes[0] / sizes[-1], rel=1e-6)
+    values = np.linalg.lstsq(data.matrix[rows], data.torque[rows], rcond=None)[0]
+    model = TorqueModel("irb120-arm", structure_, values, cutoff_hz=1 / data.correlation_s)
+    judged = model.signals(recording.with_role("validate")[0])
+    assert found.errors[0] == pytest.approx(run_error(model, judged).relative_percent, rel=1e-6)

@@ -10,7 +10,7 @@ from armlab.common.arrays import Array
 from armlab.common.statistics import adjust_by_holm, spearman_correlations
 from armlab.common.streams import named_generator
 from armlab.identification.conditioning.arm import WINDOW_BLOCKS, ArmStudy, ArmWindows
-from armlab.identification.conditioning.correlation import BlockCorrelation, average, correlate
+from armlab.identification.conditioning.correlation import BlockCorrelation, average, correlate, count_of_values
 from armlab.identification.conditioning.criteria import CRITERIA
 
 MEAN = "mean of arms"
@@ -25,7 +25,7 @@ def correlation_table(studies: Sequence[ArmStudy]) -> pd.DataFrame:
 
     Columns: blocks, window_s, arm, criterion, correlation, low, high, p, p_holm (over the arms of a length, for one
     criterion), simulated, simulated_low, simulated_high (median and range over the simulations), p_simulated (two-sided
-    share of the simulations that are as far from their median), verdict.
+    share of the simulations that are as far out, the recorded torque included), verdict.
     """
     tables = []
     for number, chosen in enumerate(WINDOW_BLOCKS):
@@ -46,11 +46,15 @@ def correlation_table(studies: Sequence[ArmStudy]) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def verdict(correlation: float, p: float) -> Verdict:
-    """Whether a small value of the criterion goes with a small error."""
-    if np.isnan(p) or p >= SIGNIFICANCE:
-        return "cannot tell"
-    return "helps" if correlation > 0 else "misleads"
+def verdict(low: float, high: float, p: float) -> Verdict:
+    """Whether a small value of the criterion goes with a small error; needs a small p and an interval without zero.
+
+    The permutations test that blocks have to do with both at all, which one odd block can show; the interval tells
+    whether the correlation stays when any block is left out.
+    """
+    if p < SIGNIFICANCE and low > 0:
+        return "helps"
+    return "misleads" if p < SIGNIFICANCE and high < 0 else "cannot tell"
 
 
 def choice_table(studies: Sequence[ArmStudy], criteria: Sequence[str]) -> pd.DataFrame:
@@ -79,8 +83,9 @@ def _rows(
     arm: str, window_s: float, blocks: int, real: BlockCorrelation, simulated: Array, p_holm: Array
 ) -> pd.DataFrame:
     low, middle, high = _quantiles(simulated)
-    below = np.mean(simulated <= real.value[:, None], axis=1)
-    above = np.mean(simulated >= real.value[:, None], axis=1)
+    below = np.sum(simulated <= real.value[:, None], axis=1)
+    above = np.sum(simulated >= real.value[:, None], axis=1)
+    as_far = 2 * (1 + np.minimum(below, above)) / (1 + simulated.shape[1])
     frame = pd.DataFrame(
         {
             "blocks": blocks,
@@ -95,10 +100,10 @@ def _rows(
             "simulated": middle,
             "simulated_low": low,
             "simulated_high": high,
-            "p_simulated": np.where(np.isnan(real.value), np.nan, np.minimum(2 * np.minimum(below, above), 1.0)),
+            "p_simulated": np.where(np.isnan(real.value), np.nan, np.minimum(as_far, 1.0)),
         }
     )
-    frame["verdict"] = [verdict(*pair) for pair in zip(frame["correlation"], frame["p_holm"], strict=True)]
+    frame["verdict"] = [verdict(*each) for each in zip(frame["low"], frame["high"], frame["p_holm"], strict=True)]
     return frame
 
 
@@ -109,7 +114,7 @@ def _quantiles(simulated: Array) -> Array:
 def _mean_over_arms(simulated: Sequence[Array]) -> Array:
     """Mean over the arms that have a value, draw by draw: (criteria, simulations)."""
     stacked = np.array(simulated)
-    return np.asarray(np.nansum(stacked, axis=0) / np.sum(~np.isnan(stacked), axis=0))
+    return np.asarray(np.nansum(stacked, axis=0) / count_of_values(stacked))
 
 
 def _holm_over_arms(p_values: Sequence[Array]) -> Array:

@@ -64,15 +64,21 @@ def correlate(windows: Windows, criteria: Array, errors: Array, rng: np.random.G
 def average(correlations: Sequence[BlockCorrelation], windows: Windows) -> BlockCorrelation:
     """The mean over arms, whose blocks are permuted independently; an arm without a value takes no part.
 
-    The interval holds for the mean of these arms, not for arms in general.
+    The interval holds for the mean of these arms, not for arms in general. NaN where no arm has a value.
     """
     values = np.array([each.value for each in correlations])
-    count = np.sum(~np.isnan(values), axis=0)
+    count = count_of_values(values)
     mean = np.nansum(values, axis=0) / count
     error = np.sqrt(np.nansum([each.error**2 for each in correlations], axis=0)) / count
     permuted = np.nansum([each.permuted for each in correlations], axis=0) / count
     half = student.ppf((1 + LEVEL) / 2, windows.blocks - 1) * error
     return BlockCorrelation(mean, error, mean - half, mean + half, permutation_p(mean, permuted), permuted)
+
+
+def count_of_values(values: Array) -> Array:
+    """How many of the first axis are not NaN; NaN where none is."""
+    count = np.sum(~np.isnan(values), axis=0)
+    return np.where(count > 0, count, np.nan)
 
 
 def permutation_p(value: Array, permuted: Array) -> Array:

@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter, LogLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from armlab.common.arrays import Array
 from armlab.identification.conditioning.answer import MEAN
 from armlab.identification.conditioning.arm import WINDOW_BLOCKS, ArmStudy
 from armlab.identification.conditioning.windows import BLOCKS
@@ -28,7 +29,8 @@ SHOWN_CRITERIA = {
 ARM_STYLES = (("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "^"), ("#CC79A7", "D"), ("#E69F00", "v"))
 MEAN_STYLE = ("#000000", "P")
 REAL_COLOUR, SIMULATED_COLOUR = "#0072B2", "#E69F00"
-SIZE_INCHES = (11.0, 9.0)
+SIZE_INCHES = (11.0, 11.0)
+FIRST_POWER = 1e5  # the least tick that is written as a power of ten
 
 
 def conditioning_images(studies: Sequence[ArmStudy], table: pd.DataFrame) -> dict[str, bytes]:
@@ -45,7 +47,7 @@ def conditioning_images(studies: Sequence[ArmStudy], table: pd.DataFrame) -> dic
 def draw_conditioning(studies: Sequence[ArmStudy], table: pd.DataFrame) -> Figure:
     """Above a panel an arm, below a panel a length of the windows."""
     figure = Figure(figsize=SIZE_INCHES, layout="constrained")
-    halves: Any = figure.subfigures(2, 1, height_ratios=(1, 1.9))
+    halves: Any = figure.subfigures(2, 1, height_ratios=(1, 2.6))
     above, below = halves
     scatter = above.subplots(1, len(studies), squeeze=False)[0]
     for axis, study in zip(scatter, studies, strict=True):
@@ -70,8 +72,12 @@ def _draw_windows(axis: Axes, study: ArmStudy) -> None:
     cond = length.criteria["fitted_cond_si"].to_numpy()
     style: dict[str, Any] = {"linestyle": "", "markersize": 2.2, "markeredgewidth": 0, "alpha": 0.55}
     simulated = length.simulated[:, 0]
-    axis.plot(cond, length.errors, marker="o", color=REAL_COLOUR, label="recorded torque", **style)
-    axis.plot(cond, simulated, marker="^", color=SIMULATED_COLOUR, label="simulated torque (one draw)", **style)
+    for name, errors, marker, colour in (
+        ("recorded torque", length.errors, "o", REAL_COLOUR),
+        ("simulated torque (one draw)", simulated, "^", SIMULATED_COLOUR),
+    ):
+        axis.plot(cond, errors, marker=marker, color=colour, **style)
+        axis.plot([], [], marker, color=colour, label=name)  # the points are too small for a legend
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xlabel("condition number (-), SI")
@@ -82,15 +88,17 @@ def _draw_windows(axis: Axes, study: ArmStudy) -> None:
     axis.set_axisbelow(True)
 
 
-def _label_ticks(axis: Any, values: Any) -> None:
+def _label_ticks(axis: Any, values: Array) -> None:
     """Ticks that a person reads, also where the values are within one power of ten."""
     decades = float(np.log10(np.max(values) / np.min(values)))
-    if decades >= 2:
-        axis.set_major_formatter(LogFormatter())
-    else:
+    if decades < 2:
         axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades > 0.4 else (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9)))
-        axis.set_major_formatter(ScalarFormatter())
+    axis.set_major_formatter(FuncFormatter(_tick_text))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _tick_text(value: float, place: int | None = None) -> str:
+    return f"{value:g}" if value < FIRST_POWER else f"{value:.0e}".replace("e+0", "e")
 
 
 def _draw_correlations(axis: Axes, table: pd.DataFrame, names: Sequence[str]) -> None:

@@ -19,11 +19,11 @@ PAGE_NAME, TABLE_NAME, CHOICES_NAME, PICTURE_STEM = (
 )
 SPECTRAL_NAMES = {
     "cond_si": "cond",
-    "cond_unit": "cond, unit columns",
+    "cond_unit": "cond (unit columns)",
     "d_optimality_si": "D",
-    "d_optimality_unit": "D, unit columns",
+    "d_optimality_unit": "D (unit columns)",
     "e_optimality_si": "E",
-    "e_optimality_unit": "E, unit columns",
+    "e_optimality_unit": "E (unit columns)",
 }
 FITTED = {f"fitted_{name}": shown for name, shown in SPECTRAL_NAMES.items()} | {"v_optimality": "V"}
 LINKS = {f"links_{name}": shown for name, shown in SPECTRAL_NAMES.items()}
@@ -35,18 +35,20 @@ ANSWERS = {
 }
 METHOD_TEXT = f"""\
 The identification run of each recording passes the filters of `identify` as a whole (cut-off from its positions) and is
-cut into {BLOCKS} equal blocks. A window is any {" or ".join(map(str, WINDOW_BLOCKS))} of them, so all windows of a
-length are equally long, and their condition numbers differ. From each window ordinary least squares finds the base
-parameters with viscous and Coulomb friction, rotor inertia and offset at each joint (for the KUKA the spring of its
-counterbalance). *Error*: `||tau - tau_hat|| / ||tau||` over all joints in percent of the filtered torque, on the runs
-that validate, which took no part.
+cut into {BLOCKS} equal blocks. A window is a choice of {", ".join(map(str, WINDOW_BLOCKS))} of them, so all windows of
+one number of blocks are equally long, and their condition numbers differ. From each window ordinary least squares finds
+the base parameters with viscous and Coulomb friction, rotor inertia and offset at each joint (for the KUKA the spring
+of its counterbalance). *Error*: `||tau - tau_hat|| / ||tau||` over all joints in percent of the filtered torque, on
+the runs that validate, which took no part.
 
 Windows share blocks and are correlated: hundreds of windows of {BLOCKS} blocks are about {BLOCKS} observations. So the
 p-value of a correlation is the share of {PERMUTATIONS} permutations of whole blocks that give one as large in size
-(Krackhardt 1988), and its 95 % interval is a jackknife over blocks (Tukey 1958). With windows as observations, four of
-five unrelated criteria would look significant (a test holds this). Neighbouring blocks are taken as exchangeable.
-p-values of single arms are corrected over the arms (Holm 1979); those of the mean are not, and several criteria and
-lengths are looked at. The mean is of these arms, its interval holds for no others.
+(Krackhardt 1988), and its 95 % interval is a jackknife over blocks (Tukey 1958). With windows as observations, most
+unrelated criteria would look significant (a test holds this). Neighbouring blocks are taken as exchangeable. p-values
+of single arms are corrected over the arms (Holm 1979); those of the mean are not, and several criteria and lengths are
+looked at. The mean is of these arms, its interval holds for no others. An answer needs a p-value below
+{SIGNIFICANCE:g} and an interval without zero; else the recordings cannot tell. The second condition, which can only
+withdraw answers, and the longest windows were added after a first look.
 
 Criteria, the smaller the better: the condition number of the observation matrix W, D-optimality `-2 mean(log sigma)`,
 E-optimality `-sigma_min`, each in SI units and with columns scaled to unit length in the window; and V-optimality
@@ -63,7 +65,7 @@ The paper's condition number is that of the links' columns alone. Friction is fi
 
 def conditioning_page(studies: Sequence[ArmStudy], table: pd.DataFrame, choices: pd.DataFrame) -> str:
     """The whole page; every number comes from the tables."""
-    parts = [*answer_lines(table), f"![Errors and rank correlations]({PICTURE_STEM}.svg)", "## What was done"]
+    parts = [*answer_lines(table, choices), f"![Errors and rank correlations]({PICTURE_STEM}.svg)", "## What was done"]
     parts += [METHOD_TEXT, setting_table(studies)]
     for blocks in WINDOW_BLOCKS:
         rows = table[table["blocks"] == blocks]
@@ -83,8 +85,8 @@ def conditioning_page(studies: Sequence[ArmStudy], table: pd.DataFrame, choices:
     return markdown_page("Does a small condition number help on real arms?", *parts)
 
 
-def answer_lines(table: pd.DataFrame) -> Iterator[str]:
-    """The answer, a paragraph for each length of the windows."""
+def answer_lines(table: pd.DataFrame, choices: pd.DataFrame) -> Iterator[str]:
+    """The answer, a paragraph for each length of the windows, and what choosing by the condition number is worth."""
     for blocks in WINDOW_BLOCKS:
         rows = table[(table["blocks"] == blocks) & (table["criterion"] == QUESTION)].set_index("arm")
         mean, arms = rows.loc[MEAN], rows.drop(index=MEAN)
@@ -93,18 +95,30 @@ def answer_lines(table: pd.DataFrame) -> Iterator[str]:
             f"**Windows of {blocks} of {BLOCKS} blocks: {ANSWERS[str(mean['verdict'])]}** Condition number and error "
             f"of the predicted torque have a mean rank correlation of {mean['correlation']:.2f} ({mean['low']:.2f} to "
             f"{mean['high']:.2f}; p {mean['p']:.2g}) over {len(arms)} arms. By arm: {counts}. With simulated torque of "
-            f"a true model the mean is {mean['simulated']:.2f} ({mean['simulated_low']:.2f} to "
+            f"a true model it is {mean['simulated']:.2f} ({mean['simulated_low']:.2f} to "
             f"{mean['simulated_high']:.2f}). " + _best_criterion(table[table["blocks"] == blocks])
         )
+    yield _worth_sentence(choices)
+
+
+def _worth_sentence(choices: pd.DataFrame) -> str:
+    """How the error of the preferred windows compares with all windows and with the whole run."""
+    rows = choices[choices["blocks"] == WINDOW_BLOCKS[0]].set_index("arm")
+    preferred, whole = rows[QUESTION] / rows["all windows"], rows["whole run"] / rows["all windows"]
+    by_arm = ", ".join(f"{arm} {preferred[arm]:.2f} ({whole[arm]:.2f})" for arm in rows.index)
+    return (
+        f"What it is worth: the tenth of the windows of {WINDOW_BLOCKS[0]} blocks with the least condition number has "
+        f"this multiple of the median error of all of them (in brackets: the fit to the whole run): {by_arm}."
+    )
 
 
 def _best_criterion(rows: pd.DataFrame) -> str:
     means = rows[(rows["arm"] == MEAN) & rows["criterion"].isin(list(FITTED))].set_index("criterion")
     best = means.index[int(means["correlation"].argmax())]
-    told = [FITTED[name] for name in FITTED if means.loc[name, "verdict"] == "helps"]
+    helpful = [FITTED[name] for name in FITTED if means.loc[name, "verdict"] == "helps"]
     return (
         f"The highest mean has {FITTED[best]} ({means.loc[best, 'correlation']:.2f}, p {means.loc[best, 'p']:.2g}); "
-        f"with p below {SIGNIFICANCE:g}, not corrected: {', '.join(told) or 'none'}."
+        f"on the mean of these arms help, not corrected for their number: {', '.join(helpful) or 'none'}."
     )
 
 

@@ -46,7 +46,7 @@ def study_conditioning(
         studies.append(study_arm(recipe_named(name), recording))
     progress("permutations of the blocks")
     table, choices = correlation_table(studies), choice_table(studies, list(SHOWN_CRITERIA))
-    yield from answer_lines(table)
+    yield from answer_lines(table, choices)
     texts: dict[str, str | bytes] = {
         PAGE_NAME: conditioning_page(studies, table, choices),
         TABLE_NAME: table_csv(table),
