@@ -19,7 +19,6 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.statistics import wilson_interval
 from armlab.concealed.score.cases import FAILURE_FILE
 from armlab.concealed.setup.plan import SetupCase
-from armlab.recordings.reading.singles import angle_between
 
 MAX_CLASS = 3  # names
 GRAVITY_DEG = 3.0
@@ -165,7 +164,8 @@ def _gravity_off(truth: dict[str, Any], setup: Sequence[dict[str, Any]]) -> floa
     if not found or not any(each["effect"] == "base_tilt" for each in truth["mistakes"]):
         return None
     case = SetupCase(*(truth[field.name] for field in fields(SetupCase)))
-    return angle_between(np.array(found[0]), np.array(case.right_gravity))
+    one, other = (np.array(each) / np.linalg.norm(each) for each in (found[0], case.right_gravity))
+    return float(np.rad2deg(2 * np.arctan2(np.linalg.norm(one - other), np.linalg.norm(one + other))))
 
 
 def _class_of(finding: dict[str, Any]) -> list[tuple[str, str]]:

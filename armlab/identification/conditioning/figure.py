@@ -92,13 +92,13 @@ def _label_ticks(axis: Any, values: Array) -> None:
     """Ticks that a person reads, also where the values are within one power of ten."""
     decades = float(np.log10(np.max(values) / np.min(values)))
     if decades < 2:
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades > 0.4 else (1, 1.5, 2, 3, 4, 5, 6, 7, 8, 9)))
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if decades > 0.6 else (1, 1.5, 2, 3, 5, 7)))
     axis.set_major_formatter(FuncFormatter(_tick_text))
     axis.set_minor_formatter(NullFormatter())
 
 
 def _tick_text(value: float, place: int | None = None) -> str:
-    return f"{value:g}" if value < FIRST_POWER else f"{value:.0e}".replace("e+0", "e")
+    return f"{value:g}" if value < FIRST_POWER else f"{value:.2g}".replace("e+0", "e")
 
 
 def _draw_correlations(axis: Axes, table: pd.DataFrame, names: Sequence[str]) -> None:
