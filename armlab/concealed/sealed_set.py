@@ -4,6 +4,7 @@ An interrupted set continues in its folder.
 """
 
 import hashlib
+import re
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -12,8 +13,20 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from joblib import Parallel, delayed
 
+from armlab.common.errors import InputError
+from armlab.common.statistics import wilson_interval
 from armlab.concealed.folders import claim_folder
-from armlab.concealed.prove import answer, is_answered, report_progress
+from armlab.concealed.plan import DEVELOPMENT_SEEDS
+from armlab.concealed.prove import (
+    FINISHED_MARK,
+    LOG_FILE,
+    answer,
+    append_to_log,
+    head_commit,
+    is_answered,
+    judged_seed,
+    report_progress,
+)
 
 OBSERVATION = "observation"  # in a draft, what the program sees
 TRUTH_FILE = "truth.json"  # in a draft, the answer
@@ -53,7 +66,7 @@ class SetMaker(Generic[Plan]):
             delayed(_make)(self.make, plan, work) for plan in missing
         )
         yield from report_progress("made", made, max(len(missing), 1))
-        yield f"answers SHA-256 {_digest_of_answers(work / 'truth')}"
+        yield f"answers SHA-256 {digest_of_answers(work)}"
         waiting = [plan for plan in plans if not is_answered(work / "verdicts" / plan.name)]
         tasks = (delayed(self._ask)(plan, work) for plan in waiting)
         asked = Parallel(n_jobs=jobs, backend="threading", return_as="generator_unordered")(tasks)
@@ -78,9 +91,56 @@ def _make(make: Callable[[Plan, Path], None], plan: Plan, work: Path) -> str:
     return plan.name
 
 
-def _digest_of_answers(truth: Path) -> str:
-    """SHA-256 of all answers."""
+def digest_of_answers(work: Path) -> str:
+    """SHA-256 of all answers of the set in a folder."""
     out = hashlib.sha256()
-    for path in sorted(truth.glob("*.json")):
+    for path in sorted((work / "truth").glob("*.json")):
         out.update(path.name.encode() + path.read_bytes())
     return out.hexdigest()
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share with its 95 % interval (Wilson 1927)."""
+
+    name: str
+    hits: int
+    number: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Of the share."""
+        return wilson_interval(self.hits, self.number)
+
+    @property
+    def text(self) -> str:
+        """Share, interval and counts."""
+        low, high = self.interval
+        share = f"{self.hits / self.number:.1%}" if self.number else "-"
+        return f"{share} ({low:.1%} to {high:.1%}), {self.hits} of {self.number}"
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """As the log of judged runs has it: id, value with its interval, number of cases."""
+        low, high = self.interval
+        value = self.hits / self.number if self.number else None
+        name = re.sub(r"[^a-z0-9]+", "_", self.name.lower()).strip("_")
+        return {"id": name, "value": value, "low": low, "high": high, "number": self.number}
+
+
+JUDGED_LOG = Path(__file__).resolve().parents[2] / "results" / "proof" / LOG_FILE  # of all judged runs
+
+
+def log_judged_set(name: str, seed: int, cases: int, work: Path, shares: Sequence[Share]) -> None:
+    """Adds a judged set, whose seed follows from the commit, to the log, once; other sets are not judged."""
+    if seed in DEVELOPMENT_SEEDS or (work / FINISHED_MARK).is_file():
+        return
+    try:
+        commit = head_commit()
+    except InputError:  # no git checkout
+        return
+    if seed != judged_seed(commit):
+        return
+    score = {"seed": seed, "cases": cases, "manifest": digest_of_answers(work)}
+    append_to_log(JUDGED_LOG, commit, name, {**score, "tiers": {name: [each.entry for each in shares]}})
+    (work / FINISHED_MARK).touch()

@@ -8,7 +8,7 @@ from armlab.concealed.pairs.make import SIDES, make_pair, write_pair
 from armlab.concealed.pairs.plan import PairPlan, draw_pair
 from armlab.concealed.pairs.score import score_lines, score_pairs
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
-from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker
+from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_judged_set
 from armlab.concealed.sets import TIERS
 
 
@@ -36,7 +36,9 @@ def prove_pairs(settings: PairSet, work: Path, results: Path, jobs: int) -> Iter
     """Makes, seals, compares and scores; yields the lines that report it. InputError for a folder of another set."""
     plans = list(settings.plans())
     yield from SetMaker(_make, _question, "compared").prove(settings, plans, work, jobs)
-    yield from score_lines(score_pairs(work, [plan.name for plan in plans], results))
+    score = score_pairs(work, [plan.name for plan in plans], results)
+    yield from score_lines(score)
+    log_judged_set("changes", settings.seed, len(plans), work, score.measures)
 
 
 def _make(plan: PairPlan, draft: Path) -> None:

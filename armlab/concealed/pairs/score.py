@@ -12,9 +12,9 @@ from typing import Any
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.common.statistics import wilson_interval
 from armlab.concealed.pairs.plan import CHANGE_KINDS, PAIRS
 from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.sealed_set import Share
 
 FRICTION = ("coulomb_friction", "viscous_friction")
 MAX_CLASS = 3  # names
@@ -49,25 +49,11 @@ class PairOutcome:
 
 
 @dataclass(frozen=True)
-class Measure:
-    """A share with its 95 % interval (Wilson 1927)."""
-
-    name: str
-    hits: int
-    number: int
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Of the share."""
-        return wilson_interval(self.hits, self.number)
-
-
-@dataclass(frozen=True)
 class PairScore:
     """All outcomes and measures."""
 
     outcomes: tuple[PairOutcome, ...]
-    measures: tuple[Measure, ...]
+    measures: tuple[Share, ...]
 
 
 def score_pairs(work: Path, names: Sequence[str], results: Path) -> PairScore:
@@ -110,7 +96,7 @@ def count_names(changed: Sequence[dict[str, Any]], findings: Sequence[dict[str, 
     return right, wrong
 
 
-def measures_of(outcomes: Sequence[PairOutcome]) -> Iterator[Measure]:
+def measures_of(outcomes: Sequence[PairOutcome]) -> Iterator[Share]:
     """The measures of all pairs, and by kind, tier and motion."""
     nulls = [each for each in outcomes if each.kind == "null"]
     seen = [each for each in outcomes if each.kind != "null" and each.visible]
@@ -124,36 +110,27 @@ def measures_of(outcomes: Sequence[PairOutcome]) -> Iterator[Measure]:
     }
     for name, (without, having) in groups.items():
         if without:
-            yield Measure(
+            yield Share(
                 f"nothing changed, something named{name}", sum(e.status == "changed" for e in without), len(without)
             )
         if having:
-            yield Measure(f"right name or class of three{name}", sum(e.right for e in having), len(having))
+            yield Share(f"right name or class of three{name}", sum(e.right for e in having), len(having))
             names = sum(len(e.named) for e in having)
-            yield Measure(f"wrong names among all names{name}", sum(e.wrong for e in having), names)
+            yield Share(f"wrong names among all names{name}", sum(e.wrong for e in having), names)
     for kind in CHANGE_KINDS:
         own = [each for each in seen if each.kind == kind]
         if own:
-            yield Measure(f"right name or class of three: {kind}", sum(each.right for each in own), len(own))
+            yield Share(f"right name or class of three: {kind}", sum(each.right for each in own), len(own))
 
 
 def score_lines(score: PairScore) -> Iterator[str]:
     """One line a measure."""
-    for each in score.measures:
-        low, high = each.interval
-        share = 100 * each.hits / max(each.number, 1)
-        yield f"{each.name}: {each.hits} of {each.number} ({share:.1f} %, {100 * low:.1f} to {100 * high:.1f} %)"
+    yield from (f"{each.name}: {each.text}" for each in score.measures)
 
 
 def score_page(score: PairScore) -> str:
     """Measures, and every pair that was not judged rightly."""
-    rows = []
-    for each in score.measures:
-        low, high = each.interval
-        share = 100 * each.hits / max(each.number, 1)
-        rows.append(
-            (each.name, f"{each.hits} of {each.number}", f"{share:.1f}", f"{100 * low:.1f} to {100 * high:.1f}")
-        )
+    rows = [(each.name, each.text) for each in score.measures]
     missed = [
         (each.pair, each.kind, each.tier, each.arm, f"{each.multiple:.1f}", _names(each.changed), str(each.named))
         for each in score.outcomes
@@ -167,7 +144,7 @@ def score_page(score: PairScore) -> str:
         f"{hidden} changes were below that at every place drawn."
     )
     headings = ("pair", "kind", "tier", "arm", "limits", "true", "named")
-    parts = [markdown_table(("measure", "number", "%", "95 %"), rows)]
+    parts = [markdown_table(("measure", "value"), rows)]
     parts += ["## Pairs that were not judged rightly", markdown_table(headings, missed)] if missed else []
     return markdown_page("What changed: the proof", intro, *parts)
 

@@ -17,7 +17,7 @@ import numpy as np
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.cases import FAILURE_FILE
-from armlab.concealed.setup.score import Share
+from armlab.concealed.sealed_set import Share
 
 MAX_CLASS = 4  # names
 LEAST_MULTIPLE = 3.0  # detection limits of an effect that counts

@@ -9,7 +9,7 @@ from typing import Any
 
 from armlab.common.errors import DataError, InputError
 from armlab.concealed.case_files import write_observation
-from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker
+from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_judged_set
 from armlab.concealed.setup.mistakes import Injected, inject
 from armlab.concealed.setup.oracle import can_be_seen
 from armlab.concealed.setup.plan import SetupCase, draw_cases, draw_mistakes
@@ -34,7 +34,9 @@ def prove_setup(settings: SetupSet, work: Path, results: Path, jobs: int) -> Ite
     """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
     cases = list(draw_cases(settings.seed, settings.simulated, settings.real, settings.nulls))
     yield from SetMaker(_make, _question, "diagnosed").prove(settings, cases, work, jobs)
-    yield from score_lines(score_setup(work, [case.name for case in cases], results))
+    scored = score_setup(work, [case.name for case in cases], results)
+    yield from score_lines(scored)
+    log_judged_set("setup", settings.seed, len(cases), work, scored[0])
 
 
 def _make(case: SetupCase, draft: Path) -> None:

@@ -16,8 +16,8 @@ from scipy.stats import fisher_exact
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.common.statistics import wilson_interval
 from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.sealed_set import Share
 from armlab.concealed.setup.plan import SetupCase
 
 MAX_CLASS = 3  # names
@@ -45,22 +45,6 @@ class SetupOutcome:
     physics: int
     physics_right: int
     gravity_off: float | None
-
-
-@dataclass(frozen=True)
-class Share:
-    """A share with its 95 % interval (Wilson 1927)."""
-
-    name: str
-    hits: int
-    number: int
-
-    @property
-    def text(self) -> str:
-        """Share, interval and counts."""
-        low, high = wilson_interval(self.hits, self.number)
-        share = f"{self.hits / self.number:.1%}" if self.number else "-"
-        return f"{share} ({low:.1%} to {high:.1%}), {self.hits} of {self.number}"
 
 
 def score_setup(work: Path, names: Sequence[str], results: Path) -> tuple[list[Share], list[SetupOutcome]]:
