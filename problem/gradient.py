@@ -3,7 +3,8 @@
 Two steps: how the motion changes with the numbers of the trajectory, and how the singular values change with the
 motion.
 
-A joint-space series is linear in its numbers. A Cartesian path is too, and the joints follow it by
+A joint-space series is linear in its numbers; the map of the feasible search space in front of it has derivatives of
+its own (`problem/feasible.py`). A Cartesian path is linear in its numbers, too, and the joints follow it by
 dQ = J dq, differentiated twice in time; so no formula of the inverse kinematics is differentiated here.
 
 The observation matrix is linear in the accelerations, quadratic in the velocities, and in the position of
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from problem.arm import Arm
+from problem.feasible import FeasibleFourier
 from problem.motion import Motion
 from problem.regressor import observation_matrix
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
@@ -35,9 +37,12 @@ def tangents(trajectory: Trajectory, motion: Motion, point: Array, times: Array)
     """Derivatives of a motion with respect to the numbers of its point, (3, dimension, samples, joints).
 
     motion: (samples, joints), that of the point (dimension,) at `times` (samples,), s. The three are for
-    positions, velocities and accelerations. For a Cartesian path they hold within reach and away from
+    positions, velocities and accelerations. In the feasible search space they are those of one side of a kink. For a
+    Cartesian path they hold within reach and away from
     singular postures. Raises ValueError for another family of trajectories.
     """
+    if isinstance(trajectory, FeasibleFourier):
+        return _mapped_tangents(trajectory, point, times)
     if isinstance(trajectory, JointFourier):
         return _linear_tangents(trajectory, times.tobytes())
     if isinstance(trajectory, CartesianFourier):
@@ -50,6 +55,13 @@ def _linear_tangents(trajectory: JointFourier, instants: bytes) -> Array:
     times, dimension = np.frombuffer(instants), len(trajectory.lower)
     moved = trajectory.motions(np.eye(dimension), times).motion
     return np.stack([moved.position, moved.velocity, moved.acceleration])
+
+
+def _mapped_tangents(trajectory: FeasibleFourier, point: Array, times: Array) -> Array:
+    straight, slopes = _linear_tangents(trajectory.series, times.tobytes()), trajectory.jacobian(point)
+    joints, terms, _ = slopes.shape
+    each = straight.reshape(3, joints, terms, len(times), joints)
+    return np.asarray(np.einsum("ojktl,jkn->ojntl", each, slopes)).reshape(straight.shape)
 
 
 def _path_tangents(trajectory: CartesianFourier, motion: Motion, point: Array, times: Array) -> Array:

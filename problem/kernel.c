@@ -258,6 +258,34 @@ void series(int64_t trajectories, int64_t samples, int joints, int terms, const 
             }
 }
 
+INLINE V blend(I where, V chosen, V other) { return (V)(((I)chosen & where) | ((I)other & ~where)); }
+
+/* Lowest and highest of sums of basis functions, (trajectories, joints, 2), of the sum over k of
+ * coefficients (trajectories, joints, terms) * basis (terms, samples); samples: a multiple of eight. */
+FOR_EACH_PROCESSOR
+void series_extremes(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
+                     const double *coefficients, double *out) {
+    for (int64_t p = 0; p < trajectories * joints; p++) {
+        const double *c = coefficients + p * terms;
+        V low = {0}, high = {0};
+        for (int64_t s = 0; s < samples; s += LANES) {
+            V sum = {0}, value;
+            for (int k = 0; k < terms; k++) {
+                memcpy(&value, basis + k * samples + s, sizeof value);
+                sum += value * c[k];
+            }
+            low = s ? blend(sum < low, sum, low) : sum;
+            high = s ? blend(sum > high, sum, high) : sum;
+        }
+        double lowest = low[0], highest = high[0];
+        for (int l = 1; l < LANES; l++) {
+            lowest = low[l] < lowest ? low[l] : lowest;
+            highest = high[l] > highest ? high[l] : highest;
+        }
+        out[2 * p] = lowest, out[2 * p + 1] = highest;
+    }
+}
+
 /* Peaks of each joint of each trajectory: lowest and highest position, largest speed and acceleration;
  * (trajectories, joints, 4). */
 FOR_EACH_PROCESSOR

@@ -22,6 +22,8 @@ void torques(int joints, const JointData *data, const double *gravity, int64_t s
     const double *qd, const double *qdd, const double *parameters, double *out);
 void series(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
     const double *coefficients, double *out);
+void series_extremes(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
+    const double *coefficients, double *out);
 void peaks(int64_t trajectories, int64_t samples, int joints, const double *q, const double *qd,
     const double *qdd, double *out);
 """

@@ -16,6 +16,7 @@ from problem.arm import Arm, Limits
 from problem.base_parameters import BaseParameters, base_parameters
 from problem.contract import Problem
 from problem.excitation import ExcitationProblem, FeasibilityRules, Penalty, ShiftedProblem, shift_randomly
+from problem.feasible import FeasibleFourier
 from problem.fitness import Criterion
 from problem.functions import FUNCTIONS, TestFunction
 from problem.inverse_kinematics import planar_arm
@@ -253,23 +254,32 @@ class PaperSettings(ExcitationSettings):
         )
 
 
+SearchSpace = Literal["coefficients", "feasible"]
+
+
 class JointFourierSettings(ExcitationSettings):
     """Finite Fourier series in joint space, five harmonics (Swevers 1997).
 
     coefficient_limit: of a_k and b_k, rad/s, one number or one a joint; the speed limit shared among the
-    harmonics if left out. rest: start and end at rest. No acceleration limit is published: 40 rad/s2.
+    harmonics if left out. rest: start and end at rest. search_space: `coefficients` as they are, or `feasible`, where
+    every point keeps the limits of position, velocity and acceleration. No acceleration limit is published: 40 rad/s2.
     """
 
     preset: Literal["joint-fourier"] = "joint-fourier"
     harmonics: Count = 5
     rest: bool = False
     coefficient_limit: PerJoint | None = None
+    search_space: SearchSpace = "coefficients"
     limits: JointLimitSettings = JointLimitSettings()
 
     title: ClassVar[str] = "joint-fourier"
 
-    def trajectory(self, arm: Arm) -> JointFourier:
-        """The series for every joint of the arm."""
+    def trajectory(self, arm: Arm) -> JointFourier | FeasibleFourier:
+        """The series for every joint of the arm, in its search space."""
+        series = self._series(arm)
+        return series if self.search_space == "coefficients" else FeasibleFourier(series, self.limits.of(arm))
+
+    def _series(self, arm: Arm) -> JointFourier:
         if self.rest and self.harmonics < 2:
             raise InputError("rest: true needs at least two harmonics")
         lower, upper = np.array([limit.position for limit in self.limits.of(arm)]).T

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
+from problem.arm import Limits
+from problem.feasible import FeasibleFourier
 from problem.fitness import Criterion
 from problem.gradient import SpectralFunction, motion_of, spectral_gradient_along, tangents
 from problem.motion import Motion
@@ -56,7 +58,7 @@ class LimitRows:
     """Distances of positions, velocities and accelerations at all samples to their limits.
 
     First to the upper limits, then to the lower ones, in units of half of the range between the two; infinite where
-    there is no limit.
+    there is no limit, or where the search space keeps it.
     """
 
     problem: "ExcitationProblem"
@@ -77,6 +79,8 @@ class LimitRows:
     def _limits(self) -> tuple[Array, Array, Array]:
         """Lower and upper limits and half of the range (1 where there is none), (3, 1, joints) each."""
         limits = self.problem.constraints.limits
+        if isinstance(self.problem.trajectory, FeasibleFourier):  # kept by construction: nothing is left to be watched
+            limits = (Limits(),) * len(limits)
         rates = np.array([[limit.velocity, limit.acceleration] for limit in limits]).T
         low = np.vstack([[limit.position[0] for limit in limits], -rates])[:, None]
         high = np.vstack([[limit.position[1] for limit in limits], rates])[:, None]

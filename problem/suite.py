@@ -11,7 +11,7 @@ from pydantic import Field, field_validator
 from armlab.common.errors import InputError
 from armlab.common.settings import Settings, read_yaml, suggest_name, validate
 from problem.excitation import ExcitationProblem, ShiftedProblem
-from problem.presets import JointFourierSettings, PaperSettings, PenaltyOrRules
+from problem.presets import JointFourierSettings, PaperSettings, PenaltyOrRules, SearchSpace
 
 SUITE_FOLDER = Path(__file__).parent / "suites"
 Definition = Annotated[PaperSettings | JointFourierSettings, Field(discriminator="preset")]
@@ -24,10 +24,11 @@ class SuiteFile(Settings):
 
 
 class InstanceSettings(Settings):
-    """A problem of a suite by its full name; only its penalty can be chosen."""
+    """A problem of a suite by its full name; only its penalty and, in joint space, its search space can be chosen."""
 
     preset: str
     penalty: PenaltyOrRules | None = None
+    search_space: SearchSpace | None = None
 
     @field_validator("preset")
     @classmethod
@@ -38,9 +39,10 @@ class InstanceSettings(Settings):
     def build(self) -> ExcitationProblem | ShiftedProblem:
         """The problem, under its full name."""
         definition = definition_of(self.preset)
-        if self.penalty is not None:
-            definition = definition.model_copy(update={"penalty": self.penalty})
-        problem = definition.build()
+        chosen = {name: value for name, value in dict(self).items() if name != "preset" and value is not None}
+        if "search_space" in chosen and not isinstance(definition, JointFourierSettings):
+            raise InputError(f"search_space: '{self.preset}' is no series in joint space, so it should be left out")
+        problem = definition.model_copy(update=chosen).build()
         return dataclasses.replace(problem, name=self.preset)
 
 

@@ -130,7 +130,7 @@ class JointFourier:
 
     def motions(self, points: Array, times: Array) -> Excitation:
         """Motions (points, samples, joints) of points (points, dimension) at `times` (samples,), s."""
-        basis = _joint_basis(self.duration, self.harmonics, self.rest, times.tobytes())
+        basis = self.basis(times)
         coefficients = points.reshape(len(points), len(self.centre), basis.shape[-1])
         motion = Motion(
             position=series(basis[0], coefficients),
@@ -138,6 +138,10 @@ class JointFourier:
             acceleration=series(basis[2], coefficients),
         )
         return Excitation(motion, np.zeros(len(points)))
+
+    def basis(self, times: Array) -> Array:
+        """What one joint's numbers are multiplied by: q and its two derivatives at `times`, (3, samples, 2 N + 1)."""
+        return _joint_basis(self.duration, self.harmonics, self.rest, times.tobytes())
 
     def _box(self, sign: float) -> Array:
         rows = np.repeat(self.coefficient_limit[:, None], 2 * self.free_harmonics, axis=1)

@@ -87,7 +87,7 @@ def test_a_problem_of_a_suite_takes_another_way_to_treat_constraints_and_nothing
     ruled, penalised = built(name, penalty="feasibility_rules"), built(name)
     points = np.random.default_rng(0).uniform(ruled.lower, ruled.upper, (40, len(ruled.lower)))
     np.testing.assert_array_equal(ruled.evaluate(points).value, penalised.evaluate(points).value)
-    assert refusal(built, name, harmonics=3) == "unknown key 'harmonics' in test: known: preset, penalty"
+    assert refusal(built, name, harmonics=3) == "unknown key 'harmonics' in test: known: preset, penalty, search_space"
 
 
 def test_names_of_presets_leave_the_problems_of_suites_out() -> None:
