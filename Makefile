@@ -6,7 +6,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study tune best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -51,6 +51,9 @@ paper: .venv/run ## all tables and figures of the paper, and what of it holds: r
 
 study: .venv/run ## the comparison where the paper stops: results/study/
 	$(BIN)/armlab study
+
+search-space: .venv/run ## what a search space within all limits does for each algorithm: results/search_space/
+	$(BIN)/armlab search-space
 
 tune: .venv/dev ## every algorithm tuned with the same budget, judged on problems that took no part: results/tune/
 	$(BIN)/armlab tune

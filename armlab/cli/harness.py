@@ -109,6 +109,19 @@ def study(**options: Any) -> Iterator[str]:
     return _make_study(make_study, describe_study, **options)
 
 
+@click.command("search-space")
+@partial(_run_options, results="results/search_space")
+@prints_lines
+def search_space(**options: Any) -> Iterator[str]:
+    """Compare the feasible search space with the coefficients.
+
+    Every algorithm in both, and what the feasible one gives up of the best known: configs/search_space.yaml.
+    """
+    from bench.studies.search_space.study import describe_search_space, make_search_space
+
+    return _make_study(make_search_space, describe_search_space, **options)
+
+
 def _make_study(make: Callable[..., Any], describe: Callable[..., Any], dry_run: bool, **options: Any) -> Iterator[str]:
     configs, settings = Path("configs"), _read_run_options(**options)
     records = Path("results/best_known.json")

@@ -51,6 +51,7 @@ _GROUPS = {
         "figure3": "armlab.cli.harness:figure3",
         "paper": "armlab.cli.harness:paper",
         "study": "armlab.cli.harness:study",
+        "search-space": "armlab.cli.harness:search_space",
         "does-it-help": "armlab.cli.harness:does_it_help",
     },
     "Proof": {

@@ -118,7 +118,12 @@ def _record_text(record: Record) -> str:
     return "{\n" + ",\n".join(f"  {json.dumps(key)}: {json.dumps(entry)}" for key, entry in entries) + "\n }"
 
 
-_IGNORED_SETTINGS = ("criterion", "penalty", "frame_seed", "search_space")  # a trajectory's value and limits stay as they are
+_IGNORED_SETTINGS = (
+    "criterion",
+    "penalty",
+    "frame_seed",
+    "search_space",
+)  # a trajectory's value and limits stay as they are
 
 
 def record_key(settings: ProblemSettings) -> str:
