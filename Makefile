@@ -86,7 +86,7 @@ prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged
 prove-quick: .venv/dev ## the same with 24 cases of a development seed, not logged
 	$(BIN)/armlab prove --quick --results .armlab/proof-quick
 
-speed: .venv/dev ## how fast, beside Pinocchio, mealpy, pygmo and scipy: results/speed.json and .md
+speed: .venv/dev ## how fast, beside Pinocchio, CasADi, mealpy, pygmo and scipy: results/speed.json and .md
 	$(BIN)/armlab speed
 
 # --- documentation

@@ -1,5 +1,6 @@
 """How good an excitation is: condition number, eq. 44, D- and E-optimality of its observation matrix."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -59,10 +60,11 @@ def singular_values(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_co
         lengths = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
         lengths = np.where(lengths > 0, lengths, 1.0)
         gram = gram / (lengths[:, :, None] * lengths[:, None, :])
-    finite = np.asarray(np.isfinite(gram.sum(axis=(1, 2))))
-    squares = np.linalg.eigvalsh(np.where(finite[:, None, None], gram, 0.0))[:, ::-1]
-    values = np.sqrt(np.maximum(squares, 0.0))
-    for point in np.flatnonzero(finite & (values[:, 0] > MAX_GRAM_CONDITION * values[:, -1])):
+    if not math.isfinite(gram.sum()):  # rare, so the points are not looked at one by one before
+        finite = np.asarray(np.isfinite(gram.sum(axis=(1, 2))))
+        gram = np.where(finite[:, None, None], gram, 0.0)
+    values: Array = np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[:, ::-1], 0.0))
+    for point in np.flatnonzero(values[:, 0] > MAX_GRAM_CONDITION * values[:, -1]):
         values[point] = _singular_values_of_matrix(arm, motion.select(point), columns, unit_columns)
     return values
 

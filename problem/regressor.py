@@ -4,6 +4,7 @@ The torque is the moment (force) of each link's wrench projected on the joint's 
 takes the z-component in the link's frame instead; with standard D-H frames the axis is z of the frame before.
 """
 
+import math
 from dataclasses import replace
 from functools import lru_cache
 
@@ -44,7 +45,7 @@ def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
     out = np.empty((*motion.batch, len(columns), len(columns)))
     scratch = np.empty(LANES * (len(columns) ** 2 + 1))
     chosen, first = _check_columns(np.asarray(columns, dtype=np.int32).tobytes(), joints)
-    trajectories = int(np.prod(motion.batch, dtype=int))
+    trajectories = math.prod(motion.batch)
     lib.gram_matrices(
         joints,
         *_kernel_data(arm),

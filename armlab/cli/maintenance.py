@@ -15,7 +15,8 @@ from armlab.common.documents import ResultLines, written_files
 def speed(results: Path) -> ResultLines:
     """Measure speed beside that of other packages.
 
-    The others are Pinocchio, mealpy, pygmo and scipy (extras `engines`, `peers`). Writes speed.json and speed.md.
+    The others are Pinocchio, CasADi, mealpy, pygmo and scipy (extras `engines`, `derivatives`, `peers`). Writes
+    speed.json and speed.md. Needs a C compiler.
     """
     from bench.studies.speed.report import write_speed_report
 

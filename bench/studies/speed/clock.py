@@ -1,4 +1,4 @@
-"""Fair timing on a noisy machine: the competitors take turns, and medians are compared."""
+"""Fair timing on a busy machine: the competitors take turns, processor time counts, and medians are compared."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ Task = Callable[[], object]
 
 
 def median_seconds(tasks: Mapping[str, Task], rounds: int, calls: int = 1) -> dict[str, float]:
-    """Median seconds of one call of each task; in each round every task has its turn of `calls` calls.
+    """Median processor seconds of one call of each task; in each round every task has its turn of `calls` calls.
 
     Each task is called once before the clock starts, so that compilation and caches do not count.
     """
@@ -17,8 +17,8 @@ def median_seconds(tasks: Mapping[str, Task], rounds: int, calls: int = 1) -> di
     taken: dict[str, list[float]] = {name: [] for name in tasks}
     for _ in range(rounds):
         for name, task in tasks.items():
-            started = time.perf_counter()
+            started = time.process_time()
             for _ in range(calls):
                 task()
-            taken[name].append((time.perf_counter() - started) / calls)
+            taken[name].append((time.process_time() - started) / calls)
     return {name: median(seconds) for name, seconds in taken.items()}

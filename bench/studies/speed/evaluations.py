@@ -1,9 +1,11 @@
-"""The speed of evaluations: from motions to the condition number beside Pinocchio with numpy, whole evaluations of a
-problem, and how their time grows.
+"""The speed of evaluations: from motions to the condition number beside Pinocchio with numpy and beside compiled C code
+of CasADi, whole evaluations of a problem, and how their time grows.
 """
 
+import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,7 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.derivatives import Question
+from bench.studies.speed.casadi_regressor import compile_regressor
 from bench.studies.speed.clock import median_seconds
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
@@ -26,28 +29,72 @@ PIPELINE_ROUNDS = 15
 PINOCCHIO_ORDER = (0, 1, 2, 3, 4, 6, 9, 5, 7, 8)  # m, mc, Ixx Ixy Iyy Ixz Iyz Izz: where each of eq. 31 stands
 
 
-def compare_with_pinocchio(arm_name: str = "irb120-arm") -> dict[str, float]:
-    """Microseconds a trajectory of both pipelines, their ratio, and how far their results are apart.
+REFERENCE = "Pinocchio regressor, numpy.linalg.cond, one at a time"
 
-    Both take the same population of random motions on one core. Pinocchio's pipeline: its regressor for each
-    sample, the base columns of the stack, `numpy.linalg.cond`.
+
+@dataclass(frozen=True)
+class PipelineFigures:
+    """From motions to condition numbers in several ways, on the same random motions.
+
+    us: microseconds a trajectory by pipeline. results_apart: largest relative difference of the condition numbers from
+    Pinocchio's. matrices_apart: largest difference of an entry of CasADi's observation matrix from Pinocchio's,
+    relative to the largest entry.
+    """
+
+    joints: int
+    us: dict[str, float]
+    results_apart: float
+    matrices_apart: float
+
+    @property
+    def ratios(self) -> dict[str, float]:
+        """How many times as fast as Pinocchio with numpy each pipeline is."""
+        return {name: self.us[REFERENCE] / taken for name, taken in self.us.items()}
+
+
+def compare_pipelines(arm_name: str, rounds: int = PIPELINE_ROUNDS) -> PipelineFigures:
+    """armlab, CasADi's generated C code and Pinocchio with numpy, on one core, taking turns.
+
+    Pinocchio: its regressor for each sample, the base columns of the stack, `numpy.linalg.cond`. CasADi: see
+    `casadi_regressor`; behind it `numpy.linalg.cond`, or the eigenvalues of the Gram matrix as armlab takes them.
     """
     arm = with_joint_frames(load_arm(arm_name))
     motion = random_motions(arm, POPULATION_SIZE, PIPELINE_SAMPLES)
+    singles = [motion.select(np.arange(POPULATION_SIZE) == number) for number in range(POPULATION_SIZE)]
     columns = base_parameters(arm).columns
-    ours, theirs = _armlab_task(arm, motion, columns), _pinocchio_task(arm, motion, columns)
-    single = _armlab_task(arm, motion.select(np.arange(POPULATION_SIZE) == 0), columns)
-    seconds = median_seconds({"armlab": ours, "single": single, "pinocchio": theirs}, PIPELINE_ROUNDS)
-    armlab = 1000000.0 * seconds["armlab"] / POPULATION_SIZE
-    pinocchio = 1000000.0 * seconds["pinocchio"] / POPULATION_SIZE
-    return {
-        "armlab_us": armlab,
-        "armlab_one_at_a_time_us": 1e6 * seconds["single"],
-        "pinocchio_us": pinocchio,
-        "ratio_to_pinocchio": pinocchio / armlab,
-        "ratio_to_pinocchio_one_at_a_time": pinocchio / (1e6 * seconds["single"]),
-        "largest_relative_difference": float(np.max(np.abs(ours() / theirs() - 1.0))),
+    with tempfile.TemporaryDirectory() as folder:
+        observe = compile_regressor(arm, columns, Path(folder))
+    stack = _pinocchio_stack(arm, columns)
+
+    def each(condition: Callable[[Motion], Array]) -> Callable[[], Array]:
+        return lambda: np.concatenate([condition(single) for single in singles])
+
+    def of_armlab(some: Motion) -> Array:
+        return condition_number(singular_values(arm, some, columns, unit_columns=False))
+
+    tasks: dict[str, Callable[[], Array]] = {
+        "armlab, population of 50": lambda: of_armlab(motion),
+        "armlab, one at a time": each(of_armlab),
+        "CasADi in C, Gram matrix, population of 50": lambda: _gram_condition(observe(motion)),
+        "CasADi in C, Gram matrix, one at a time": each(lambda single: _gram_condition(observe(single))),
+        "CasADi in C, numpy.linalg.cond, one at a time": each(lambda single: np.linalg.cond(observe(single))),
+        REFERENCE: each(lambda single: np.linalg.cond(stack(single)[None])),
     }
+    seconds = median_seconds(tasks, rounds)
+    found = {name: task() for name, task in tasks.items()}
+    theirs = stack(singles[0])
+    return PipelineFigures(
+        joints=len(arm),
+        us={name: 1e6 * taken / POPULATION_SIZE for name, taken in seconds.items()},
+        results_apart=max(float(np.abs(values / found[REFERENCE] - 1).max()) for values in found.values()),
+        matrices_apart=float(np.abs(observe(singles[0])[0] - theirs).max() / np.abs(theirs).max()),
+    )
+
+
+def _gram_condition(matrices: Array) -> Array:
+    """Condition numbers (points,) of matrices (points, rows, columns) from the eigenvalues of their Gram matrices."""
+    squares = np.linalg.eigvalsh(np.swapaxes(matrices, 1, 2) @ matrices)
+    return np.asarray(np.sqrt(squares[:, -1] / squares[:, 0]))
 
 
 def with_joint_frames(arm: Arm) -> Arm:
@@ -66,24 +113,20 @@ def random_motions(arm: Arm, trajectories: int, samples: int) -> Motion:
     return Motion(*(rng.uniform(-2, 2, (trajectories, samples, len(arm))) for _ in range(3)))
 
 
-def _armlab_task(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Callable[[], Array]:
-    return lambda: condition_number(singular_values(arm, motion, columns, unit_columns=False))
-
-
-def _pinocchio_task(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Callable[[], Array]:
+def _pinocchio_stack(arm: Arm, columns: NDArray[np.intp]) -> Callable[[Motion], Array]:
+    """Pinocchio's observation matrix (samples * joints, chosen) of one motion (1, samples, joints)."""
     import pinocchio
 
     model = _pinocchio_model(arm)
     data = model.createData()
     chosen = [10 * (column // 10) + PINOCCHIO_ORDER[column % 10] for column in columns]
 
-    def condition(q: Array, v: Array, a: Array) -> float:
+    def stack(motion: Motion) -> Array:
         regressor = pinocchio.computeJointTorqueRegressor
-        rows = [regressor(model, data, *state).copy() for state in zip(q, v, a, strict=True)]
-        return float(np.linalg.cond(np.vstack(rows)[:, chosen]))
+        states = zip(motion.position[0], motion.velocity[0], motion.acceleration[0], strict=True)
+        return np.asarray(np.vstack([regressor(model, data, *state).copy() for state in states])[:, chosen])
 
-    trajectories = list(zip(motion.position, motion.velocity, motion.acceleration, strict=True))
-    return lambda: np.array([condition(*trajectory) for trajectory in trajectories])
+    return stack
 
 
 def _pinocchio_model(arm: Arm) -> Any:
