@@ -11,7 +11,7 @@ from datetime import date
 
 import numpy as np
 
-from armlab.common.errors import InputError
+from armlab.common.errors import DataError, InputError
 from armlab.common.notebook import notebook_html
 from armlab.diagnosis.compare.changes import ChangeTable, Tested, make_table
 from armlab.diagnosis.compare.named import NamedChange, list_table, name_changes
@@ -116,7 +116,10 @@ def compare_diagnosed(
     if failed is not None:
         return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.summary}")
     progress("putting the recordings on one table")
-    pooled = pool_recordings(recordings, diagnoses, read_simulation(recordings[0], baseline), Settings())
+    try:
+        pooled = pool_recordings(recordings, diagnoses, read_simulation(recordings[0], baseline), Settings())
+    except DataError as error:
+        return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
     progress("looking for changes")
     table = make_table(pooled)
     found = find_sound_changes(pooled, table)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.diagnosis.blocks import block_numbers
 from armlab.diagnosis.columns import Block, Place, place_of
 from armlab.diagnosis.data import Observed, observe
@@ -135,10 +136,17 @@ class Pooled:
 def pool_recordings(
     recordings: Sequence[Recording], diagnoses: Sequence[Diagnosis], simulation: Simulation, settings: Settings
 ) -> Pooled:
-    """The recordings on one table. diagnoses: of each; simulation: what the columns are deviations from."""
+    """The recordings on one table. diagnoses: of each; simulation: what the columns are deviations from.
+
+    Raises DataError where no run has a joint in motion for long enough.
+    """
     runs = [run for number, each in enumerate(recordings) for run in _labelled_runs(each, number)]
     owner = tuple(number for number, each in enumerate(recordings) for _ in each.runs)
     observed = observe(runs, simulation.arm, simulation.inertial, settings)
+    short = [joint + 1 for joint in range(observed.joints) if not observed.used(joint)]
+    if short:
+        least = observed.min_segment_rows / observed.rate_hz
+        raise DataError(f"joint {short[0]} is never in motion for {least:.2g} s on end: record longer runs")
     bare = build_design_matrix(observed, simulation, base_parameters(simulation.arm), None, settings)
     found = unite_candidates(diagnoses)
     design = _with_candidates(bare, [*found, *_usual_beside(bare, found)])
