@@ -1,11 +1,12 @@
 """Tables as Markdown and LaTeX, and Markdown pages."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 
-def markdown_table(headings: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A Markdown table; a vertical bar in a cell is escaped."""
-    return "\n".join(_table_line(line) for line in (headings, ["---"] * len(headings), *rows))
+def markdown_table(headings: Sequence[str], rows: Iterable[Sequence[object]], numbers: Collection[int] = ()) -> str:
+    """A Markdown table; a vertical bar in a cell is escaped. numbers: columns that stand on the right."""
+    marks = ["---:" if place in numbers else "---" for place in range(len(headings))]
+    return "\n".join(_table_line(line) for line in (headings, marks, *rows))
 
 
 def markdown_page(title: str, *parts: str) -> str:

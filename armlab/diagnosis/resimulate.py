@@ -20,6 +20,11 @@ from problem.base_parameters import base_parameters
 from problem.motion import Motion
 from problem.regressor import observation_matrix, rigid_body_torque
 
+NO_INERTIA = (
+    "the recorded motion does not determine the mass of every link well enough; with the fitted links some joint would "
+    "have no inertia of its own"
+)
+
 
 class NoInertiaError(DataError):
     """Inertial parameters that give no positive definite inertia matrix somewhere: nothing can be simulated."""
@@ -40,7 +45,7 @@ class Body:
         """
         matrices = self._with_bias(position, np.zeros_like(position))[0]
         if not self.is_positive_definite(matrices):
-            raise NoInertiaError("the inertia matrix of the fitted links is not positive definite along this motion")
+            raise NoInertiaError(NO_INERTIA)
         return matrices
 
     def is_positive_definite(self, matrices: Array) -> bool:
@@ -48,9 +53,12 @@ class Body:
         return bool(np.all(np.linalg.eigvalsh(matrices)[..., 0] > 0))
 
     def acceleration(self, position: Array, velocity: Array, torque: Array) -> Array:
-        """Joint accelerations (states, joints) under torques (states, joints), gravity included."""
+        """Joint accelerations (states, joints) under torques (states, joints), gravity included; NoInertiaError."""
         matrices, bias = self._with_bias(position, velocity)
-        return np.asarray(np.linalg.solve(matrices, (torque - bias)[..., None])[..., 0])
+        try:
+            return np.asarray(np.linalg.solve(matrices, (torque - bias)[..., None])[..., 0])
+        except np.linalg.LinAlgError:
+            raise NoInertiaError(NO_INERTIA) from None
 
     def _with_bias(self, position: Array, velocity: Array) -> tuple[Array, Array]:
         """Inertia matrices, and the torque without acceleration: one column a unit acceleration, all in one batch."""

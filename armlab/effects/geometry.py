@@ -10,7 +10,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.effects.contract import ANGLE, Candidate, Effect, Family, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import GEOMETRY_STEP, directional_derivative, geometry_derivative, gravity_derivative
-from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
+from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_less, format_number
 from problem.arm import Arm, Joint
 from problem.motion import Motion
 from problem.transforms import rotation_x, translation
@@ -163,7 +163,7 @@ class EncoderOffset(Term):
         return {"offset": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        return f"q_{self.joint} = recorded - {format_number(coefficients[0])}"
+        return f"q_{self.joint} = {format_less('recorded', coefficients[0])}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:

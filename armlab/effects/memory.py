@@ -31,7 +31,15 @@ from armlab.effects.friction import (
     mean_within_samples,
     positions_within_samples,
 )
-from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number, joint_moves, top_speed
+from armlab.effects.term import (
+    EveryJoint,
+    Term,
+    form_from_parameters,
+    format_less,
+    format_number,
+    joint_moves,
+    top_speed,
+)
 from problem.arm import Arm
 
 WARMING_TIMES_SEEN = Range(
@@ -358,7 +366,7 @@ class ThermometerFriction(Drift):
 
     def _warming(self) -> str:
         low, high = self.span
-        return f"(T - {format_number(low)})/{format_number(high - low)}"
+        return f"({format_less('T', low)})/{format_number(high - low)}"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:

@@ -141,6 +141,12 @@ def format_number(value: float) -> str:
     return f"{value:.4g}"
 
 
+def format_less(what: str, value: float, unit: str = "") -> str:
+    """`t - 0.0005 s`, and `t + 0.0005 s` of a negative value."""
+    sign = "+" if value < 0 else "-"
+    return f"{what} {sign} {format_number(abs(value))}{' ' + unit if unit else ''}"
+
+
 def format_sum(*terms: tuple[float, str]) -> str:
     """`2 sgn(qd_1) - 0.5 qd_1` of coefficients and what they multiply."""
     text = " ".join(

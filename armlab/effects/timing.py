@@ -12,7 +12,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate, Effect, Family, Parameter, Range, Scene, Value
 from armlab.effects.sensitivity import delay_signal, directional_derivative
-from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_number
+from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_less
 from problem.arm import Arm
 from problem.motion import Motion
 
@@ -96,7 +96,7 @@ class TimeDelay(LateTorque):
         return cls(None, (), tuple(range(len(arm))), **details)
 
     def equation(self, coefficients: Array) -> str:
-        return f"tau(t) = tau_model(t - {format_number(coefficients[0])} s)"
+        return f"tau(t) = tau_model({format_less('t', coefficients[0], 's')})"
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class TorqueSkew(LateTorque):
     form = "torque"
 
     def equation(self, coefficients: Array) -> str:
-        return f"tau_{self.joint}(t) = tau_model_{self.joint}(t - {format_number(coefficients[0])} s)"
+        return f"tau_{self.joint}(t) = tau_model_{self.joint}({format_less('t', coefficients[0], 's')})"
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class PositionSkew(Term):
         return {"seconds": float(coefficients[0])}
 
     def equation(self, coefficients: Array) -> str:
-        return f"q_{self.joint}(t) = q_recorded_{self.joint}(t - {format_number(coefficients[0])} s)"
+        return f"q_{self.joint}(t) = q_recorded_{self.joint}({format_less('t', coefficients[0], 's')})"
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:

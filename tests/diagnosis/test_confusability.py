@@ -93,7 +93,7 @@ def test_tables_tell_the_same_as_the_card(card: Card) -> None:
     rows = list(csv.DictReader(io.StringIO(card_csv(card))))
     told = {(row["effect"], row["joint"], row["rival"]) for row in rows if row["view"] == "nominal" and row["rival"]}
     assert len(told) == len({(e.effect, e.joint, r.index) for e in card.entries for r in e.rivals["nominal"]})
-    assert card_markdown(card).count("\n| ") == 2 * (len(card.entries) + 1)
+    assert card_markdown(card).count("\n| ") == 2 * (len(card.entries) + 2)
     assert any("a refit hides" in line and "rotor_inertia 1" in line for line in card_lines(card))
 
 

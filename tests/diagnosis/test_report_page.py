@@ -1,6 +1,7 @@
 """The report as its reader has it: in Chromium on a desk, on a phone and on paper, without network or script."""
 
 import json
+import re
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -15,24 +16,30 @@ from told_recordings import frame, recording_in
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
-from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.report.charts import (
+from armlab.common.report import palette
+from armlab.common.report.charts import (
     FLOOR_LOOK,
     FOUND_LOOK,
     GIVEN_LOOK,
     MEASURED_LOOK,
     REFITTED_LOOK,
-    UNKNOWN_COLOR,
 )
+from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.report.content import finding_details
+from armlab.diagnosis.report.gallery import draw_gallery
+from armlab.diagnosis.report.measured import body_sentences, format_measured, joint_table
 from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
 from armlab.diagnosis.report.torque_pictures import evidence_variable
-from armlab.diagnosis.report.words import verdict_lines
+from armlab.diagnosis.report.words import format_gap, verdict_lines
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts
 from armlab.effects.contract import Effect
 from armlab.effects.friction import CoulombFriction
+from armlab.effects.parameters import ParameterValue
+from armlab.effects.timing import TimeDelay
 from armlab.recordings.load import load_recording
+from problem.robot_file import load_arm
 
 HOSTILE = "x<script>alert(1)<!script>\"&'<img src=y onerror=alert(2)>"
 ARM_FILE = Path(__file__).parents[2] / "problem" / "robots" / "irb120-arm.yaml"
@@ -153,7 +160,7 @@ def test_the_verdict_stands_in_two_sentences_with_the_joint_and_the_gain(browser
 def test_every_finding_has_its_equation_numbers_and_evidence(found: Diagnosis, texts: dict[str, str]) -> None:
     page = texts["report.html"]
     assert found.claims
-    assert page.count('<article class="finding">') == len(found.claims)
+    assert page.count('<details class="finding">') == len(found.claims)
     for claim in found.claims:
         assert f"<code>{claim.equation}</code>" in page
     assert page.count("fitted law") >= len(found.claims)
@@ -179,7 +186,75 @@ def test_an_effect_of_a_user_is_drawn_against_its_own_axis(found: Diagnosis, axi
 
 
 def test_the_page_repeats_the_command(texts: dict[str, str]) -> None:
-    assert "armlab diagnose &#x27;a b&#x27; --out c" in texts["report.html"]
+    assert "armlab diagnose &#39;a b&#39; --out c" in texts["report.html"]
+
+
+def test_details_are_folded_and_the_largest_share_of_the_error_comes_first(found: Diagnosis) -> None:
+    data = select_residuals(found)
+    assert data is not None
+    shares = [float(each.share.removesuffix(" %")) for each in finding_details(found, draw_gallery(found, data))]
+    assert shares == sorted(shares, reverse=True)
+    page = report_texts(found)["report.html"]
+    assert page.index('id="next"') < page.index('id="details"') < page.index('<details class="finding">')
+    assert "<details open" not in page
+
+
+def test_the_first_screen_has_a_row_a_joint_with_its_friction_units_and_intervals(found: Diagnosis) -> None:
+    table = joint_table(found)
+    assert table.headings == ["joint", "Coulomb friction", "Viscous friction", "Rotor inertia", "other"]
+    assert len(table.rows) >= len(found.simulation.arm)
+    claim = next(each for each in found.claims if each.effect == "coulomb_friction")
+    (level,) = claim.parameters
+    cell = table.rows[claim.joint - 1][1]
+    assert cell == format_measured(level)
+    assert re.fullmatch(r"\d[\d.]* N m \([\d.]+ to [\d.]+\)", cell)
+
+
+@pytest.mark.parametrize(
+    ("value", "interval", "text"),
+    [
+        (2.0, (1.9976, 2.0031), "2.00 kg (1.998 to 2.003)"),
+        (-0.5, (-0.61, -0.39), "−0.500 kg (−0.6 to −0.4)"),
+        (0.05, None, "0.0500 kg"),
+        (12345.0, (12000.0, 12690.0), "12345 kg (12000 to 12690)"),
+    ],
+)
+def test_a_number_has_three_digits_and_an_interval_as_fine_as_it_is_wide(value: Any, interval: Any, text: str) -> None:
+    assert format_measured(ParameterValue("mass", value, interval, "kg")) == text
+
+
+def test_a_payload_is_told_by_mass_and_centre_in_the_frame_of_its_joint(found: Diagnosis) -> None:
+    numbers = (
+        ParameterValue("mass", 2.0, (1.9976, 2.0031), "kg"),
+        ParameterValue("centre", (-1e-9, 0.02, 0.06), ((-0.002, 0.002), (0.018, 0.022), (0.05, 0.07)), "m"),
+    )
+    claim = replace(found.claims[0], effect="payload", joint=1, joints=(1,), parameters=numbers)
+    (sentence,) = body_sentences(replace(found, claims=(claim,)))
+    assert sentence.startswith("Payload: 2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of j0")
+
+
+def test_words_of_the_field_lead_to_their_meaning_once(texts: dict[str, str]) -> None:
+    page = texts["report.html"]
+    targets = re.findall(r'<a class="word" href="#([\w-]+)"', page)
+    assert "word-noise-floor" in targets
+    assert len(targets) == len(set(targets))
+    assert sorted(targets) == sorted(re.findall(r'<dt id="([\w-]+)"', page))
+
+
+def test_no_more_than_the_whole_gap_is_closed() -> None:
+    assert [format_gap(each) for each in (1.001, 0.5, None)] == ["100.0 %", "50.0 %", "–"]
+
+
+def test_a_shift_back_in_time_has_one_sign() -> None:
+    delay = TimeDelay.at(load_arm("irb120-arm"), 1)
+    assert delay.equation(np.array([-0.0005])) == "tau(t) = tau_model(t + 0.0005 s)"
+
+
+def test_on_paper_the_page_is_short_until_its_details(browser: Any, address: str) -> None:
+    page = browser.new_page()
+    page.goto(address)
+    assert len(re.findall(rb"/Type\s*/Page\b", page.pdf(format="A4"))) <= 4
+    page.close()
 
 
 def test_rivals_say_why_they_cannot_be_told_and_what_would_tell_them(found: Diagnosis) -> None:
@@ -265,6 +340,6 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     texts = report_texts(told)
     assert "surrogate" in texts["figures/finding1_unknown.svg"]
     assert "time from the start of the run, s" in texts["figures/finding1_unknown.svg"]
-    assert UNKNOWN_COLOR in texts["figures/arm.svg"]
+    assert palette.PURPLE in texts["figures/arm.svg"]
     assert "something that no known effect explains at joint 2" in texts["report.html"]
     assert "40 % of the held-out error variance depends on time" in texts["report.html"]

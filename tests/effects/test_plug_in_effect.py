@@ -153,7 +153,8 @@ def test_the_model_file_holds_an_installed_effect_and_predicts_with_it(diagnosed
 
 def test_the_report_shows_an_installed_effect_by_its_title_and_meaning_against_its_axis(diagnosed: Diagnosed) -> None:
     page = (diagnosed.out / "report.html").read_text()
-    article = re.search(r'<article class="finding"><h3>Lip-seal friction at joint 2</h3>.*?</article>', page, re.DOTALL)
+    begin = r'<details class="finding">\s*<summary>Lip-seal friction at joint 2 '
+    article = re.search(rf"{begin}.*?</details>", page, re.DOTALL)
     assert article is not None
     assert lip_seal.LIP_SEAL_FACTS.meaning in article[0]
     assert "Lip-seal friction, joint 2: torque left without it against velocity of joint 2, rad/s" in article[0]

@@ -4,16 +4,36 @@ these files.
 
 import shlex
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from textwrap import wrap
 from typing import Any, get_args
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
+from armlab.common.report import palette
+from armlab.common.report.charts import (
+    FOUND_LOOK,
+    GIVEN_LOOK,
+    LAW_LOOK,
+    Axis,
+    Layer,
+    Line,
+    Look,
+    Points,
+    draw_chart,
+    fit_axis,
+    shorten_text,
+    svg_element,
+    svg_picture,
+    svg_text,
+)
+from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
 from armlab.diagnosis.compare.named import ONE_FACTOR, NamedChange
@@ -31,25 +51,7 @@ from armlab.diagnosis.formats import (
     TrendEntry,
     kind_of_effect,
 )
-from armlab.diagnosis.report import sections
-from armlab.diagnosis.report.charts import (
-    FOUND_LOOK,
-    GIVEN_LOOK,
-    LAW_LOOK,
-    PALE_COLOR,
-    Axis,
-    Layer,
-    Line,
-    Look,
-    Points,
-    draw_chart,
-    fit_axis,
-    shorten_text,
-    svg_element,
-    svg_picture,
-    svg_text,
-)
-from armlab.diagnosis.report.html import bullets, figures, folded_details, html_document, html_table, paragraph, section
+from armlab.diagnosis.report.content import origin_of
 from armlab.diagnosis.report.words import (
     LINE_WIDTH,
     PARAMETER_DIGITS,
@@ -269,49 +271,78 @@ TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit"
 PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 178.0
 MAX_DRAWN_CHANGES = 24
 VALUE_LOOK = Look("value", LAW_LOOK.color, 4.0)
-INTERVAL_LOOK = Look("95 % interval", "#8b929b", 2.0)
+INTERVAL_LOOK = Look("95 % interval", palette.MIDDLE, 2.0)
+
+
+@dataclass(frozen=True)
+class ChangeCard:
+    """A named change: numbers, what it explains, and what else it could be."""
+
+    title: str
+    texts: Sequence[str]
+    numbers: Table
+
+
+@dataclass(frozen=True)
+class TrendPart:
+    """The parameters that move, in words and pictures. days: of the recordings."""
+
+    texts: Sequence[str]
+    pictures: Sequence[Markup]
+    days: str
 
 
 def comparison_page(comparison: Comparison, command: str) -> str:
     """HTML text."""
-    first, second = comparison_sentences(comparison)
     kind = {"changed": "mismatch", "same": "none", "inconclusive": "inconclusive"}[comparison.status]
-    title = f"What changed between {join_words(comparison.names)}"
-    parts = [sections.page_header(title, kind, first, second)]
-    if comparison.named:
-        parts.append(section("changed", "What changed", *(_card(each, comparison.names) for each in comparison.named)))
-    if comparison.trends:
-        parts.append(_trends_section(comparison))
-    if comparison.changes:
-        parts.append(_numbers_section(comparison))
-    if comparison.notes:
-        parts.append(section("notes", "Not used", bullets(comparison.notes)))
-    parts.append(sections.origin_section(comparison.new, command))
-    return html_document(title, parts)
+    changes = comparison.changes
+    return render_page(
+        __package__,
+        "comparison.html",
+        f"What changed between {join_words(comparison.names)}",
+        status=kind,
+        verdict=comparison_sentences(comparison),
+        changed=_named_table(comparison) if comparison.named else None,
+        cards=[_card(each, comparison.names) for each in comparison.named],
+        trends=_trend_part(comparison) if comparison.trends else None,
+        picture=draw_changes(changes) if changes else None,
+        moved=_changes_table([each for each in changes if each.changed]),
+        still=_changes_table([each for each in changes if not each.changed]),
+        notes=comparison.notes,
+        origin=origin_of(comparison.new, command),
+    )
 
 
-def _card(named: NamedChange, names: Sequence[str]) -> str:
-    """One change: numbers, what it explains, and what else it could be."""
+def _named_table(comparison: Comparison) -> Table:
+    """What changed, where and by how much, and what else it could be."""
+    rows = []
+    for each in comparison.named:
+        amounts = "; ".join(_amount(one) for one in each.changes) or each.equation
+        where = place_in_words(each.effect, each.joint, each.joints)
+        rivals = join_words([_rival_phrase(rival) for rival in each.rivals], "or") if each.rivals else "–"
+        rows.append([effect_in_words(each.effect), where, amounts, rivals])
+    return Table(["what", "where", "change, 95 % interval", "it could also be"], rows, (1, 2, 3), stacked=True)
+
+
+def _card(named: NamedChange, names: Sequence[str]) -> ChangeCard:
     rows = [[one.name, one.value, one.interval, one.unit] for each in named.parameters for one in parameter_rows(each)]
     gains = ", ".join(f"{name} {100 * gain:.3g} %" for name, gain in zip(names, named.gains, strict=True))
     rivals = [_rival_phrase(each) for each in named.rivals]
-    texts = [
-        paragraph(f"{named.equation}. Log evidence {named.evidence:.0f}, p {format_probability(named.p_value)}."),
-        paragraph(f"Held-out errors fall by this share of what is left: {gains}."),
-        paragraph(f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well."),
-    ]
-    table = html_table(["change of", "value", "95 % interval", "unit"], rows, (0, 3))
-    return f'<article class="finding"><h3>{change_phrase(named)}</h3>{"".join(texts)}{table}</article>'
+    texts = (
+        f"{named.equation}. Log evidence {named.evidence:.0f}, p-value {format_probability(named.p_value)}.",
+        f"Held-out errors fall by this share of what is left: {gains}.",
+        f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well.",
+    )
+    return ChangeCard(change_phrase(named), texts, Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3)))
 
 
-def _trends_section(comparison: Comparison) -> str:
-    """A picture of each parameter that moves, with its shape in words."""
+def _trend_part(comparison: Comparison) -> TrendPart:
     names = comparison.names
-    pictures = [draw_trend(each, names) for each in comparison.trends]
-    texts = [trend_phrase(each, names) for each in comparison.trends]
     days = [f"{name}: {'no date' if day is None else day}" for name, day in zip(names, comparison.dates, strict=True)]
-    return section(
-        "trends", "Over the recordings", bullets(texts), figures(pictures), paragraph("; ".join(days), "pale")
+    return TrendPart(
+        [trend_phrase(each, names) for each in comparison.trends],
+        [draw_trend(each, names) for each in comparison.trends],
+        "; ".join(days),
     )
 
 
@@ -330,7 +361,7 @@ def trend_phrase(trend: Trend, names: Sequence[str]) -> str:
     )
 
 
-def draw_trend(trend: Trend, names: Sequence[str]) -> str:
+def draw_trend(trend: Trend, names: Sequence[str]) -> Markup:
     """Values of a parameter over the recordings with their 95 % intervals."""
     own, count = trend.movement, len(names)
     x = Axis("recording", 0.5, count + 0.5)
@@ -343,26 +374,8 @@ def draw_trend(trend: Trend, names: Sequence[str]) -> str:
     return draw_chart(title, x, y, layers, f"{own.parameter} of {title} in {count} recordings")
 
 
-def _numbers_section(comparison: Comparison) -> str:
-    text = (
-        "All recordings are fitted with one model: links, and what the diagnoses found, are common; each change is the "
-        "same column again, times the recording, and is tested beside its common part. Intervals come from the scatter "
-        "between stretches of time. “Smallest seen” is the change that would have been named."
-    )
-    changed = [each for each in comparison.changes if each.changed]
-    rest = [each for each in comparison.changes if not each.changed]
-    return section(
-        "numbers",
-        "In numbers",
-        figures([draw_changes(comparison.changes)]),
-        _changes_table(changed) if changed else "",
-        paragraph(text, "pale"),
-        folded_details(f"{len(rest)} parameters that show no change", _changes_table(rest)),
-    )
-
-
-def _changes_table(changes: Sequence[Change]) -> str:
-    return html_table(TABLE_HEADINGS, [_change_row(each) for each in changes], (0, 1, 5))
+def _changes_table(changes: Sequence[Change]) -> Table:
+    return Table(TABLE_HEADINGS, [_change_row(each) for each in changes], (0, 1, 5), stacked=True)
 
 
 def _change_name(change: Change) -> str:
@@ -383,7 +396,7 @@ def _change_row(change: Change) -> list[str]:
     ]
 
 
-def draw_changes(changes: tuple[Change, ...]) -> str:
+def draw_changes(changes: Sequence[Change]) -> Markup:
     """Differences in units of half their own 95 % interval: within one of zero is no change."""
     chosen = sorted(changes, key=lambda each: each.p_value)[:MAX_DRAWN_CHANGES]
     height = 58 + ROW_HEIGHT * len(chosen) + 34
@@ -395,8 +408,10 @@ def draw_changes(changes: tuple[Change, ...]) -> str:
     )
     for value, text in ((-largest, f"{-largest:.0f}"), (0.0, "0"), (largest, f"{largest:.0f}")):
         x = _score_position(value, largest)
-        out += svg_element("line", x1=x, x2=x, y1=44, y2=height - 28, stroke="#c4cad1" if value == 0 else "#e6e9ed")
-        out += svg_text(text.replace("-", "−"), x, height - 12, 10.5, "middle", fill=PALE_COLOR)
+        out += svg_element(
+            "line", x1=x, x2=x, y1=44, y2=height - 28, stroke=palette.STROKE if value == 0 else palette.GRID
+        )
+        out += svg_text(text.replace("-", "−"), x, height - 12, 10.5, "middle", fill=palette.PALE)
     for number, each in enumerate(chosen):
         y = 58 + ROW_HEIGHT * number
         where = "" if each.joint is None else f", {each.joint}"
@@ -404,7 +419,9 @@ def draw_changes(changes: tuple[Change, ...]) -> str:
             shorten_text(f"{_change_name(each)}{where}", NAMES_WIDTH - 12, 10.5), NAMES_WIDTH - 8, y + 4, 10.5, "end"
         )
         x = _score_position(_score(each), largest)
-        out += svg_element("line", x1=_score_position(0.0, largest), x2=x, y1=y, y2=y, stroke="#c4cad1", stroke_width=2)
+        out += svg_element(
+            "line", x1=_score_position(0.0, largest), x2=x, y1=y, y2=y, stroke=palette.STROKE, stroke_width=2
+        )
         out += (
             svg_element("rect", x=x - 4.5, y=y - 4.5, width=9, height=9, fill=GIVEN_LOOK.color)
             if each.changed

@@ -6,16 +6,22 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.common.arrays import Array
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.report import palette
+from armlab.common.report.charts import shorten_text, svg_element, svg_picture, svg_text
+from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.confusability.card import (
     CERTAIN_STANDARD_ERRORS,
     MIN_CONFUSED_COSINE,
@@ -25,8 +31,6 @@ from armlab.diagnosis.confusability.card import (
     confusability_card,
     read_planned_motions,
 )
-from armlab.diagnosis.report.charts import PALE_COLOR, shorten_text, svg_element, svg_picture, svg_text
-from armlab.diagnosis.report.html import folded_details, html_document, html_table, paragraph, section
 from armlab.effects.library import library
 from problem.arm import Arm
 from problem.robot_file import load_arm
@@ -72,21 +76,21 @@ def _rivals_text(card: Card, entry: Entry, view: str) -> str:
 
 def card_markdown(card: Card) -> str:
     """One table a view."""
-    lines = ["# Confusability", "", explain_card(card)]
+    headings = ("effect", "absorbed", "shows from", "not told from (cosine, told from)")
+    parts = [explain_card(card)]
     for view in VIEWS:
-        lines += ["", f"## {view}", "", "| effect | absorbed | shows from | not told from (cosine, told from) |"]
-        lines.append("|---|---:|---:|---|")
-        lines += [_markdown_row(card, each, view) for each in card.entries]
-    return "\n".join(lines) + "\n"
+        rows = [_markdown_row(card, each, view) for each in card.entries]
+        parts += [f"## {view}", markdown_table(headings, rows, numbers=(1, 2))]
+    return markdown_page("Confusability", *parts)
 
 
-def _markdown_row(card: Card, entry: Entry, view: str) -> str:
+def _markdown_row(card: Card, entry: Entry, view: str) -> list[str]:
     rivals = [
         f"{card.entries[each.index].label} ({each.cosine:.3f}, {_size_text(each.separation)})"
         for each in entry.rivals[view][:MAX_SHOWN_RIVALS]
     ]
-    shares = f"{100 * entry.absorbed[view]:.1f} % | {_size_text(entry.shows_from[view])}"
-    return f"| {entry.label} | {shares} | {'; '.join(rivals) or '–'} |"
+    shows = _size_text(entry.shows_from[view])
+    return [entry.label, f"{100 * entry.absorbed[view]:.1f} %", shows, "; ".join(rivals) or "–"]
 
 
 def _size_text(value: float) -> str:
@@ -150,10 +154,10 @@ def _finite_or_none(value: float) -> float | None:
 
 CELL_SIZE, LABEL_SIZE, NAMES_WIDTH, TOP_MARGIN = 12.0, 10.0, 208.0, 44.0
 DARKEST_COLOR = (8, 48, 107)
-MARK_COLOR = "#c44e00"
+MARK_COLOR = palette.DARK_VERMILION
 
 
-def draw_heat_map(card: Card, view: str, joint: int) -> str:
+def draw_heat_map(card: Card, view: str, joint: int) -> Markup:
     """Effects of one joint (from 1) and of the whole robot, each against the others."""
     chosen = [index for index, each in enumerate(card.entries) if each.joint in (joint, None)]
     count = len(chosen)
@@ -163,7 +167,7 @@ def draw_heat_map(card: Card, view: str, joint: int) -> str:
         middle = CELL_SIZE * (place + 0.5)
         label = shorten_text(f"{place + 1}  {card.entries[index].label}", NAMES_WIDTH - 8, LABEL_SIZE)
         out += svg_text(label, NAMES_WIDTH - 5, TOP_MARGIN + middle + 3.5, LABEL_SIZE, "end")
-        out += svg_text(str(place + 1), NAMES_WIDTH + middle, TOP_MARGIN - 5, 7.5, "middle", fill=PALE_COLOR)
+        out += svg_text(str(place + 1), NAMES_WIDTH + middle, TOP_MARGIN - 5, 7.5, "middle", fill=palette.PALE)
     cosines = card.cosines[view][np.ix_(chosen, chosen)]
     out += "".join(
         _draw_cell(row, column, float(cosines[row, column])) for row in range(count) for column in range(count)
@@ -175,11 +179,11 @@ def draw_heat_map(card: Card, view: str, joint: int) -> str:
 def _draw_cell(row: int, column: int, cosine: float) -> str:
     x, y = NAMES_WIDTH + CELL_SIZE * column, TOP_MARGIN + CELL_SIZE * row
     if row == column:
-        return svg_element("rect", x=x, y=y, width=CELL_SIZE - 1, height=CELL_SIZE - 1, fill="#e9ecef")
+        return svg_element("rect", x=x, y=y, width=CELL_SIZE - 1, height=CELL_SIZE - 1, fill=palette.SHADE)
     out = svg_element("rect", x=x, y=y, width=CELL_SIZE - 1, height=CELL_SIZE - 1, fill=_cell_color(cosine))
     if cosine >= MIN_CONFUSED_COSINE:
         out += svg_element(
-            "circle", cx=x + (CELL_SIZE - 1) / 2, cy=y + (CELL_SIZE - 1) / 2, r=3, fill=MARK_COLOR, stroke="#fff"
+            "circle", cx=x + (CELL_SIZE - 1) / 2, cy=y + (CELL_SIZE - 1) / 2, r=3, fill=MARK_COLOR, stroke=palette.BACK
         )
     return out
 
@@ -195,7 +199,7 @@ def _draw_scale(y: float) -> str:
     for number, cosine in enumerate((0.0, 0.5, 0.7, 0.8, 0.9, 1.0)):
         x = 52 + 42 * number
         out += svg_element(
-            "rect", x=x, y=y, width=14, height=14, fill=_cell_color(cosine), stroke="#c4cad1", stroke_width=0.5
+            "rect", x=x, y=y, width=14, height=14, fill=_cell_color(cosine), stroke=palette.STROKE, stroke_width=0.5
         )
         out += svg_text(f"{cosine:g}", x + 17, y + 11, 10)
     x = 52 + 42 * 6
@@ -213,32 +217,45 @@ VIEW_MEANINGS = {
 }
 
 
+@dataclass(frozen=True)
+class ViewPart:
+    """What cannot be told apart in a view. maps: one a joint."""
+
+    title: str
+    meaning: str
+    classes: Table
+    maps: Sequence[Markup]
+
+
 def card_page(card: Card) -> str:
     """HTML text."""
-    hidden = [each.label for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE]
-    parts = ["<h1>Confusability card</h1>", paragraph(explain_card(card))]
-    if hidden:
-        parts.append(section("hidden", "What a refit hides", paragraph(", ".join(hidden) + ".")))
-    for view in VIEWS:
-        maps = [draw_heat_map(card, view, joint) for joint in range(1, len(card.arm) + 1)]
-        scrolled = "".join(f'<div class="map">{each}</div>' for each in maps)
-        parts.append(
-            section(view, view.capitalize(), paragraph(VIEW_MEANINGS[view]), _classes_table(card, view), scrolled)
+    views = [
+        ViewPart(
+            view.capitalize(),
+            VIEW_MEANINGS[view],
+            _classes_table(card, view),
+            [draw_heat_map(card, view, joint) for joint in range(1, len(card.arm) + 1)],
         )
-    return html_document(f"Confusability of {card.trajectory}", parts)
+        for view in VIEWS
+    ]
+    return render_page(
+        __package__,
+        "card.html",
+        f"Confusability of {card.trajectory}",
+        explanation=explain_card(card),
+        hidden=[each.label for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE],
+        views=views,
+    )
 
 
-def _classes_table(card: Card, view: str) -> str:
+def _classes_table(card: Card, view: str) -> Table:
     rows = []
     for each in card.entries:
         for place, rival in enumerate(each.rivals[view][:MAX_SHOWN_RIVALS]):
             own = (each.label, f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
             beside = (card.entries[rival.index].label, f"{rival.cosine:.3f}", _size_text(rival.separation))
             rows.append([*(own if place == 0 else ("", "", "")), *beside])
-    listed = (
-        html_table(PAGE_HEADINGS, rows, (0, 3)) if rows else paragraph("Every effect can be told from every other.")
-    )
-    return folded_details("What cannot be told apart", listed)
+    return Table(PAGE_HEADINGS, rows, (0, 3))
 
 
 def write_card(
@@ -261,7 +278,7 @@ def write_card(
     yield from card_lines(card)
     written: tuple[Path, ...] = ()
     if out is not None:
-        maps = {
+        maps: dict[str, str] = {
             f"figures/{view}_joint{joint}.svg": draw_heat_map(card, view, joint) + "\n"
             for view in VIEWS
             for joint in range(1, len(arm) + 1)

@@ -7,6 +7,7 @@ from pathlib import Path
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
     ChangeEntry,
@@ -19,7 +20,6 @@ from armlab.diagnosis.formats import (
 )
 from armlab.diagnosis.motion.compare import MotionComparison, ServoChange, compare_motion
 from armlab.diagnosis.motion.tuning import DEFAULT
-from armlab.diagnosis.report.html import bullets, html_document, html_table, paragraph, section
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
 
@@ -115,22 +115,24 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
             str(each.joint),
             each.parameter.key,
             f"{each.old:.4g}",
-            f"{each.new:.4g}" if each.changed else "",
+            f"{each.new:.4g}" if each.changed else "–",
             f"{each.difference_interval[0]:.3g} to {each.difference_interval[1]:.3g}",
             f"{each.detectable:.3g}",
             each.parameter.unit,
         )
         for each in comparison.changes
     ]
-    heads = ("joint", "number", "old", "new", "change, 95 % interval", "smallest change seen", "unit")
-    title = f"Comparison of {' and '.join(comparison.names)}"
-    parts = [
-        paragraph(comparison_summary(comparison), "verdict" if comparison.changed else "verdict none"),
-        section("numbers", "All numbers", html_table(heads, rows, texts=(1, 6)) if rows else ""),
-        section("notes", "Beside it", bullets(comparison.notes or ("nothing else was recorded",))),
-        section("origin", "How to repeat this", paragraph(command, "pale")),
-    ]
-    return html_document(title, parts)
+    headings = ("joint", "number", "old", "new", "change, 95 % interval", "smallest change seen", "unit")
+    return render_page(
+        __package__,
+        "motion_comparison.html",
+        f"Comparison of {' and '.join(comparison.names)}",
+        status="inconclusive" if comparison.reason else "mismatch" if comparison.changed else "none",
+        summary=comparison_summary(comparison),
+        numbers=Table(headings, rows, (1, 6), stacked=True),
+        notes=comparison.notes or ("nothing else was recorded",),
+        command=command,
+    )
 
 
 def compare_motion_recordings(

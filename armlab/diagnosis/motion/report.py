@@ -1,15 +1,14 @@
 """The page of a motion-only verdict: findings, errors before and after, one figure a joint, what the files hold."""
 
-from html import escape
-
 import numpy as np
+from markupsafe import Markup
 
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis
+from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
+from armlab.common.report.page import Table, render_page
+from armlab.diagnosis.motion.diagnose import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.words import finding_phrase, summary_of
-from armlab.diagnosis.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
-from armlab.diagnosis.report.html import bullets, figures, html_document, html_table, paragraph, section
 from armlab.effects.library import effect_named
 
 SHOWN_S = 20.0  # of the longest held-out run, in the figures
@@ -17,36 +16,77 @@ SHOWN_S = 20.0  # of the longest held-out run, in the figures
 
 def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
     """HTML text of the page. command: that repeats the diagnosis."""
-    name = diagnosis.recording.name
-    parts = [
-        f"<h1>Diagnosis of {escape(name)}: motion only</h1>",
-        paragraph(summary_of(diagnosis), f"verdict {diagnosis.status}"),
-    ]
-    if diagnosis.servos is not None:
-        parts += [_errors(diagnosis), _findings(diagnosis), _numbers(diagnosis), _files(diagnosis)]
-    parts.append(section("origin", "How to repeat this", paragraph(command, "pale")))
-    return html_document(f"Diagnosis of {name}", parts)
+    known = diagnosis.servos is not None
+    first, _, rest = summary_of(diagnosis).partition(". ")
+    return render_page(
+        __package__,
+        "motion.html",
+        f"Diagnosis of {diagnosis.recording.name}: motion only",
+        status=diagnosis.status,
+        verdict=(first.removesuffix(".") + ".", rest),
+        known=known,
+        joints=_joint_table(diagnosis) if known else None,
+        steps=_next_recordings(diagnosis),
+        errors=_error_table(diagnosis) if known else None,
+        tool=_tool_text(diagnosis),
+        pictures=_pictures(diagnosis) if known else [],
+        findings=[finding_phrase(each) for each in diagnosis.findings],
+        numbers=_number_table(diagnosis) if known else None,
+        missing=_missing_fields(diagnosis),
+        command=command,
+    )
 
 
-def _errors(diagnosis: MotionDiagnosis) -> str:
+def _joint_table(diagnosis: MotionDiagnosis) -> Table:
+    """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
+    rows = []
+    for each in diagnosis.errors:
+        own = [finding for finding in diagnosis.findings if finding.joint == each.joint]
+        words = "; ".join(_finding_cell(finding) for finding in own) or "–"
+        before = "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
+        name = diagnosis.simulation.arm.joints[diagnosis.simulation.joints[each.joint - 1]].name
+        rows.append((f"{each.joint}  {name}", words, before, f"{1e3 * each.replay_after:.3g} mrad"))
+    headings = ("joint", "what is wrong, 95 % interval", "replay error before", "after")
+    return Table(headings, rows, (1,), stacked=True)
+
+
+def _finding_cell(finding: ServoFinding) -> str:
+    low, high = finding.interval
+    unit = "" if finding.parameter.unit == "1" else f" {finding.parameter.unit.replace('.', ' ')}"
+    known = f", not {finding.nominal:.4g}" if finding.nominal == finding.nominal else ""
+    words = f"{effect_named(finding.effect).words}: {finding.name}"
+    return f"{words} {finding.value:.4g}{unit} ({low:.4g} to {high:.4g}){known}"
+
+
+def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
+    """Recordings that separate the findings from their rivals."""
+    steps = {
+        each.parameter.experiment or effect_named(each.effect).experiment for each in diagnosis.findings if each.rivals
+    }
+    return sorted(step for step in steps if step)
+
+
+def _error_table(diagnosis: MotionDiagnosis) -> Table:
     rows = [
         (
             str(each.joint),
             f"{1e3 * each.command:.3g}",
-            "" if each.replay_before is None else f"{1e3 * each.replay_before:.3g}",
+            "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g}",
             f"{1e3 * each.replay_after:.3g}",
         )
         for each in diagnosis.errors
     ]
+    return Table(("joint", "command itself", "simulation as given", "with what was found"), rows, stacked=True)
+
+
+def _tool_text(diagnosis: MotionDiagnosis) -> str:
+    if diagnosis.servos is None:
+        return ""
     before, after = diagnosis.tool
-    tool = "" if before is None else f" At the tool: {1e3 * before:.3g} mm before, {1e3 * after:.3g} mm after."
-    table = html_table(("joint", "command itself", "simulation as given", "with what was found"), rows)
-    words = "Root mean square of simulated minus measured position over the held-out runs, mrad; whole runs, closed "
-    words += f"loop, from the measured first state.{tool}"
-    return section("replay", "Held-out runs, replayed", paragraph(words), table, figures(_pictures(diagnosis)))
+    return "" if before is None else f"At the tool: {1e3 * before:.3g} mm before, {1e3 * after:.3g} mm after."
 
 
-def _pictures(diagnosis: MotionDiagnosis) -> list[str]:
+def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
     """One figure a joint: a stretch of a held-out run in which it moves most."""
     made = []
     for row, joint in enumerate(diagnosis.simulation.joints):
@@ -67,16 +107,7 @@ def _pictures(diagnosis: MotionDiagnosis) -> list[str]:
     return made
 
 
-def _findings(diagnosis: MotionDiagnosis) -> str:
-    lines = [finding_phrase(each) for each in diagnosis.findings]
-    steps = {
-        each.parameter.experiment or effect_named(each.effect).experiment for each in diagnosis.findings if each.rivals
-    }
-    next_steps = ("<h3>Next recording</h3>", bullets(sorted(step for step in steps if step))) if any(steps) else ()
-    return section("findings", "What the simulation has wrong", bullets(lines or ["nothing"]), *next_steps)
-
-
-def _numbers(diagnosis: MotionDiagnosis) -> str:
+def _number_table(diagnosis: MotionDiagnosis) -> Table:
     """All numbers of all joints beside those of the simulation, with intervals where they were fitted."""
     rows = []
     for row, chosen in enumerate(diagnosis.chosen):
@@ -90,16 +121,10 @@ def _numbers(diagnosis: MotionDiagnosis) -> str:
             given = "unknown" if np.isnan(nominal) else "none" if nominal >= INFINITE_LIMIT else f"{nominal:.4g}"
             interval = f"{low[place]:.4g} to {high[place]:.4g}"
             rows.append((str(row + 1), parameter.key, given, f"{value:.4g}", interval, parameter.unit))
-    table = html_table(("joint", "number", "simulation", "found", "95 % interval", "unit"), rows, texts=(1, 5))
-    return section("numbers", "All fitted numbers", table)
+    headings = ("joint", "number", "simulation", "found", "95 % interval", "unit")
+    return Table(headings, rows, (1, 5), stacked=True)
 
 
-def _files(diagnosis: MotionDiagnosis) -> str:
-    assert diagnosis.servos is not None
-    words = (
-        "simulation.xml is the simulation with these numbers, as MJCF for MuJoCo; robot.urdf and controllers.yaml are "
-    )
-    words += "for ROS 2, isaaclab_actuators.py for Isaac Lab, mjlab_actuators.py for mjlab; each says what it does not "
-    words += "hold. servo_plugin.py adds the rest to a simulation in MuJoCo. What MJCF has no field for:"
-    missing = list(lines_without_field(diagnosis.simulation, diagnosis.servos)) or ["nothing"]
-    return section("files", "The simulation with these numbers", paragraph(words), bullets(missing))
+def _missing_fields(diagnosis: MotionDiagnosis) -> list[str]:
+    """What of the servos MJCF has no field for."""
+    return [] if diagnosis.servos is None else list(lines_without_field(diagnosis.simulation, diagnosis.servos))

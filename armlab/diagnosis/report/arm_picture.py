@@ -4,13 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.report.charts import (
-    GUILTY_COLOR,
-    INNOCENT_COLOR,
-    PALE_COLOR,
-    UNKNOWN_COLOR,
+from armlab.common.report import palette
+from armlab.common.report.charts import (
     shorten_text,
     svg_element,
     svg_picture,
@@ -20,6 +18,7 @@ from problem.arm import Arm
 
 PICTURE_WIDTH, ROW_HEIGHT = 372.0, 17.0
 ARM_WIDTH = 168.0  # px: width of the arm itself; the names stand beside it
+MARKED_NAME_WIDTH = 66.0  # px: width of a guilty joint's name before its finding
 ELEVATION = np.deg2rad(18)
 AXLE_SHARE = 0.045  # of the arm's size: half the length of a joint's axle
 MIN_LENGTH = 1e-9
@@ -35,7 +34,7 @@ class JointMark:
     @property
     def color(self) -> str:
         """Of the joint and its name."""
-        return UNKNOWN_COLOR if self.unknown else GUILTY_COLOR
+        return palette.PURPLE if self.unknown else palette.DARK_VERMILION
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,7 @@ def clearest_posture(arm: Arm, positions: Array) -> Array:
     return np.asarray(max(positions, key=lambda position: visible_extent(arm_skeleton(arm, position).path)))
 
 
-def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: Sequence[str] = ()) -> str:
+def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: Sequence[str] = ()) -> Markup:
     """The arm as SVG. marks: by joint, from 1. whole: what concerns the robot as a whole."""
     bones = arm_skeleton(arm, position)
     height = max(230.0, 46.0 + ROW_HEIGHT * (len(arm) + len(whole)))
@@ -131,14 +130,16 @@ def _draw_base(point: Array) -> str:
     x, y = point
     marks = "".join(f"M{x + step:.1f} {y + 8:.1f}l-6 7" for step in (-12, -4, 4, 12, 18))
     return svg_element(
-        "path", d=f"M{x - 16:.1f} {y + 8:.1f}h34{marks}", fill="none", stroke=PALE_COLOR, stroke_width=1.5
+        "path", d=f"M{x - 16:.1f} {y + 8:.1f}h34{marks}", fill="none", stroke=palette.PALE, stroke_width=1.5
     )
 
 
 def _draw_links(path: Array) -> str:
     corners = "L".join(f"{x:.1f} {y:.1f}" for x, y in path)
-    tool = svg_element("circle", cx=path[-1][0], cy=path[-1][1], r=3, fill="#fff", stroke=PALE_COLOR, stroke_width=1.5)
-    tubes = (("#5b6570", 9.0), ("#d9dee4", 6.5))  # a dark line under a pale one has a dark edge
+    tool = svg_element(
+        "circle", cx=path[-1][0], cy=path[-1][1], r=3, fill=palette.BACK, stroke=palette.PALE, stroke_width=1.5
+    )
+    tubes = ((palette.PALE, 9.0), (palette.RULE, 6.5))  # a dark line under a pale one has a dark edge
     return "".join(_draw_tube(f"M{corners}", color, width) for color, width in tubes) + tool
 
 
@@ -152,9 +153,9 @@ def _draw_joint(centre: Array, axis: Array, mark: JointMark | None, size: float)
     """The axle as a short bar, a ring round it where a finding is at the joint."""
     half = axis * AXLE_SHARE * size
     ends = f"M{centre[0] - half[0]:.1f} {centre[1] - half[1]:.1f}L{centre[0] + half[0]:.1f} {centre[1] + half[1]:.1f}"
-    color = mark.color if mark else INNOCENT_COLOR
+    color = mark.color if mark else palette.MIDDLE
     out = svg_element("path", d=ends, stroke=color, stroke_width=8, stroke_linecap="round", fill="none")
-    out += svg_element("circle", cx=centre[0], cy=centre[1], r=4.2, fill="#fff", stroke=color, stroke_width=2)
+    out += svg_element("circle", cx=centre[0], cy=centre[1], r=4.2, fill=palette.BACK, stroke=color, stroke_width=2)
     if mark:
         dash = "3 2" if mark.unknown else "none"
         out += svg_element(
@@ -177,7 +178,7 @@ def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height
     out = ""
     for row, index in zip(rows, order, strict=True):
         mark = marks.get(int(index) + 1)
-        color, weight = (mark.color, "600") if mark else (PALE_COLOR, "400")
+        color, weight = (mark.color, "600") if mark else (palette.PALE, "400")
         x, y = centres[index]
         start = ARM_WIDTH + 12
         out += svg_element(
@@ -188,7 +189,8 @@ def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height
             stroke_width=1.2 if mark else 0.6,
             stroke_dasharray="none" if mark else "1 3",
         )
-        text = f"{index + 1}  {mark.text}" if mark else f"{index + 1}  {arm.joints[index].name}"
+        name = shorten_text(arm.joints[index].name, MARKED_NAME_WIDTH, 10.5) if mark else arm.joints[index].name
+        text = f"{index + 1}  {name}: {mark.text}" if mark else f"{index + 1}  {name}"
         out += svg_text(
             shorten_text(text, PICTURE_WIDTH - start - 2, 10.5), start, row, 10.5, fill=color, font_weight=weight
         )
@@ -199,6 +201,6 @@ def _draw_whole_robot(texts: Sequence[str], height: float) -> str:
     rows = [height - 8 - ROW_HEIGHT * index for index in range(len(texts))][::-1]
     pairs = zip(rows, texts, strict=True)
     return "".join(
-        svg_text(shorten_text(f"whole robot: {text}", PICTURE_WIDTH - 12), 6, row, 11, fill=GUILTY_COLOR)
+        svg_text(shorten_text(f"whole robot: {text}", PICTURE_WIDTH - 12), 6, row, 11, fill=palette.DARK_VERMILION)
         for row, text in pairs
     )

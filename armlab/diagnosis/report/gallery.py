@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.diagnosis.report.arm_picture import JointMark, clearest_posture, draw_arm
 from armlab.diagnosis.report.motion_pictures import draw_motion, draw_motion_differences
@@ -25,24 +26,24 @@ MAX_LOCATED_JOINTS = 4  # joints whose error is drawn against every variable
 
 @dataclass(frozen=True, eq=False)
 class Gallery:
-    """SVG texts. motions: simulated anew; differences: from a reference; their texts say what they show, or why not."""
+    """SVG pictures. motions: simulated anew; differences: from a reference; their texts say what they are."""
 
     data: ShownResiduals
-    arm: str
-    errors_by_joint: str
-    torques: list[str]
-    errors: list[str]
-    evidence: list[tuple[Claim, str]]
-    located: list[tuple[int, list[str]]]
-    motions: list[str]
+    arm: Markup
+    errors_by_joint: Markup
+    torques: list[Markup]
+    errors: list[Markup]
+    evidence: list[tuple[Claim, Markup]]
+    located: list[tuple[int, list[Markup]]]
+    motions: list[Markup]
     motion_text: str
-    differences: list[str]
+    differences: list[Markup]
     difference_text: str
 
     @property
     def files(self) -> dict[str, str]:
         """Names of the files and their content."""
-        out = {"arm.svg": self.arm, "errors.svg": self.errors_by_joint}
+        out: dict[str, str] = {"arm.svg": self.arm, "errors.svg": self.errors_by_joint}
         out |= {f"torque_joint{number}.svg": each for number, each in enumerate(self.torques, 1)}
         out |= {f"error_joint{number}.svg": each for number, each in enumerate(self.errors, 1)}
         for number, (claim, each) in enumerate(self.evidence, 1):

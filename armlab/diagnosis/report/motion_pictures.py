@@ -3,9 +3,11 @@ and simulated motion.
 """
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.report.charts import (
+from armlab.common.report import palette
+from armlab.common.report.charts import (
     FOUND_LOOK,
     GIVEN_LOOK,
     MEASURED_LOOK,
@@ -28,7 +30,7 @@ MILLI_PER_UNIT = 1e3  # mrad in a rad, mm in a m
 MAX_ERROR_RATIO = 300.0  # of the error at the end: less is not drawn
 
 
-def draw_motion(diagnosis: Diagnosis) -> tuple[list[str], str]:
+def draw_motion(diagnosis: Diagnosis) -> tuple[list[Markup], str]:
     """Pictures, and what they show; no pictures, and why, where nothing can be simulated."""
     try:
         resimulation = resimulate(diagnosis)
@@ -39,9 +41,9 @@ def draw_motion(diagnosis: Diagnosis) -> tuple[list[str], str]:
 
 def _motion_text(resimulation: Resimulation) -> str:
     old = "the refitted rigid body" if resimulation.refitted else "the simulation as given"
-    lost = (
-        "" if resimulation.old is not None else f" It cannot be done with {old}, whose inertia matrix is not positive."
-    )
+    lost = ""
+    if resimulation.old is None:
+        lost = f" It cannot be done with {old}, whose links leave a joint without inertia."
     return (
         f"{len(resimulation.starts)} windows of {WINDOW_SECONDS:g} s of {resimulation.run}, "
         "which took no part in the fit, were simulated "
@@ -59,7 +61,7 @@ def _old_look(resimulation: Resimulation) -> Look:
     return REFITTED_LOOK if resimulation.refitted else GIVEN_LOOK
 
 
-def _draw_growths(diagnosis: Diagnosis, resimulation: Resimulation) -> list[str]:
+def _draw_growths(diagnosis: Diagnosis, resimulation: Resimulation) -> list[Markup]:
     out = []
     time = resimulation.time[1:]
     x = Axis("time since the start of a window, s", 0.0, float(time[-1]))
@@ -82,7 +84,7 @@ def _draw_growths(diagnosis: Diagnosis, resimulation: Resimulation) -> list[str]
     return out
 
 
-def _draw_windows(diagnosis: Diagnosis, resimulation: Resimulation) -> list[str]:
+def _draw_windows(diagnosis: Diagnosis, resimulation: Resimulation) -> list[Markup]:
     """The window of the worst old error, for the joints whose error falls most."""
     old = resimulation.new if resimulation.old is None else resimulation.old
     gain = resimulation.growth(old)[-1] / np.maximum(resimulation.growth(resimulation.new)[-1], 1e-300)
@@ -103,12 +105,12 @@ def _draw_windows(diagnosis: Diagnosis, resimulation: Resimulation) -> list[str]
 
 
 DIFFERENCE_HEIGHT = 205.0
-REFERENCE_LOOK = Look("reference − measured", "#0072b2", 1.2)
+REFERENCE_LOOK = Look("reference − measured", palette.BLUE, 1.2)
 SIMULATED_LOOK = Look("simulated − measured", GIVEN_LOOK.color, 1.2, GIVEN_LOOK.dash)
 DIFFERENCE_SIGNALS = (("reference_position", REFERENCE_LOOK), ("simulated_position", SIMULATED_LOOK))
 
 
-def draw_motion_differences(diagnosis: Diagnosis) -> tuple[list[str], str]:
+def draw_motion_differences(diagnosis: Diagnosis) -> tuple[list[Markup], str]:
     """One picture a joint of the run that is shown elsewhere, and rms values of all runs; nothing to say without."""
     runs = diagnosis.recording.runs
     chosen = next((run for run in runs if run.role == "validate"), runs[0])

@@ -3,9 +3,11 @@ the error is.
 """
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.report.charts import (
+from armlab.common.report import palette
+from armlab.common.report.charts import (
     CHART_WIDTH,
     FITTED_ROWS_LOOK,
     FLOOR_LOOK,
@@ -15,7 +17,6 @@ from armlab.diagnosis.report.charts import (
     LAW_LOOK,
     LEFT_MARGIN,
     MEASURED_LOOK,
-    PALE_COLOR,
     REFITTED_LOOK,
     RIGHT_MARGIN,
     SURROGATE_LOOK,
@@ -41,7 +42,7 @@ JOINT_ROW_HEIGHT = 26.0
 Series = list[tuple[Look, Array]]
 
 
-def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> str:
+def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> Markup:
     """Held-out error of each joint on a logarithmic axis: as given, refitted, with what was found, noise floor."""
     series: Series = [(REFITTED_LOOK, data.held_out_rms(data.refit)), (FOUND_LOOK, data.held_out_rms(data.final))]
     if data.given is not None:
@@ -77,8 +78,8 @@ def _draw_grid(axis: Axis, top: float, height: float) -> str:
     out = ""
     for value, text in axis.ticks(6):
         x = _axis_position(axis, value)
-        out += svg_element("line", x1=x, x2=x, y1=top, y2=height - 40, stroke="#e6e9ed")
-        out += svg_text(text, x, height - 25, 10.5, "middle", fill=PALE_COLOR)
+        out += svg_element("line", x1=x, x2=x, y1=top, y2=height - 40, stroke=palette.GRID)
+        out += svg_text(text, x, height - 25, 10.5, "middle", fill=palette.PALE)
     return out + svg_text(
         f"{axis.label} (logarithmic)", (LEFT_MARGIN + CHART_WIDTH - RIGHT_MARGIN) / 2, height - 8, 11, "middle"
     )
@@ -87,7 +88,7 @@ def _draw_grid(axis: Axis, top: float, height: float) -> str:
 def _draw_joint_row(axis: Axis, y: float, joint: int, series: Series, floor: float) -> str:
     places = [_axis_position(axis, float(each[joint])) for _, each in series]
     out = svg_text(f"joint {joint + 1}", 6, y + 4, 11)
-    out += svg_element("line", x1=min(places), x2=max(places), y1=y, y2=y, stroke="#c4cad1", stroke_width=2)
+    out += svg_element("line", x1=min(places), x2=max(places), y1=y, y2=y, stroke=palette.STROKE, stroke_width=2)
     out += _draw_mark(_axis_position(axis, floor), y, FLOOR_LOOK)
     return out + "".join(_draw_mark(x, y, look) for x, (look, _) in zip(places, series, strict=True))
 
@@ -101,13 +102,13 @@ def _draw_mark(x: float, y: float, look: Look) -> str:
     if look is GIVEN_LOOK:
         return svg_element("rect", x=x - 4.5, y=y - 4.5, width=9, height=9, fill=look.color)
     if look is REFITTED_LOOK:
-        return svg_element("circle", cx=x, cy=y, r=4.6, fill="#fff", stroke=look.color, stroke_width=2.2)
+        return svg_element("circle", cx=x, cy=y, r=4.6, fill=palette.BACK, stroke=look.color, stroke_width=2.2)
     if look is FOUND_LOOK:
         return svg_element("circle", cx=x, cy=y, r=5, fill=look.color)
     return svg_element("path", d=f"M{x:.1f} {y - 9:.1f}v18", stroke=look.color, stroke_width=2.4)
 
 
-def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
+def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
     """One picture a joint: measured torque and that of each model, where the held-out error falls most."""
     segment, rows = clearest_stretch(data, STRETCH_SECONDS)
     time, torque = data.observed.time[rows], data.observed.torque
@@ -128,7 +129,7 @@ def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
     return out
 
 
-def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[str]:
+def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
     """One picture a joint: the residual of each model over a whole held-out run, with the noise floor."""
     segment, _ = clearest_stretch(data, STRETCH_SECONDS)
     rows = slice(segment.start, segment.stop)
@@ -155,7 +156,7 @@ FULL_TURN = 2 * np.pi
 MOTION_UNITS = {"position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "acceleration": ("rad/s²", "m/s²")}
 
 
-def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> str:
+def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> Markup:
     """Dots: residual torque of the model without the finding. Line: torque of the finding."""
     joint = claim.evidence.joint
     label, x = evidence_variable(diagnosis, data, claim)
@@ -230,7 +231,7 @@ LOCATED_BINS = 24
 LOCATED_HEIGHT = 205.0
 
 
-def draw_located_errors(diagnosis: Diagnosis, data: ShownResiduals, joint: int) -> list[str]:
+def draw_located_errors(diagnosis: Diagnosis, data: ShownResiduals, joint: int) -> list[Markup]:
     """rms error of a joint (from 0) against its position, velocity, acceleration, and time."""
     arm = diagnosis.simulation.arm
     turns = arm.joints[joint].kind == "revolute"
@@ -242,7 +243,7 @@ def draw_located_errors(diagnosis: Diagnosis, data: ShownResiduals, joint: int) 
     return [*pictures, over_time]
 
 
-def _draw_error_against(diagnosis: Diagnosis, data: ShownResiduals, joint: int, label: str, x: Array) -> str:
+def _draw_error_against(diagnosis: Diagnosis, data: ShownResiduals, joint: int, label: str, x: Array) -> Markup:
     start = REFITTED_LOOK if data.given is None else GIVEN_LOOK
     used, layers = data.used(joint), []
     for look, residual in ((start, data.before), (FOUND_LOOK, data.final)):

@@ -109,6 +109,16 @@ def format_probability(value: float) -> str:
     return "below 1e−12" if value < 1e-12 else format_number(value)
 
 
+def format_share(value: float) -> str:
+    """A share in percent, `below 0.1 %` where it is that small."""
+    return "below 0.1 %" if 0 <= value < 0.001 else f"{100 * value:.1f} %"
+
+
+def format_gap(closed: float | None) -> str:
+    """The share of a gap that is closed: 100 % at most, as the noise floor is an estimate too."""
+    return "–" if closed is None else f"{100 * min(closed, 1.0):.1f} %"
+
+
 def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
     """What is missing, and how much better the model is with it."""
     setup = diagnosis.setup.sentence if diagnosis.setup else ""
@@ -194,7 +204,7 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.fit:
         yield "  joint   refitted      found      noise   gap closed   (rms on data that took no part)"
     for fit in diagnosis.fit:
-        closed = "-" if fit.gap_closed is None else f"{100 * fit.gap_closed:.1f} %"
+        closed = format_gap(fit.gap_closed)
         errors = "".join(f"{format_number(value):>11}" for value in (fit.before, fit.after, fit.noise_floor))
         yield f"  {fit.joint:>5}{errors}{closed:>13}   {joint_unit(diagnosis.simulation.arm, fit.joint - 1)}"
 

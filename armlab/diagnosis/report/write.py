@@ -5,18 +5,17 @@ import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
+from armlab.common.report.page import render_page
 from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.report import sections
+from armlab.diagnosis.report import content, measured
 from armlab.diagnosis.report.gallery import Gallery, draw_gallery
-from armlab.diagnosis.report.html import html_document
 from armlab.diagnosis.report.residuals import select_residuals
-from armlab.diagnosis.report.sections import findings_section
-from armlab.diagnosis.report.words import verdict_lines
+from armlab.diagnosis.report.words import verdict_lines, verdict_sentences
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
 from armlab.diagnosis.tuning import parse_change
@@ -33,18 +32,36 @@ from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 
 def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:
     """HTML text. gallery: None where nothing was fitted."""
-    parts = [each for each in (sections.verdict_section(diagnosis), sections.setup_section(diagnosis)) if each]
-    if gallery is not None:
-        parts += [
-            sections.before_after_section(diagnosis, gallery),
-            findings_section(diagnosis, gallery),
-            sections.location_section(diagnosis, gallery),
-            sections.motion_section(gallery),
-            sections.next_steps_section(diagnosis),
-            sections.method_section(diagnosis, gallery.data.observed.held_out_blocks),
-        ]
-    parts.append(sections.origin_section(diagnosis, command))
-    return html_document(f"Diagnosis of {diagnosis.recording.name}", parts)
+    more = {} if gallery is None else _details(diagnosis, gallery)
+    return render_page(
+        __package__,
+        "report.html",
+        f"Diagnosis of {diagnosis.recording.name}",
+        status=diagnosis.status,
+        verdict=verdict_sentences(diagnosis),
+        story=content.story_text(diagnosis),
+        guilty=content.guilty_joints(diagnosis),
+        setup=content.setup_part(diagnosis),
+        joints=measured.joint_table(diagnosis) if diagnosis.claims else None,
+        bodies=measured.body_sentences(diagnosis),
+        steps=content.next_steps(diagnosis),
+        gallery=gallery,
+        origin=content.origin_of(diagnosis, command),
+        **more,
+    )
+
+
+def _details(diagnosis: Diagnosis, gallery: Gallery) -> dict[str, Any]:
+    """What is folded on the page, and only there where something was fitted."""
+    return {
+        "causes": content.cause_table(diagnosis),
+        "findings": content.finding_details(diagnosis, gallery),
+        "unexplained": content.unexplained_lines(diagnosis),
+        "fits": content.fit_table(diagnosis, gallery.data),
+        "whiteness": content.whiteness_text(diagnosis, gallery.data),
+        "located": content.located_table(diagnosis),
+        "method": content.method_text(diagnosis, gallery.data.observed.held_out_blocks),
+    }
 
 
 REPORT_PAGE, FIGURES_FOLDER = "report.html", "figures"

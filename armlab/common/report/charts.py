@@ -1,5 +1,5 @@
-"""Charts as SVG text: elements, looks of lines (colours that colour-blind readers can distinguish, Okabe and Ito
-2008), axes with round ticks, and charts of lines, points and levels.
+"""Charts as SVG that stands in a page: elements, looks of lines, axes with round ticks, and charts of lines, points and
+levels.
 """
 
 from collections.abc import Sequence
@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
+from markupsafe import Markup
 
 from armlab.common.arrays import Array
+from armlab.common.report import palette
 
 FONT_FAMILY = "system-ui, 'Segoe UI', 'DejaVu Sans', sans-serif"
-INK_COLOR, PALE_COLOR, LINE_COLOR = "#1b1f24", "#5b6570", "#d5dae0"
 LETTER_WIDTH = 0.56  # width of a letter over its size, about
 
 
@@ -25,17 +26,22 @@ def svg_text(
     text: str, x: float, y: float, size: float = 11.0, anchor: str = "start", **attributes: str | float
 ) -> str:
     """Text at a place, its baseline at y."""
-    chosen: dict[str, str | float] = {"fill": INK_COLOR, "font_size": size, "text_anchor": anchor, **attributes}
+    chosen: dict[str, str | float] = {"fill": palette.INK, "font_size": size, "text_anchor": anchor, **attributes}
     return svg_element("text", escape(text), x=x, y=y, **chosen)
 
 
-def svg_picture(content: str, width: float, height: float, title: str) -> str:
+def svg_picture(content: str, width: float, height: float, title: str) -> Markup:
     """A whole picture that scales with the page; title: what it shows, for those who do not see it."""
-    return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" role="img" '
-        f'aria-label="{escape(title)}" font-family="{FONT_FAMILY}"><title>{escape(title)}</title>'
-        f"{content}</svg>"
+    frame = svg_element(
+        "svg",
+        svg_element("title", escape(title)) + content,
+        xmlns="http://www.w3.org/2000/svg",
+        viewBox=f"0 0 {width:g} {height:g}",
+        role="img",
+        aria_label=title,
+        font_family=FONT_FAMILY,
     )
+    return Markup(frame)
 
 
 def shorten_text(text: str, width: float, size: float = 11.0) -> str:
@@ -65,16 +71,15 @@ class Look:
     dash: str = ""
 
 
-MEASURED_LOOK = Look("measured", "#8b929b", 2.8)
-GIVEN_LOOK = Look("simulation as given", "#b87800", 1.3, "6 3")
-REFITTED_LOOK = Look("rigid body refitted", "#0072b2", 1.3, "2 2")
-FOUND_LOOK = Look("with what was found", "#007a58", 1.4)
-FLOOR_LOOK = Look("noise floor", "#9c4a7e", 1.4, "8 3 2 3")
-LAW_LOOK = Look("fitted law", "#c44e00", 2.0)
-SURROGATE_LOOK = Look("surrogate", "#7b3294", 2.0)
-FITTED_ROWS_LOOK = Look("data of the fit", "#a9b0b8", 2.6)
-HELD_OUT_ROWS_LOOK = Look("held-out data", "#3d6f9e", 2.6)
-GUILTY_COLOR, UNKNOWN_COLOR, INNOCENT_COLOR = "#c44e00", "#7b3294", "#7d8791"
+MEASURED_LOOK = Look("measured", palette.MIDDLE, 2.8)
+GIVEN_LOOK = Look("simulation as given", palette.AMBER, 1.3, "6 3")
+REFITTED_LOOK = Look("rigid body refitted", palette.BLUE, 1.3, "2 2")
+FOUND_LOOK = Look("with what was found", palette.DARK_GREEN, 1.4)
+FLOOR_LOOK = Look("noise floor", palette.PLUM, 1.4, "8 3 2 3")
+LAW_LOOK = Look("fitted law", palette.DARK_VERMILION, 2.0)
+SURROGATE_LOOK = Look("surrogate", palette.PURPLE, 2.0)
+FITTED_ROWS_LOOK = Look("data of the fit", palette.SILVER, 2.6)
+HELD_OUT_ROWS_LOOK = Look("held-out data", palette.BLUE, 2.6)
 
 
 MIN_LOG_SPAN = 3.0  # factor below which a logarithmic axis is widened
@@ -174,7 +179,7 @@ Layer = Line | Points | Level
 
 def draw_chart(
     title: str, x: Axis, y: Axis, layers: Sequence[Layer], about: str = "", height: float = CHART_HEIGHT
-) -> str:
+) -> Markup:
     """The chart as SVG. about: what it shows in a sentence, the title if left out."""
     entries = list(dict.fromkeys((layer.look, isinstance(layer, Points)) for layer in layers))
     legend, top = _draw_legend(entries)
@@ -225,18 +230,18 @@ class _PlotFrame:
         for value, text in self.y.ticks(5):
             height = float(self.place(np.array(self.x.low), np.array(value))[1])
             out += svg_element(
-                "line", x1=LEFT_MARGIN, x2=CHART_WIDTH - RIGHT_MARGIN, y1=height, y2=height, stroke="#e6e9ed"
+                "line", x1=LEFT_MARGIN, x2=CHART_WIDTH - RIGHT_MARGIN, y1=height, y2=height, stroke=palette.GRID
             )
-            out += svg_text(text, LEFT_MARGIN - 5, height + 4, 10.5, "end", fill=PALE_COLOR)
+            out += svg_text(text, LEFT_MARGIN - 5, height + 4, 10.5, "end", fill=palette.PALE)
         for value, text in self.x.ticks(6):
             across = float(self.place(np.array(value), np.array(self.y.low))[0])
-            out += svg_element("line", x1=across, x2=across, y1=self.bottom, y2=self.bottom + 4, stroke=PALE_COLOR)
-            out += svg_text(text, across, self.bottom + 16, 10.5, "middle", fill=PALE_COLOR)
+            out += svg_element("line", x1=across, x2=across, y1=self.bottom, y2=self.bottom + 4, stroke=palette.PALE)
+            out += svg_text(text, across, self.bottom + 16, 10.5, "middle", fill=palette.PALE)
         out += svg_element(
             "path",
             d=f"M{LEFT_MARGIN} {self.top:.1f}V{self.bottom:.1f}H{CHART_WIDTH - RIGHT_MARGIN}",
             fill="none",
-            stroke=LINE_COLOR,
+            stroke=palette.RULE,
         )
         middle = (self.top + self.bottom) / 2
         label = shorten_text(self.y.label, self.bottom - self.top + 20, 10.5)
@@ -295,7 +300,7 @@ def _draw_stroke(path: str, look: Look) -> str:
         "path",
         d=path,
         fill="none",
-        stroke=look.color or INK_COLOR,
+        stroke=look.color or palette.INK,
         stroke_width=look.width,
         stroke_linejoin="round",
         **chosen,

@@ -1,0 +1,285 @@
+"""What the report page says, as plain data for its template: the first screen, what to do next, then the details."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+from markupsafe import Markup
+
+from armlab.common.report.page import Table
+from armlab.diagnosis.report.gallery import Gallery
+from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
+from armlab.diagnosis.report.words import (
+    effect_in_words,
+    finding_in_words,
+    format_gap,
+    format_number,
+    format_probability,
+    format_share,
+    join_words,
+    joint_unit,
+    parameter_rows,
+    place_in_words,
+)
+from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.story import finding_shares, story_sentence, tell_story
+from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
+from armlab.identification.export import has_place_in_simulator
+from armlab.recordings.reading.corrected import CORRECTED_FOLDER
+from armlab.recordings.reading.words import describe
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a page comes from. table: recording, robot, runs, versions. command: that repeats it."""
+
+    table: Table
+    settings: Table
+    command: str
+
+
+@dataclass(frozen=True)
+class FindingDetail:
+    """One finding. share: of the error that it explains. picture: its evidence."""
+
+    title: str
+    share: str
+    error: str
+    about: str
+    equation: str
+    picture: Markup
+    numbers: Table
+    gain: str
+    rivals: Sequence[str]
+    next_experiment: str
+
+
+@dataclass(frozen=True)
+class SetupPart:
+    """How the recording is to be read."""
+
+    text: str
+    table: Table
+
+
+def story_text(diagnosis: Diagnosis) -> str:
+    """The causes of the error in a sentence; empty without findings."""
+    chapters = tell_story(diagnosis)
+    return story_sentence(chapters, len(diagnosis.simulation.arm)) if chapters else ""
+
+
+def guilty_joints(diagnosis: Diagnosis) -> str:
+    """The joints of the findings by their names; empty where none is guilty."""
+    joints = diagnosis.simulation.arm.joints
+    numbers = sorted({claim.joint for claim in diagnosis.claims if claim.joint is not None})
+    if not numbers:
+        return ""
+    names = [f"{number} ({joints[number - 1].name})" for number in numbers]
+    return f"Guilty: joint{'s' if len(names) > 1 else ''} {join_words(names)}."
+
+
+def cause_table(diagnosis: Diagnosis) -> Table | None:
+    """The causes with their findings, the largest first; None without findings."""
+    rows = []
+    for each in tell_story(diagnosis):
+        names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
+        joints = ", ".join(str(joint) for joint in each.joints) or "all"
+        rows.append([each.cause, joints, format_share(each.share), join_words(list(names))])
+    return Table(["cause", "joints", "share of the error", "findings"], rows, (0, 1, 3)) if rows else None
+
+
+def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
+    """How the recording is to be read, where it is read wrongly; None where it is not."""
+    setup = diagnosis.setup
+    if setup is None or not setup.findings:
+        return None
+    rows = []
+    for each in setup.findings:
+        size = joint_unit(diagnosis.simulation.arm, each.worst_joint - 1)
+        error = (
+            f"{format_number(each.rms_before)} → {format_number(each.rms_after)} {size} (joint {each.worst_joint}); "
+            f"{each.share_before:.0%} → {each.share_after:.0%} of its torque"
+        )
+        rivals = "; ".join(rival.text for rival in each.rivals)
+        rows.append([describe(each.mistake), error, rivals or "–", each.next_experiment or "–"])
+    headings = ["read wrongly", "held-out error as it is → read rightly", "fits as well", "to tell"]
+    text = (
+        f"{setup.looks} readings of the recording and of the robot file were compared on blocks of time that were held "
+        f"out of the runs that identify. {CORRECTED_FOLDER}/ beside this page holds both as they should be; everything "
+        "below is of the recording read rightly."
+    )
+    return SetupPart(text, Table(headings, rows, (0, 1, 2, 3), stacked=True))
+
+
+def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> Table:
+    """Held-out errors by joint, the gap that is closed, and how long what is left remembers itself."""
+    given = None if data.given is None else data.held_out_rms(data.given)
+    headings = ["joint", *(["as given"] if given is not None else []), "refitted", "found", "noise floor", "gap closed"]
+    rows = []
+    for joint, each in enumerate(diagnosis.fit):
+        size = joint_unit(diagnosis.simulation.arm, joint)
+        first = [] if given is None else [f"{format_number(float(given[joint]))} {size}"]
+        errors = [f"{format_number(value)} {size}" for value in (each.before, each.after, each.noise_floor)]
+        times = [
+            1e3 * correlation_seconds(residual[:, joint], joint, data.observed) for residual in (data.refit, data.final)
+        ]
+        memory = f"{times[0]:.0f} → {times[1]:.0f} ms"
+        rows.append([str(each.joint), *first, *errors, format_gap(each.gap_closed), memory])
+    headings.append(f"memory (filter {1e3 * filter_correlation_seconds(data.observed):.0f} ms)")
+    return Table(headings, rows, stacked=True)
+
+
+def whiteness_text(diagnosis: Diagnosis, data: ShownResiduals) -> str:
+    """Whether what is left is noise: a floor that remembers itself holds structure too."""
+    joints = [joint for joint in range(len(diagnosis.fit)) if not is_white(data.final[:, joint], joint, data.observed)]
+    times = [1e3 * correlation_seconds(data.final[:, joint], joint, data.observed) for joint in joints]
+    tied = [f"{joint + 1} ({each:.0f} ms)" for joint, each in zip(joints, times, strict=True)]
+    if not tied:
+        return "What is left is as white as noise through this filter would be."
+    filtered = 1e3 * filter_correlation_seconds(data.observed)
+    return (
+        f"What is left is not white at joint {', '.join(tied)}: it is tied to itself for longer than noise through "
+        f"this filter ({filtered:.0f} ms), so the noise floor there holds structure too."
+    )
+
+
+def finding_details(diagnosis: Diagnosis, gallery: Gallery) -> list[FindingDetail]:
+    """Each finding with its equation, numbers, evidence and rivals, the largest share of the error first."""
+    shares = [share or 0.0 for share in finding_shares(diagnosis)]
+    order = sorted(range(len(shares)), key=lambda place: -shares[place])
+    return [_finding_detail(diagnosis, *gallery.evidence[place], shares[place]) for place in order]
+
+
+def _finding_detail(diagnosis: Diagnosis, claim: Claim, picture: Markup, share: float) -> FindingDetail:
+    evidence = claim.evidence
+    size = joint_unit(diagnosis.simulation.arm, evidence.joint)
+    before, after = format_number(evidence.rms_before), format_number(evidence.rms_after)
+    gain = (
+        f"Joint {evidence.joint + 1} on held-out data: {before} {size} without it, {after} {size} with it (whitened, "
+        f"its variance is {format_number(1 + evidence.gain)} times as large without it). "
+        f"p-value {format_probability(evidence.corrected)} after correction for everything that was compared."
+    )
+    title = finding_in_words(claim)
+    return FindingDetail(
+        title=title[0].upper() + title[1:],
+        share=format_share(share),
+        error=f"joint {evidence.joint + 1}: {before} → {after} {size}",
+        about=effect_named(claim.effect).meaning,
+        equation=claim.equation,
+        picture=picture,
+        numbers=parameter_table(claim),
+        gain=gain,
+        rivals=[_rival_text(claim, place) for place in range(len(claim.rivals))],
+        next_experiment=claim.next_experiment or "",
+    )
+
+
+def parameter_table(claim: Claim) -> Table:
+    """Named parameters of a finding with their intervals."""
+    rows = [
+        [each.name, each.value, each.interval, each.unit] for one in claim.parameters for each in parameter_rows(one)
+    ]
+    return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3))
+
+
+def _rival_text(claim: Claim, place: int) -> str:
+    each = claim.rivals[place]
+    why = (
+        "no motion of this arm can tell the two apart"
+        if each.identical
+        else f"on this very motion it fits as well ({format_number(each.deficit)} units of log likelihood worse)"
+    )
+    return f"{effect_in_words(each.effect)}, {place_in_words(each.effect, each.joint, each.joints)}: {why}"
+
+
+def unexplained_lines(diagnosis: Diagnosis) -> list[str]:
+    """What stays without a name, joint by joint."""
+    return [
+        f"Joint {each.joint}: {100 * each.share:.0f} % of the held-out error variance depends on "
+        f"{', '.join(name.replace('_', ' of joint ') for name in each.depends_on)}, and no effect of the library has "
+        "that form. A surrogate of these variables is in the errors above, not in model.yaml."
+        for each in diagnosis.unexplained
+    ]
+
+
+def located_table(diagnosis: Diagnosis) -> Table:
+    """Which joints carry the excess error, and in which regime."""
+    rows = []
+    for each in diagnosis.located:
+        stretch = "–" if each.time is None else f"{format_number(each.time[0])} to {format_number(each.time[1])} s"
+        rows.append([str(each.joint), format_share(each.share), each.regime, ", ".join(each.runs) or "–", stretch])
+    return Table(["joint", "share of the excess error", "where", "runs", "stretch of time"], rows, (2, 3, 4))
+
+
+def next_steps(diagnosis: Diagnosis) -> list[str]:
+    """Which experiments would tell rivals apart, and what to do with the model."""
+    if not diagnosis.fit:
+        return []
+    asked = [
+        f"{finding_in_words(claim)[0].upper()}{finding_in_words(claim)[1:]}: {claim.next_experiment}."
+        for claim in diagnosis.claims
+        if claim.next_experiment
+    ]
+    if any(claim.rivals for claim in diagnosis.claims):
+        asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
+    elif any(claim.effect == UNKNOWN.id for claim in diagnosis.claims):
+        asked.append("Look at the details of what is unknown: the variables that it depends on say where to look.")
+    use = [
+        "model.yaml beside this page holds the links and every named effect: `armlab predict model.yaml RECORDING` "
+        "compares it with another recording.",
+        _export_text(diagnosis),
+    ]
+    return asked + use
+
+
+def _export_text(diagnosis: Diagnosis) -> str:
+    if diagnosis.simulation.inertial is None:
+        return "It has base parameters, which simulators do not take: they need nominal `links` to start from."
+    missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
+    lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""
+    return f"Where a simulator needs it: `armlab export-model model.yaml model.xml` writes MJCF.{lost}"
+
+
+def _has_place_in_simulator(claim: Claim) -> bool:
+    if claim.candidate is None or claim.coefficients is None:
+        return False
+    return claim.in_links or has_place_in_simulator(claim.candidate, claim.coefficients)
+
+
+def method_text(diagnosis: Diagnosis, held_out_blocks: bool) -> str:
+    """How it was done, in a few sentences."""
+    held = (
+        "No run was kept for validation, so every third of six blocks of time was held out."
+        if held_out_blocks
+        else "Runs that validate took no part in any fit."
+    )
+    return (
+        f"{diagnosis.looks} candidates and shapes were compared in {len(diagnosis.steps)} moves. Torque and columns "
+        f"passed the same filter ({format_number(float(diagnosis.settings.get('cutoff_hz', 0.0)))} Hz at most). Errors "
+        "count as correlated in time; p-values are corrected for everything that was compared; a finding has to lower "
+        "the error on held-out data and to obey the signs of physics. No candidate is built from measured torque. "
+        f"{held}"
+    )
+
+
+def origin_of(diagnosis: Diagnosis, command: str) -> Origin:
+    """Where the data come from, and the command that repeats it."""
+    recording, simulation = diagnosis.recording, diagnosis.simulation
+    compared = {
+        "nominal": "simulation as given",
+        "refit": "rigid body refitted",
+        "simulated": "torque simulated elsewhere",
+    }
+    name = recording.simulation.name if recording.simulation else f"links of {recording.robot}"
+    rows = [
+        ["recording", recording.name],
+        ["robot", f"{simulation.arm.name}, {len(simulation.arm)} joint(s)"],
+        ["compared with", compared[simulation.kind] + (f" ({name})" if simulation.kind == "nominal" else "")],
+        *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
+        *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),
+        *(["warning", each.text] for each in diagnosis.signs),
+        ["armlab", version("armlab")],
+    ]
+    settings = [[key.replace("_", " "), str(value)] for key, value in diagnosis.settings.items()]
+    return Origin(Table(["what", "of this page"], rows, (0, 1)), Table(["setting", "value"], settings, (0, 1)), command)
