@@ -1,7 +1,6 @@
 """The flows of `armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
 
 from dataclasses import dataclass
-from html import escape
 from importlib.metadata import version
 from pathlib import Path
 
@@ -10,10 +9,11 @@ import pandas as pd
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
+from armlab.common.report.page import png_address, render_page
+from armlab.common.report.palette import figure_style
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 from armlab.identification.model_file import model_content, model_text
-from armlab.identification.pictures import png_data_url
 from armlab.identification.priors import NO_PULL, Pull
 from armlab.identification.selection import (
     candidate_groups,
@@ -29,21 +29,22 @@ from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_text
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
 
-PAGE_STYLE = "body{font:15px/1.45 system-ui,sans-serif;max-width:1060px;margin:2em auto;color:#222}img{max-width:100%}"
-
 
 def identification_page(recording: Recording, identifier: Identifier, errors: tuple[RunError, ...]) -> str:
     """The page, as HTML."""
     model = identifier.model_
-    parts = [
-        f"<h1>{escape(recording.name)}</h1><p>Cut-off {model.cutoff_hz:.4g} Hz; condition number "
-        f"{identifier.condition_number_:.4g} (columns at unit length); 95 % intervals for correlated errors.</p>",
-        f"<h2>Errors</h2><pre>{escape(error_table(errors))}</pre>",
-        f"<h2>Parameters</h2><pre>{escape(str(model))}</pre><h2>Residuals</h2>",
-        *(f'<img alt="{escape(run.name)}" src="{png_data_url(model.plot(run))}">' for run in recording.runs),
-    ]
-    head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{escape(recording.name)}</title>'
-    return f"{head}<style>{PAGE_STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
+    with figure_style():
+        pictures = [(run.name, png_address(model.plot(run))) for run in recording.runs]
+    return render_page(
+        "armlab.identification",
+        "identification.html",
+        f"Identification of {recording.name}",
+        summary=f"Cut-off {model.cutoff_hz:.4g} Hz; condition number {identifier.condition_number_:.4g} (columns at "
+        "unit length); each 95 % interval is for correlated errors.",
+        errors=error_table(errors),
+        parameters=str(model),
+        pictures=pictures,
+    )
 
 
 NO_VALIDATION_WARNING = (

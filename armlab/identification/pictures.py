@@ -1,10 +1,8 @@
 """Pictures of a model beside a run."""
 
-import base64
-from io import BytesIO
-
 from matplotlib.figure import Figure
 
+from armlab.common.report import palette
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 
@@ -18,9 +16,9 @@ def residual_figure(model: TorqueModel, signals: Signals) -> Figure:
     axes = figure.subplots(joints, 2, sharex=True, squeeze=False)
     for joint, (left, right) in enumerate(axes):
         unit = "N m" if model.arm.joints[joint].kind == "revolute" else "N"
-        left.plot(signals.time, signals.torque[:, joint], color="0.6", linewidth=1.2, label="recorded")
-        left.plot(signals.time, predicted[:, joint], color="tab:blue", linewidth=0.8, label="model")
-        right.plot(signals.time, signals.torque[:, joint] - predicted[:, joint], color="tab:red", linewidth=0.7)
+        left.plot(signals.time, signals.torque[:, joint], color=palette.MIDDLE, linewidth=1.2, label="recorded")
+        left.plot(signals.time, predicted[:, joint], color=palette.BLUE, linewidth=0.8, label="model")
+        right.plot(signals.time, signals.torque[:, joint] - predicted[:, joint], color=palette.VERMILION, linewidth=0.7)
         left.set_ylabel(f"{model.arm.joints[joint].name}\n{unit}", fontsize=8)
     axes[0, 0].set_title(f"torque on {signals.run.name}", fontsize=9)
     axes[0, 1].set_title("recorded - model", fontsize=9)
@@ -30,10 +28,3 @@ def residual_figure(model: TorqueModel, signals: Signals) -> Figure:
     for axis in axes.flat:
         axis.tick_params(labelsize=7)
     return figure
-
-
-def png_data_url(figure: Figure) -> str:
-    """A figure as the address of an embedded picture."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=80)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")

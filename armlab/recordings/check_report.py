@@ -1,9 +1,7 @@
 """The HTML page of `armlab recording check`: findings first, then each run with its pictures."""
 
-import base64
-from collections.abc import Callable, Iterator
-from html import escape
-from io import BytesIO
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,9 @@ from matplotlib.ticker import NullFormatter
 
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
+from armlab.common.report import palette
+from armlab.common.report.page import png_address, render_page
+from armlab.common.report.palette import figure_style, series_style
 from armlab.recordings.check import CheckResult
 from armlab.recordings.cutoff import CutoffChoice
 from armlab.recordings.differentiate import Signals, differentiate
@@ -21,14 +22,7 @@ from armlab.recordings.recording import ROLES, MotionRun, Recording, Run
 from problem.arm import Arm
 
 FIGURE_WIDTH_IN, ROW_HEIGHT_IN = 11.0, 1.5  # inches
-RAW_COLOR, FILTERED_COLOR = "0.72", "tab:blue"
-
-
-def encode_png(figure: Figure) -> str:
-    """A figure as the address of an embedded picture."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=90)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
+RAW_COLOR, FILTERED_COLOR, LIMIT_COLOR = palette.STROKE, palette.BLUE, palette.VERMILION
 
 
 def draw_signals(signals: Signals, arm: Arm) -> Figure:
@@ -52,7 +46,7 @@ def draw_motion(run: MotionRun, arm: Arm) -> Figure:
     def draw(left: Axes, right: Axes, joint: int) -> None:
         left.plot(run.time, command[:, joint], color=RAW_COLOR, linewidth=0.8, label="command")
         left.plot(run.time, run.position[:, joint], color=FILTERED_COLOR, linewidth=1, label="position")
-        right.plot(run.time, command[:, joint] - run.position[:, joint], color="black", linewidth=0.8)
+        right.plot(run.time, command[:, joint] - run.position[:, joint], color=palette.INK, linewidth=0.8)
         right.set_ylabel(_unit_of(arm, joint), fontsize=8)
 
     return _draw_joints(run, arm, ("command and position", "command - position"), draw)
@@ -85,7 +79,7 @@ def _show_limits(axis: Axes, limits: tuple[float, float], position: Array) -> No
     span = float(np.ptp(position)) or 1.0
     for limit in limits:
         if position.min() - span / 4 < limit < position.max() + span / 4:
-            axis.axhline(limit, color="tab:red", linewidth=0.8, linestyle="--")
+            axis.axhline(limit, color=LIMIT_COLOR, linewidth=0.8, linestyle="--")
 
 
 def draw_stamps(run: MotionRun) -> Figure:
@@ -105,19 +99,19 @@ def draw_cutoff(choice: CutoffChoice, arm: Arm) -> Figure:
     left, right = figure.subplots(1, 2)
     inside = choice.frequency_hz > 0
     for joint in range(choice.spectrum.shape[1]):
-        color = f"C{joint % 10}"
+        color = series_style(joint).color
         spectrum = _smooth_spectrum(choice.spectrum[inside, joint])
         left.loglog(choice.frequency_hz[inside], spectrum, color=color, linewidth=0.8, label=arm.joints[joint].name)
         left.loglog(choice.frequency_hz[inside], choice.noise[inside, joint], ":", color=color, linewidth=0.8)
     left.set(
         xlabel="frequency, Hz", ylabel="power of acceleration", title="acceleration (solid), encoder noise (dotted)"
     )
-    right.loglog(choice.candidates_hz, np.maximum(choice.risk, 1e-12), color="black", linewidth=1)
+    right.loglog(choice.candidates_hz, np.maximum(choice.risk, 1e-12), color=palette.INK, linewidth=1)
     right.set(xlabel="cut-off, Hz", ylabel="estimated error", title=f"cut-off {choice.cutoff_hz:.3g} Hz")
     for axis in (left, right):
         axis.xaxis.set_minor_formatter(NullFormatter())
         axis.yaxis.set_minor_formatter(NullFormatter())
-        axis.axvline(choice.cutoff_hz, color="tab:red", linewidth=1)
+        axis.axvline(choice.cutoff_hz, color=LIMIT_COLOR, linewidth=1)
     left.legend(fontsize=6, ncols=2)
     _shrink_labels(np.array([left, right]))
     return figure
@@ -139,36 +133,39 @@ def _shrink_labels(axes: np.ndarray) -> None:
         axis.grid(alpha=0.25)
 
 
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; max-width: 1060px; margin: 2em auto; padding: 0 1em; color: #222; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ccc; }
-table { border-collapse: collapse; width: 100%; } th, td { text-align: left; padding: 4px 10px; vertical-align: top; }
-th { border-bottom: 2px solid #888; } td { border-bottom: 1px solid #e4e4e4; }
-img { max-width: 100%; display: block; margin: 0.6em 0; }
-.refused { color: #b00020; font-weight: 600; } .warning { color: #a85400; font-weight: 600; }
-td:nth-child(2) { white-space: nowrap; }
-.repaired { color: #00589b; } .note { color: #666; }
-"""
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a run. address: of its data. text: why it looks so, before it."""
+
+    address: str
+    about: str
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class RunPart:
+    """What the page says of a run."""
+
+    title: str
+    facts: str
+    pictures: Sequence[Picture]
 
 
 def write_check_page(check: CheckResult, path: Path) -> Path:
     """Writes the page of a check and returns its path; InputError where it cannot be written."""
-    body = "".join(_render_body(check))
-    name = escape(check.recording.name)
-    head = (
-        f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{name}</title><style>{STYLE}</style></head>'
-    )
-    write_whole(path, f"{head}<body>{body}</body></html>\n")
-    return path
-
-
-def _render_body(check: CheckResult) -> Iterator[str]:
     recording = check.recording
-    yield f"<h1>Recording {escape(recording.name)}</h1><p>{escape(_summarize_recording(recording))}</p>"
-    yield "<h2>Findings</h2>"
-    yield _render_findings(check)
-    for run in recording.runs:
-        yield from _render_run(run, recording)
+    with figure_style():
+        runs = [_run_part(run, recording) for run in recording.runs]
+    page = render_page(
+        "armlab.recordings",
+        "check.html",
+        f"Recording {recording.name}",
+        summary=_summarize_recording(recording),
+        findings=_finding_rows(check),
+        runs=runs,
+    )
+    write_whole(path, page)
+    return path
 
 
 def _summarize_recording(recording: Recording | MotionRecording) -> str:
@@ -182,45 +179,36 @@ def _summarize_recording(recording: Recording | MotionRecording) -> str:
     )
 
 
-def _render_findings(check: CheckResult) -> str:
+def _finding_rows(check: CheckResult) -> list[tuple[str, str, str, str]]:
+    """Kind, run, joint and text of each finding, the worst first."""
     rows = [("refused", file, "", reason) for file, reason in check.refused]
     for run, finding in check.findings:
         rows.append((finding.severity, run, str(finding.joint or ""), finding.text))
-    if not rows:
-        return "<p>Nothing was repaired and nothing looks wrong.</p>"
     order = ("refused", "warning", "repaired", "note")
-    rows.sort(key=lambda row: order.index(row[0]))
-    cells = "".join(
-        f'<tr><td class="{kind}">{kind}</td><td>{escape(run)}</td><td>{joint}</td><td>{escape(text)}</td></tr>'
-        for kind, run, joint, text in rows
-    )
-    return f"<table><tr><th></th><th>run</th><th>joint</th><th>what</th></tr>{cells}</table>"
+    return sorted(rows, key=lambda row: order.index(row[0]))
 
 
-def _render_run(run: MotionRun, recording: Recording | MotionRecording) -> Iterator[str]:
-    yield f"<h2>{escape(run.name)} ({run.role})</h2>"
-    yield f"<p>{run.samples} samples at {run.rate_hz:.5g} Hz, {run.time[-1] - run.time[0]:.4g} s.</p>"
+def _run_part(run: MotionRun, recording: Recording | MotionRecording) -> RunPart:
+    pictures = []
     if isinstance(recording, MotionRecording):
-        picture = encode_png(draw_motion(run, recording.recorded_arm))
-        yield _embed_picture(picture, f"command and position of {run.name}")
+        address = png_address(draw_motion(run, recording.recorded_arm))
+        pictures.append(Picture(address, f"command and position of {run.name}"))
     elif isinstance(run, Run):
-        yield from _render_filtering(run, recording.arm)
+        pictures += _filter_pictures(run, recording.arm)
     if not run.even:
-        yield _embed_picture(encode_png(draw_stamps(run)), f"time between the samples of {run.name}")
+        pictures.append(Picture(png_address(draw_stamps(run)), f"time between the samples of {run.name}"))
+    facts = f"{run.samples} samples at {run.rate_hz:.5g} Hz, {run.time[-1] - run.time[0]:.4g} s."
+    return RunPart(f"{run.name} ({run.role})", facts, pictures)
 
 
-def _render_filtering(run: Run, arm: Arm) -> Iterator[str]:
+def _filter_pictures(run: Run, arm: Arm) -> Iterator[Picture]:
     """Torque as recorded and filtered, and why the cut-off was chosen."""
     signals = differentiate(run)
-    yield _embed_picture(encode_png(draw_signals(signals, arm)), f"position and torque of {run.name}")
+    yield Picture(png_address(draw_signals(signals, arm)), f"position and torque of {run.name}")
     if signals.cutoff is not None:
         choice = signals.cutoff
-        yield (
-            f"<p>Cut-off {choice.cutoff_hz:.3g} Hz: the least estimated error of the acceleration, at most ten times "
-            f"the bandwidth of the motion ({choice.motion_hz:.2g} Hz).</p>"
+        text = (
+            f"Cut-off {choice.cutoff_hz:.3g} Hz: the least estimated error of the acceleration, at most ten times "
+            f"the bandwidth of the motion ({choice.motion_hz:.2g} Hz)."
         )
-        yield _embed_picture(encode_png(draw_cutoff(choice, arm)), f"choice of the cut-off for {run.name}")
-
-
-def _embed_picture(address: str, text: str) -> str:
-    return f'<img alt="{escape(text)}" src="{address}">'
+        yield Picture(png_address(draw_cutoff(choice, arm)), f"choice of the cut-off for {run.name}", text)
