@@ -12,23 +12,24 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
+from armlab.common.report import palette
 from bench.printed import display_name
 
 # Okabe and Ito 2008: told apart by readers with any colour vision; yellow is left out, too pale for a line. Then grey
 # and four of Tol's muted colours; with as many lines, the markers help.
 _STYLES: tuple[tuple[str, str | tuple[int, tuple[int, ...]], str], ...] = (
-    ("#0072B2", "solid", "o"),
-    ("#D55E00", "dashed", "s"),
-    ("#009E73", "dashdot", "^"),
-    ("#CC79A7", "dotted", "D"),
-    ("#E69F00", (0, (5, 1)), "v"),
-    ("#56B4E9", (0, (3, 1, 1, 1, 1, 1)), "P"),
-    ("#000000", (0, (1, 1)), "X"),
-    ("#999999", "solid", "*"),
-    ("#882255", "dashed", "<"),
-    ("#999933", "dashdot", ">"),
-    ("#332288", "dotted", "p"),
-    ("#AA4499", (0, (5, 1)), "h"),
+    (palette.BLUE, "solid", "o"),
+    (palette.VERMILION, "dashed", "s"),
+    (palette.GREEN, "dashdot", "^"),
+    (palette.PINK, "dotted", "D"),
+    (palette.ORANGE, (0, (5, 1)), "v"),
+    (palette.SKY, (0, (3, 1, 1, 1, 1, 1)), "P"),
+    (palette.BLACK, (0, (1, 1)), "X"),
+    (palette.GREY, "solid", "*"),
+    (palette.WINE, "dashed", "<"),
+    (palette.OLIVE, "dashdot", ">"),
+    (palette.INDIGO, "dotted", "p"),
+    (palette.MAGENTA, (0, (5, 1)), "h"),
 )
 DrawPanels = Callable[[Sequence[Axes]], None]
 

@@ -1,10 +1,9 @@
-"""The report about a result set as one HTML file that loads nothing from the network: sections, style, scripts and the
-data of the charts.
+"""The report about a result set as one HTML file that loads nothing from the network, with scripts and the data of
+its charts.
 """
 
 import json
 from collections.abc import Sequence
-from html import escape
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -12,13 +11,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import yaml
+from markupsafe import Markup
 
 from algorithms.registry import names as registered
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
+from armlab.common.report.page import render_page
+from armlab.common.report.palette import series_style
 from bench.report import sections
 from bench.report.analysis import Cell, analyse_cells, share_of_targets_reached
-from bench.report.ranking_chart import chart_style
+from bench.report.ranking_chart import draw_critical_difference
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import ResultSet
 from bench.statistics.critical_difference import block_losses, critical_difference
@@ -80,29 +82,27 @@ _SCRIPTS = ("scales.js", "lines.js", "boxes.js", "page.js")
 
 def report_page(results: ResultSet, cells: Sequence[Cell], facts: Sequence[AlgorithmProperties]) -> str:
     """The page as HTML; facts: properties of the algorithms that took part and are registered here."""
-    looks = {name: chart_style(index) for index, name in enumerate(results.algorithms)}
+    looks = {name: series_style(index) for index, name in enumerate(results.algorithms)}
     found = critical_difference(block_losses([cell.losses for cell in cells]))
-    parts = [
-        sections.header_section(results, cells, found),
-        sections.algorithm_buttons(looks),
-        sections.ranking_section(found, cells, results.algorithms, looks),
-        sections.overall_section(),
-        sections.problem_section(cells),
-        sections.power_section(cells),
-        sections.properties_section(facts),
-        sections.origin_section(results),
-    ]
-    style = _read_asset("page.css")
-    scripts = "\n".join(_read_asset(name) for name in _SCRIPTS)
     data = page_data(cells, results.algorithms).replace("<", "\\u003c")  # a label must not end the script
-    title = escape(results.name)
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f'<title>{title}</title>\n<link rel="icon" href="data:,">\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n'
-        + "\n".join(parts)
-        + f'\n</main>\n<script type="application/json" id="data">{data}</script>\n<script>\n{scripts}</script>\n'
-        "</body>\n</html>\n"
+    return render_page(
+        __package__,
+        "results.html",
+        results.name,
+        counts=sections.count_sentence(results, cells),
+        headline=sections.headline(cells, found),
+        looks=looks,
+        ranking=sections.ranking_text(found, cells),
+        picture=draw_critical_difference(found, looks),
+        tally=sections.tally_table(cells, results.algorithms) if len(cells) > 1 else None,
+        problems=[
+            sections.ProblemPart(cell.label, sections.ends_table(cell), sections.duels_table(cell)) for cell in cells
+        ],
+        power=sections.power_part(cells),
+        properties=sections.properties_part(facts),
+        origin=sections.origin_part(results),
+        data=Markup(data),
+        scripts=Markup("\n".join(_read_asset(name) for name in _SCRIPTS)),
     )
 
 

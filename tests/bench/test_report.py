@@ -10,10 +10,11 @@ import pandas as pd
 import pytest
 from small_results import CONFIG, Ran, ran
 
+from armlab.common.report.palette import series_style
 from bench.report.analysis import Cell, analyse_cell, analyse_cells
 from bench.report.page import page_data, report_page, write_report
-from bench.report.ranking_chart import chart_style, draw_critical_difference
-from bench.report.sections import ends_table, format_number, tally_table
+from bench.report.ranking_chart import draw_critical_difference
+from bench.report.sections import ends_table, format_number, headline, tally_table
 from bench.result_sets.formats import read_results, share_results
 from bench.result_sets.result_set import ResultSet, TableOfCurves
 from bench.statistics.critical_difference import block_losses, critical_difference
@@ -133,39 +134,49 @@ def test_the_picture_has_a_dot_an_algorithm_and_a_bar_a_group_and_says_so_in_wor
     base = rng.normal(size=20)
     losses = pd.DataFrame({"b": base + 5, "a": base, "c": base + 5 + rng.normal(scale=0.1, size=20)})
     found = critical_difference(losses)
-    picture = draw_critical_difference(found, {name: chart_style(k) for k, name in enumerate("abc")})
+    picture = draw_critical_difference(found, {name: series_style(k) for k, name in enumerate("abc")})
     assert picture.count("<circle") == 3
-    assert picture.count('class="group"') == len(found.groups) == 1
+    assert picture.count('stroke-width="4"') == len(found.groups) == 1
     assert "Average ranks: a 1.00, " in picture
     assert "Not told apart: b and c" in picture or "Not told apart: c and b" in picture
+
+
+def test_the_headline_says_who_beats_whom_and_who_ties(cell: Cell) -> None:
+    rng = np.random.default_rng(0)
+    base = rng.normal(size=20)
+    losses = pd.DataFrame({"b": base + 5, "a": base, "c": base + 5 + rng.normal(scale=0.1, size=20)})
+    first, second = headline([cell], critical_difference(losses))
+    assert re.fullmatch(r"a has the best average rank, 1\.00 of 3: it beats (b and c|c and b)\.", first)
+    assert second == "1 of 3 pairs tie: no difference was shown."
 
 
 def test_the_axis_of_many_ranks_numbers_as_many_as_there_is_room_for() -> None:
     names = [f"a{k}" for k in range(22)]
     found = critical_difference(pd.DataFrame(np.random.default_rng(0).normal(size=(3, 22)), columns=names))
-    picture = draw_critical_difference(found, {name: chart_style(k) for k, name in enumerate(names)})
-    numbers = [float(x) for x in re.findall(r'<text x="([\d.]+)" y="20" text-anchor="middle">\d+</text>', picture)]
+    picture = draw_critical_difference(found, {name: series_style(k) for k, name in enumerate(names)})
+    axis = r'<text x="([\d.]+)" y="20" [^>]*text-anchor="middle"[^>]*>\d+</text>'
+    numbers = [float(x) for x in re.findall(axis, picture)]
     assert len(numbers) > 5
     assert min(np.diff(numbers)) >= 20
 
 
 def test_no_two_of_many_algorithms_look_the_same() -> None:
-    assert len({chart_style(index) for index in range(40)}) == 40
+    assert len({series_style(index) for index in range(40)}) == 40
 
 
 def test_the_tally_counts_problems_won_and_lost_on_both_sides(results: ResultSet) -> None:
     cells = analyse_cells(results)
-    text = tally_table(cells, results.algorithms)
+    text = " ".join(cell for row in tally_table(cells, results.algorithms).rows for cell in row)
     scores = re.findall(r"(\d) – (\d)", text)
     assert len(scores) == 6
     assert sorted(scores) == sorted((lost, won) for won, lost in scores)
 
 
 def test_the_table_of_ends_has_medians_intervals_and_expected_running_times(cell: Cell) -> None:
-    text = ends_table(cell)
-    assert "<td>15 (10 – 20)</td>" in text
-    assert "<td>50%</td>" in text
-    assert text.count("ERT to ") == 3
+    table = ends_table(cell)
+    assert table.rows[0][1] == "15 (10 – 20)"
+    assert table.rows[1][4] == "50%"
+    assert sum(heading.startswith("ERT to ") for heading in table.headings) == 3
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from armlab.common.arrays import Array
+from armlab.common.report import palette
 from bench.figures import line_style, render_figure
 from bench.printed import display_name
 from bench.studies.paper.identification import BestRun
@@ -15,7 +16,7 @@ from bench.studies.paper.settings import Figure4Settings, TrajectorySettings
 from problem.arm import Limits, body_points
 from problem.trajectories import sample_instants
 
-_ARM_COLOR = "#555555"
+_ARM_COLOR = palette.DIM
 
 
 def draw_figure4(settings: Figure4Settings, run: BestRun) -> dict[str, bytes]:

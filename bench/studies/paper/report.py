@@ -5,8 +5,10 @@ from collections.abc import Mapping, Sequence
 
 import pandas as pd
 from markdown_it import MarkdownIt
+from markupsafe import Markup
 
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.report.page import render_page
 from bench.printed import display_name
 from bench.statistics.power import power_text
 from bench.studies.paper.claims import PRINTED_TOLERANCE, VERDICTS, Claim, Evidence, Verdict
@@ -14,14 +16,6 @@ from bench.studies.paper.claims_comparison import comparison_claims, conclusion_
 from bench.studies.paper.claims_identification import identification_claims, trajectory_claims, value_claims
 from bench.studies.paper.claims_swarm_size import swarm_size_claims
 from bench.studies.paper.ranking import SUBJECT, Standing, ranking_table
-
-_PAGE_STYLE = """\
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 80rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
-table { border-collapse: collapse; font-size: 0.82rem; margin: 1rem 0; display: block; overflow-x: auto; }
-th, td { border: 1px solid #ccc; padding: 0.3rem 0.5rem; text-align: left; vertical-align: top; }
-th { background: #f2f2f2; }
-img { max-width: 100%; }
-"""
 
 
 def markdown_to_html(title: str, text: str, images: Mapping[str, bytes]) -> str:
@@ -36,10 +30,7 @@ def markdown_to_html(title: str, text: str, images: Mapping[str, bytes]) -> str:
             if child.type == "image":
                 child.attrs["src"] = _data_uri(images[str(child.attrs["src"])])
     body = parser.renderer.render(tokens, parser.options, {})
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'
-        f"<style>\n{_PAGE_STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
-    )
+    return render_page("bench.studies.paper", "replication.html", title, body=Markup(body))
 
 
 def _data_uri(image: bytes) -> str:
