@@ -12,6 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from armlab.common.report import palette
 from armlab.concealed.loop.case import MOTION_KINDS
 from armlab.concealed.loop.counts import (
     ENDS,
@@ -30,7 +31,7 @@ from armlab.concealed.loop.run import LoopSettings
 END_TITLES = {"right": "decided rightly", "wrong": "decided wrongly", "open": "still open"}
 MOTION_TITLES = {"designed": "designed motion", "random": "random motion", "condition": "smallest condition number"}
 MIN_LABELLED_SHARE = 0.04  # smaller shares carry no number
-END_COLORS = {"right": "#0072B2", "wrong": "#D55E00", "open": "#C9CED4"}  # told apart with any colour vision
+END_COLORS = {"right": palette.GOOD, "wrong": palette.BAD, "open": palette.OPEN}
 
 
 def draw_picture(counted: Shares, bins: Sequence[ChanceBin]) -> bytes:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from armlab.common.report import palette
 from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.outside import OUTSIDE
 from armlab.concealed.score.measures import (
@@ -19,7 +20,7 @@ from armlab.concealed.score.measures import (
 from armlab.concealed.score.rows import ScoreRows
 
 # Okabe and Ito 2008
-BLACK, BLUE, ORANGE, SKY, GREEN = "#000000", "#0072B2", "#D55E00", "#56B4E9", "#009E73"
+BLACK, BLUE, ORANGE, SKY, GREEN = palette.BLACK, palette.BLUE, palette.VERMILION, palette.SKY, palette.GREEN
 GREY, LIGHT_GREY = "0.6", "0.88"
 TIER_COLORS = {"clean": BLUE, "realistic": ORANGE}
 TIER_MARKERS = {"clean": "o", "realistic": "s"}

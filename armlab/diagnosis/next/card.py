@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from io import BytesIO
 from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from armlab.common.arrays import Array
+from armlab.common.report import palette
+from armlab.common.report.palette import figure_style, series_style
 from armlab.diagnosis.next.decision import Chances
 from armlab.diagnosis.next.experiment import Experiment, RivalPair
 from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
@@ -126,8 +127,7 @@ def torque_difference(question: Question, pair: tuple[int, int], gram: Array, co
 
 
 FIGURE_SIZE = (11.0, 6.6)  # inches
-BEFORE_COLOR, AFTER_COLOR, NOISE_COLOR = "#B87800", "#0072B2", "#C9CED4"  # told apart with any colour vision
-JOINT_COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+BEFORE_COLOR, AFTER_COLOR, NOISE_COLOR = palette.BEFORE, palette.AFTER, palette.NOISE
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class _MotionDifference:
 def draw_card(experiment: Experiment) -> bytes:
     """PNG of the pair that is hardest to tell, its difference before and after, how clear it is, and the motion."""
     pair = min((each for each in experiment.pairs if not each.hopeless), key=lambda each: each.after)
-    with matplotlib.rc_context({"font.size": 9, "axes.grid": True, "grid.alpha": 0.3, "legend.frameon": False}):
+    with figure_style():
         figure = Figure(figsize=FIGURE_SIZE, layout="constrained")
         axes = figure.subplots(2, 2)
         _fill_panels(axes.ravel().tolist(), experiment, pair)
@@ -183,10 +183,10 @@ def _fill_panels(axes: list[Axes], experiment: Experiment, pair: RivalPair) -> N
 def _draw_separations(axis: Axes, pair: RivalPair) -> None:
     """Standard errors between the rivals with each kind of second motion."""
     bars = {"this motion": pair.after, "a random motion": pair.random, "first recording alone": pair.before}
-    axis.barh(list(bars), list(bars.values()), color=[AFTER_COLOR, "0.6", BEFORE_COLOR], height=0.6)
+    axis.barh(list(bars), list(bars.values()), color=[AFTER_COLOR, palette.MIDDLE, BEFORE_COLOR], height=0.6)
     for place, value in enumerate(bars.values()):
         axis.text(value, place, f" {value:.1f}", va="center")
-    axis.axvline(CLEAR_SEPARATION, color="0.2", linestyle="dashed", linewidth=1.0)
+    axis.axvline(CLEAR_SEPARATION, color=palette.INK, linestyle="dashed", linewidth=1.0)
     axis.text(CLEAR_SEPARATION, -0.45, f" {CLEAR_SEPARATION:g}: clear", fontsize=8)
     axis.set(xlim=(0, 1.15 * max(*bars.values(), CLEAR_SEPARATION)), title="how far the rivals are apart")
     axis.set(xlabel="standard errors")
@@ -201,7 +201,7 @@ def _draw_motion(axis: Axes, experiment: Experiment) -> None:
         axis.plot(
             problem.times,
             motion.position[0, :, number],
-            color=JOINT_COLORS[number % len(JOINT_COLORS)],
+            color=series_style(number).color,
             label=joint.name,
         )
     units = dict.fromkeys("m" if joint.kind == "prismatic" else "rad" for joint in problem.arm.joints)

@@ -4,19 +4,20 @@ from collections.abc import Sequence
 from io import StringIO
 from typing import Any
 
+from armlab.common.report import palette
 from armlab.diagnosis.real_arms.study import ArmStudy, Line, ModelName
 
 # Okabe and Ito 2008, with a shape each: told apart by everyone, in grey too
 MODEL_STYLES: dict[ModelName, tuple[str, str, str]] = {
-    "rigid_given": ("#999999", "x", "rigid as given"),
-    "rigid_refitted": ("#000000", "|", "rigid refitted"),
-    "plain_friction": ("#E69F00", "^", "plain friction"),
-    "identify": ("#56B4E9", "s", "identify"),
-    "named": ("#009E73", "D", "diagnose, named physics alone"),
-    "diagnose": ("#0072B2", "o", "diagnose"),
+    "rigid_given": (palette.GREY, "x", "rigid as given"),
+    "rigid_refitted": (palette.BLACK, "|", "rigid refitted"),
+    "plain_friction": (palette.ORANGE, "^", "plain friction"),
+    "identify": (palette.SKY, "s", "identify"),
+    "named": (palette.GREEN, "D", "diagnose, named physics alone"),
+    "diagnose": (palette.BLUE, "o", "diagnose"),
 }
 MARK_SIZES = {"|": 10, "D": 9, "o": 4.5}  # points: the whole model shows on top of its names, which it often equals
-BEST_KNOWN_STYLE = ("#D55E00", "*", "best known")
+BEST_KNOWN_STYLE = (palette.VERMILION, "*", "best known")
 ROW_INCHES, PANEL_INCHES = 0.32, 0.5  # inches of a row, and of a panel's heading and margins
 PICTURE_NAME = "arms.svg"
 

@@ -13,6 +13,7 @@ import pandas as pd
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.common.report import palette
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.real_concealed.examine import Outcome, ReportedFinding, open_outcomes
 from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
@@ -245,13 +246,13 @@ def _injected_row(verdict: CaseVerdict) -> str:
 
 # Okabe and Ito 2008, with a shape each: told apart by everyone, in grey too
 ANSWER_STYLES: dict[Answer, tuple[str, str, str]] = {
-    "named": ("#0072B2", "o", "named at its place"),
-    "identical": ("#56B4E9", "s", "named as what no motion separates from it"),
-    "law": ("#009E73", "v", "another law named"),
-    "class": ("#E69F00", "D", "among the rivals of a finding"),
-    "cancelled": ("#999999", "P", "cancels what the control names"),
-    "elsewhere": ("#CC79A7", "^", "named at another place"),
-    "missed": ("#000000", "x", "missed"),
+    "named": (palette.BLUE, "o", "named at its place"),
+    "identical": (palette.SKY, "s", "named as what no motion separates from it"),
+    "law": (palette.GREEN, "v", "another law named"),
+    "class": (palette.ORANGE, "D", "among the rivals of a finding"),
+    "cancelled": (palette.GREY, "P", "cancels what the control names"),
+    "elsewhere": (palette.PINK, "^", "named at another place"),
+    "missed": (palette.BLACK, "x", "missed"),
 }
 ROW_INCHES = 0.24  # inches
 
