@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from armlab.common.arrays import Array
+from armlab.common.report import palette
 from armlab.identification.conditioning.answer import MEAN
 from armlab.identification.conditioning.arm import WINDOW_BLOCKS, ArmStudy
 from armlab.identification.conditioning.windows import BLOCKS
@@ -26,9 +27,9 @@ SHOWN_CRITERIA = {
     "v_optimality": "V",
 }
 # Okabe and Ito 2008, with a shape each: told apart by everyone, in grey too
-ARM_STYLES = (("#0072B2", "o"), ("#D55E00", "s"), ("#009E73", "^"), ("#CC79A7", "D"), ("#E69F00", "v"))
-MEAN_STYLE = ("#000000", "P")
-REAL_COLOUR, SIMULATED_COLOUR = "#0072B2", "#E69F00"
+ARM_STYLES = tuple(zip(palette.SERIES, ("o", "s", "^", "D", "v"), strict=False))
+MEAN_STYLE = (palette.BLACK, "P")
+REAL_COLOUR, SIMULATED_COLOUR = palette.BLUE, palette.ORANGE
 SIZE_INCHES = (11.0, 11.0)
 FIRST_POWER = 1e5  # the least tick that is written as a power of ten
 
