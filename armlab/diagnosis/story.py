@@ -116,7 +116,7 @@ def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
 
 
 def _cause_in_words(each: Chapter, joints: int) -> str:
-    name = {"unknown": "Structure without a name", "links": "What the links are off"}.get(each.cause)
+    name = {"unknown": "Structure without a name", "links": "Errors of the links"}.get(each.cause)
     name = name or each.cause.capitalize()
     if not each.joints or each.cause == "links":
         return name
