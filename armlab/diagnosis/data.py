@@ -190,6 +190,15 @@ class Observed:
         moving = self.moving[:, joint]
         return tuple(part for each in own for part in split_segment(each, moving, self.min_segment_rows))
 
+    @property
+    def reason_too_short(self) -> str | None:
+        """Why nothing can be said of a joint: it is never in motion for long enough; None where all are."""
+        short = [joint + 1 for joint in range(self.joints) if not self.used(joint)]
+        if not short:
+            return None
+        least = self.min_segment_rows / self.rate_hz
+        return f"joint {short[0]} is never in motion for {least:.2g} s on end: record longer runs"
+
     def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
         """Rows of a role near a standstill or a reversal of a joint (from 0)."""
         whole = rows_in(self.of_role(role), self.rows)

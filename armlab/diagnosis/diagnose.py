@@ -131,7 +131,7 @@ def prepare(
         return Diagnosis(recording, simulation, "inconclusive", reason)
     progress("filtering")
     observed = observe(recording.runs, simulation.arm, simulation.inertial, settings)
-    reason = reason_misread(observed, simulation, settings.tuning.soundness)
+    reason = observed.reason_too_short or reason_misread(observed, simulation, settings.tuning.soundness)
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason, observed)
     base = base_parameters(simulation.arm)

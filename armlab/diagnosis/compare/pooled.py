@@ -143,10 +143,8 @@ def pool_recordings(
     runs = [run for number, each in enumerate(recordings) for run in _labelled_runs(each, number)]
     owner = tuple(number for number, each in enumerate(recordings) for _ in each.runs)
     observed = observe(runs, simulation.arm, simulation.inertial, settings)
-    short = [joint + 1 for joint in range(observed.joints) if not observed.used(joint)]
-    if short:
-        least = observed.min_segment_rows / observed.rate_hz
-        raise DataError(f"joint {short[0]} is never in motion for {least:.2g} s on end: record longer runs")
+    if observed.reason_too_short is not None:
+        raise DataError(observed.reason_too_short)
     bare = build_design_matrix(observed, simulation, base_parameters(simulation.arm), None, settings)
     found = unite_candidates(diagnoses)
     design = _with_candidates(bare, [*found, *_usual_beside(bare, found)])
