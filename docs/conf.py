@@ -41,7 +41,7 @@ def _show_math(translator: nodes.NodeVisitor, node: nodes.Element) -> None:
         written = f'<div class="equation-block">{convert(node.astext(), display="block")}</div>'
     else:
         written = convert(node.astext(), display="inline")
-    translator.body.append(written)  # type: ignore[attr-defined]
+    translator.body.append(written)
     raise nodes.SkipNode
 
 

@@ -28,7 +28,7 @@ def random_arm(kinds: str, seed: int = 0) -> Arm:
     rng = np.random.default_rng(seed)
     names = {"R": "revolute", "P": "prismatic"}
     joints = tuple(
-        Joint(f"joint{number}", names[kind], random_pose(rng), random_pose(rng))  # type: ignore[arg-type]
+        Joint(f"joint{number}", names[kind], random_pose(rng), random_pose(rng))
         for number, kind in enumerate(kinds, start=1)
     )
     links = tuple(random_link(rng) for _ in kinds)

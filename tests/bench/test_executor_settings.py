@@ -46,7 +46,7 @@ def test_a_missing_package_is_told_with_its_extra(backend: str, monkeypatch: pyt
     monkeypatch.setitem(sys.modules, package, None)
 
     def use() -> None:
-        with open_executor(ExecutorSettings(backend=backend), 1, None):  # type: ignore[arg-type]
+        with open_executor(ExecutorSettings(backend=backend), 1, None):
             pass
 
     with pytest.raises(Exception, match=rf"executor '{backend}' needs the package .*armlab\[cluster\]"):

@@ -148,7 +148,7 @@ def test_the_best_known_trajectory_from_rest_to_rest_is_exported_at_250_hz(tmp_p
     assert out.exists()
     for part in (motion.velocity, motion.acceleration):
         assert np.abs(part[[0, -1]]).max() < 1e-9
-    arm = parse_problem(yaml.safe_load(problem.read_text()), "export").build().arm  # type: ignore[attr-defined]
+    arm = parse_problem(yaml.safe_load(problem.read_text()), "export").build().arm
     for joint, position, velocity in zip(arm.joints, motion.position.T, motion.velocity.T, strict=True):
         low, high = joint.limits.position
         assert low <= position.min() <= position.max() <= high
@@ -169,7 +169,7 @@ def test_a_limit_that_is_kept_at_the_samples_but_broken_at_the_rate_is_refused(t
     point = np.array(
         list(yaml.safe_load((tmp_path / RECORDS_FILE).read_text())["problems"]["gentle"]["coefficients"].values())
     )
-    motion = problem.trajectory.motions(point[None], np.linspace(0, 4, 13)).motion  # type: ignore[attr-defined]
+    motion = problem.trajectory.motions(point[None], np.linspace(0, 4, 13)).motion
     seen = float(np.abs(motion.velocity[..., 1]).max())
     path.write_text(yaml.safe_dump({**REST, "limits": {"velocity": [99.0, seen * (1 + 1e-9), 99.0]}}))
     told = refusal(export_record, path, "gentle", "csv", tmp_path / "out", tmp_path / RECORDS_FILE)
@@ -221,5 +221,5 @@ def test_a_seventh_axis_is_nothing_that_rapid_can_take() -> None:
 def test_sampling_includes_both_ends(tmp_path: Path) -> None:
     problem = parse_problem(REST, "test").build()
     middle = (problem.lower + problem.upper) / 2
-    trajectory = sample_trajectory(problem, middle, 10.0, "still")  # type: ignore[arg-type]
+    trajectory = sample_trajectory(problem, middle, 10.0, "still")
     assert trajectory.times[[0, -1]].tolist() == [0.0, 4.0]

@@ -116,7 +116,7 @@ def test_payload_is_a_heavier_body(link: int) -> None:
     body = link_from_centre_of_mass(1.3, np.array([0.05, -0.02, 0.1]), inertia)
     theirs = _with_body(where, link, body)
     payload = candidate("payload", [where], link, "body")
-    coefficients = body.parameters[list(payload.felt)]  # type: ignore[attr-defined]
+    coefficients = body.parameters[list(payload.felt)]
     if len(coefficients) == 10:
         named = payload.parameters(coefficients)
         assert named["mass"] == pytest.approx(1.3)

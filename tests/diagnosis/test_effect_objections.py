@@ -75,7 +75,7 @@ def test_a_compensator_carries_gravity() -> None:
     where = scene("RRR")
     position = where.motion.position
     sine = candidate("gravity_compensator", [where], 2, "sine")
-    gravity = np.array(sine.gravity)  # type: ignore[attr-defined]
+    gravity = np.array(sine.gravity)
     assert np.linalg.norm(gravity) > 0.5 * np.abs(_gravity_torque(where)).mean()
     assert sine.objection(-0.5 * gravity) is None
     assert "adds to gravity" in str(sine.objection(0.5 * gravity))
@@ -90,9 +90,9 @@ def _gravity_torque(where: object) -> Array:
     from problem.motion import Motion
 
     found = where
-    position = found.motion.position  # type: ignore[attr-defined]
+    position = found.motion.position
     still = Motion(position, np.zeros_like(position), np.zeros_like(position))
-    torque = rigid_body_torque(found.arm, still, found.inertial)  # type: ignore[attr-defined]
+    torque = rigid_body_torque(found.arm, still, found.inertial)
     return np.asarray(torque[:, 1])
 
 

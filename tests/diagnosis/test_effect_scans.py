@@ -37,7 +37,7 @@ def test_scan_finds_the_stretch_of_a_push() -> None:
         inside = (where.time > 3.0) & (where.time < 3.8) & (where.run == "run-2.csv")
         return np.where(inside, 2 * np.sin(np.pi * (where.time - 3.0) / 0.8), 0.0)
 
-    found = [each for each in scanned("external_contact", push, 2) if each.run == "run-2.csv"]  # type: ignore[attr-defined]
+    found = [each for each in scanned("external_contact", push, 2) if each.run == "run-2.csv"]
     assert found[0].shape == pytest.approx((3.0, 3.8), abs=0.15)
     assert found[1].shape == pytest.approx((3.1, 3.7), abs=0.1)
     assert {each.form for each in found} == {"half sine", "box"}

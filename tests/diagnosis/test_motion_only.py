@@ -202,7 +202,7 @@ def test_the_command_says_why_nothing_can_be_said(tmp_path: Path) -> None:
 def test_bad_input_is_inconclusive_with_a_reason_in_one_line(tmp_path: Path, damage: object, reason: str) -> None:
     folder = write_recording(tmp_path / "bad", {"kp": 40.0}, seconds=3.0)
     for path in folder.glob("*.csv"):
-        damage(pd.read_csv(path)).to_csv(path, index=False)  # type: ignore[operator]
+        damage(pd.read_csv(path)).to_csv(path, index=False)
     result = diagnose_motion(load_motion_recording(folder))
     assert result.status == "inconclusive"
     assert reason in make_motion_verdict(result).summary

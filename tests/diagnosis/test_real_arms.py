@@ -131,7 +131,7 @@ def test_all_models_of_a_run_are_judged_by_one_filter_as_recorded_and_filtered(r
 
 def test_named_share_is_what_names_close_of_what_the_whole_model_closes() -> None:
     errors = {"rigid_refitted": Percent(50, 40), "named": Percent(20, 10), "diagnose": Percent(10, 5)}
-    line = Line("a", "refit", "b", 10.0, errors, None, 2.0, 1.0, 0.2, 1)  # type: ignore[arg-type]
+    line = Line("a", "refit", "b", 10.0, errors, None, 2.0, 1.0, 0.2, 1)
     assert line.reading_ratio == pytest.approx(0.25)
     assert line.named_share("recorded") == pytest.approx(30 / 40)
     assert line.named_share("filtered") == pytest.approx(30 / 35)

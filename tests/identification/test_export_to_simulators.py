@@ -93,13 +93,13 @@ def test_pinocchio_reproduces_the_exported_torque(name: str, form: str, tmp_path
 
 def _configuration(read: object, position: Array) -> Array:
     """Pinocchio writes a joint without limits as a cosine and a sine."""
-    if read.nq == len(position):  # type: ignore[attr-defined]
+    if read.nq == len(position):
         return position
     return np.column_stack([np.cos(position), np.sin(position)]).ravel()
 
 
 def _damping(read: object, velocity: Array) -> Array:
-    return np.asarray(read.damping) * velocity  # type: ignore[attr-defined]
+    return np.asarray(read.damping) * velocity
 
 
 def test_gravity_along_any_direction_survives_the_urdf() -> None:

@@ -60,7 +60,7 @@ def test_a_push_during_a_tenth_of_the_time_does_not_move_robust_estimates(loss: 
     noise[-100:] += 5.0
     data = line(noise)
     assert abs(OrdinaryLeastSquares()(data).values[0] - 2) > 0.5
-    assert abs(RobustLeastSquares(loss)(data).values[0] - 2) < 0.05  # type: ignore[arg-type]
+    assert abs(RobustLeastSquares(loss)(data).values[0] - 2) < 0.05
 
 
 def test_a_prior_weighs_like_the_data_that_it_stands_for() -> None:

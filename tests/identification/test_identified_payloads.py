@@ -56,7 +56,7 @@ def pair(tmp_path: Path) -> tuple[Path, Path]:
 
 
 def invoke(command: object, *arguments: object) -> str:
-    result = CliRunner().invoke(command, [str(each) for each in arguments], catch_exceptions=False)  # type: ignore[arg-type]
+    result = CliRunner().invoke(command, [str(each) for each in arguments], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.output
 

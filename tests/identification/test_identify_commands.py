@@ -23,7 +23,7 @@ def recording(tmp_path: Path) -> Path:
     values = truth(model)
     runs = []
     for seed, role in ((0, "identify"), (1, "validate")):
-        made = run(model, values, seed, noise=0.05, role=role)  # type: ignore[arg-type]
+        made = run(model, values, seed, noise=0.05, role=role)
         table = np.column_stack([made.time, made.position, made.torque])
         runs.append(DraftRun(f"run-{seed}.csv", made.role, NAMES, table))
     units = {"time": "s", "position": "rad", "torque": "N.m"}
@@ -31,7 +31,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def invoke(command: object, *arguments: object) -> str:
-    result = CliRunner().invoke(command, [str(each) for each in arguments], catch_exceptions=False)  # type: ignore[arg-type]
+    result = CliRunner().invoke(command, [str(each) for each in arguments], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.output
 

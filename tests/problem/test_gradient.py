@@ -146,4 +146,4 @@ def test_another_family_of_trajectories_is_refused() -> None:
     problem = build({"preset": "paper"})
     motion = problem.trajectory.motions(within_reach(problem)[None], problem.times).motion.select(np.intp(0))
     with pytest.raises(ValueError, match="no derivatives are known for object"):
-        tangents(object(), motion, np.zeros(7), problem.times)  # type: ignore[arg-type]
+        tangents(object(), motion, np.zeros(7), problem.times)

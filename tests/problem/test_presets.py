@@ -206,7 +206,7 @@ def test_a_problem_sent_to_another_process_is_the_same_problem(preset: str) -> N
 def test_a_test_function_has_its_minimum_zero_at_the_optimum_and_nowhere_else(preset: str) -> None:
     for shift_seed in (None, 4):
         problem = build(preset, dimension=3, shift_seed=shift_seed)
-        optimum = problem.optimum  # type: ignore[attr-defined]
+        optimum = problem.optimum
         around = optimum + np.random.default_rng(0).normal(scale=0.3, size=(50, 3))
         assert problem.evaluate(optimum[None]).value == pytest.approx([0.0], abs=1e-12)
         assert np.all(problem.evaluate(around).value > 0)

@@ -35,7 +35,7 @@ class _Restless:
 
 
 class _RestlessSettings(FunctionSettings):
-    preset: Literal["restless"] = "restless"  # type: ignore[assignment]
+    preset: Literal["restless"] = "restless"
 
     def build(self) -> Any:
         return _Restless()

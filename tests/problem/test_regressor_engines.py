@@ -154,7 +154,7 @@ def test_our_pinocchio_model_carries_the_links(tmp_path: Path) -> None:
 
 def rnea(model: object, motion: Motion) -> Array:
     pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed")
-    data = model.createData()  # type: ignore[attr-defined]
+    data = model.createData()
     states = zip(motion.position, motion.velocity, motion.acceleration, strict=True)
     return np.array([pin.rnea(model, data, *state).copy() for state in states])
 

@@ -94,7 +94,7 @@ def test_a_shift_of_the_coordinates_changes_no_derivative() -> None:
     shifted, plain = build(frame_seed=3), tiny()
     assert why_not_differentiable(shifted) == ""
     point, question = 0.7 * plain.upper + 0.3 * plain.lower, Question(10.0, NOTHING, 0.3)
-    moved = shifted.differentiate(point + (shifted.lower - plain.lower), question)  # type: ignore[attr-defined]
+    moved = shifted.differentiate(point + (shifted.lower - plain.lower), question)
     for ours, theirs in zip(moved, plain.differentiate(point, question), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9)
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.common.report.palette import svg_text
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.real_arms.checks import check_arm
-from armlab.diagnosis.real_arms.figure import PICTURE_NAME, studies_svg
+from armlab.diagnosis.real_arms.figure import PICTURE_NAME, draw_studies
 from armlab.diagnosis.real_arms.page import PAGE_NAME, TABLE_NAME, lines_csv, studies_markdown
 from armlab.diagnosis.real_arms.study import Line, Progress, study_arm
 from armlab.identification.peers.side_by_side import compare_peers, write_peers
@@ -40,7 +41,7 @@ def bench_real_arms(
     texts = {
         PAGE_NAME: studies_markdown(studies, checks),
         TABLE_NAME: lines_csv(studies),
-        PICTURE_NAME: studies_svg(studies),
+        PICTURE_NAME: svg_text(draw_studies(studies), "arms"),
     }
     yield from (str(path) for path in write_texts(texts, results))
     if peers is not None:

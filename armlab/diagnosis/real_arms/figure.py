@@ -1,7 +1,6 @@
 """The picture of the table: a panel an arm, a row for each baseline and run, a mark for each model."""
 
 from collections.abc import Sequence
-from io import StringIO
 from typing import Any
 
 from armlab.common.report import palette
@@ -20,16 +19,6 @@ MARK_SIZES = {"|": 10, "D": 9, "o": 4.5}  # points: the whole model shows on top
 BEST_KNOWN_STYLE = (palette.VERMILION, "*", "best known")
 ROW_INCHES, PANEL_INCHES = 0.32, 0.5  # inches of a row, and of a panel's heading and margins
 PICTURE_NAME = "arms.svg"
-
-
-def studies_svg(studies: Sequence[ArmStudy]) -> str:
-    """The picture as text, the same for the same errors."""
-    import matplotlib
-
-    out = StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "arms", "svg.fonttype": "none"}):
-        draw_studies(studies).savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
 
 
 def draw_studies(studies: Sequence[ArmStudy]) -> Any:

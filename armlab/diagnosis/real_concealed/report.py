@@ -14,6 +14,7 @@ import pandas as pd
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.report import palette
+from armlab.common.report.palette import svg_text
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.real_concealed.examine import Outcome, ReportedFinding, open_outcomes
 from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
@@ -257,16 +258,6 @@ ANSWER_STYLES: dict[Answer, tuple[str, str, str]] = {
 ROW_INCHES = 0.24  # inches
 
 
-def studies_svg(studies: Sequence[ConcealedStudy]) -> str:
-    """The picture as text, the same in every run."""
-    import matplotlib
-
-    out = StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "concealed", "svg.fonttype": "none"}):
-        draw_studies(studies).savefig(out, format="svg", metadata={"Date": None})
-    return out.getvalue()
-
-
 def draw_studies(studies: Sequence[ConcealedStudy]) -> Any:
     """The picture: a panel a recording, a row a case."""
     from matplotlib.figure import Figure
@@ -335,6 +326,6 @@ def conceal_in_recordings(
     texts = {
         "concealed.md": studies_markdown(studies),
         "concealed.csv": studies_csv(studies),
-        PICTURE_NAME: studies_svg(studies),
+        PICTURE_NAME: svg_text(draw_studies(studies), "concealed"),
     }
     yield from (str(path) for path in write_texts(texts, results))
