@@ -648,7 +648,6 @@ class ComparisonTuning:
     max_rivals: int = tuned(2, unit="rivals", meaning="most rivals of a change", source="a class has three names")
     max_asked: int = tuned(12, unit="candidates", meaning="candidates that are tested at each step", least=1)
     max_changes: int = tuned(8, unit="changes", meaning="most changes that are named", least=1)
-    folds: int = tuned(4, unit="folds", meaning="parts of the stretches that are held out in turn", least=2)
 
 
 @dataclass(frozen=True)

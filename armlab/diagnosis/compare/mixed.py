@@ -192,8 +192,8 @@ class MixedModel:
         count = int(np.sum(np.any(products != 0, axis=1)))
         return np.asarray(products.T @ products * count / max(count - 1, 1) + drift), between
 
-    def held_out_errors(self, chosen: NDArray[np.intp], folds: int) -> list[Array]:
-        """Errors (rows,) of each joint where chosen columns and drift were fitted to the other folds of stretches.
+    def held_out_errors(self, chosen: NDArray[np.intp]) -> list[Array]:
+        """Errors (rows,) of each joint where chosen columns and drift were fitted to all other stretches.
 
         A constant of each run is no part of the drift here: it would stand for a change.
         """
@@ -207,17 +207,23 @@ class MixedModel:
             places.append(np.append(where[each.rows.index[used]], at + np.arange(drift.shape[1])))
             at += drift.shape[1]
         precisions = [np.full(int(each.rows.waves.sum()), 1 / each.variance) for each in self.joints]
-        prior = np.diag(np.concatenate([self.precision[chosen], *precisions]))
+        whole = np.zeros((at, at + 1))
+        whole[:, :at] = np.diag(np.concatenate([self.precision[chosen], *precisions]))
+        products: list[dict[int, tuple[NDArray[np.intp], Array]]] = [{} for _ in range(self.stretches)]
+        for joint, each in enumerate(self.joints):
+            place, both = places[joint], np.column_stack([designs[joint], each.rows.target])
+            order = np.argsort(each.rows.stretches, kind="stable")
+            for rows in np.split(order, np.flatnonzero(np.diff(each.rows.stretches[order])) + 1):
+                own = designs[joint][rows].T @ both[rows] / each.variance
+                whole[np.ix_(place, np.append(place, at))] += own
+                products[int(each.rows.stretches[rows[0]])][joint] = rows, own
         out = [np.empty(len(each.rows.target)) for each in self.joints]
-        for fold in range(folds):
-            matrix, towards = prior.copy(), np.zeros(at)
-            for each, design, place in zip(self.joints, designs, places, strict=True):
-                taught = each.rows.stretches % folds != fold
-                matrix[np.ix_(place, place)] += design[taught].T @ design[taught] / each.variance
-                towards[place] += design[taught].T @ each.rows.target[taught] / each.variance
-            scale = 1 / np.sqrt(np.diag(matrix))
-            values = scale * np.linalg.solve(matrix * np.outer(scale, scale), scale * towards)
-            for errors, each, design, place in zip(out, self.joints, designs, places, strict=True):
-                judged = each.rows.stretches % folds == fold
-                errors[judged] = each.rows.target[judged] - design[judged] @ values[place]
+        for stretch in products:
+            others = whole.copy()
+            for joint, (_, own) in stretch.items():
+                others[np.ix_(places[joint], np.append(places[joint], at))] -= own
+            scale = 1 / np.sqrt(np.diag(others[:, :at]))
+            values = scale * np.linalg.solve(others[:, :at] * np.outer(scale, scale), scale * others[:, at])
+            for joint, (rows, _) in stretch.items():
+                out[joint][rows] = self.joints[joint].rows.target[rows] - designs[joint][rows] @ values[places[joint]]
         return out

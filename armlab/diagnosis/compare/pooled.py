@@ -7,13 +7,13 @@ changed are the same columns again, times the recording that a row is of (`chang
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
-from armlab.diagnosis.blocks import block_numbers
 from armlab.diagnosis.columns import Block, Place, place_of
 from armlab.diagnosis.data import Observed, observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
@@ -81,11 +81,17 @@ class Pooled:
     def stretches(self) -> NDArray[np.intp]:
         """Number of the stretch of time of each row, (rows,).
 
-        Runs of two recordings that follow the same motion share their stretches: what the model lacks is the same in
-        both, and is no difference between them.
+        A stretch is part of one run. Runs of two recordings that follow the same motion share their stretches: what
+        the model lacks is the same in both, and is no difference between them.
         """
-        numbers = block_numbers(self.observed, self.tuning.stretch_s, self.tuning.min_stretches)
-        starts = np.cumsum([0, *(len(each.torque) for each in self.observed.signals)])
+        rate, starts = self.observed.rate_hz, np.cumsum([0, *(len(each.torque) for each in self.observed.signals)])
+        shortest = float(np.bincount(self.members).min()) / rate
+        length = min(self.tuning.stretch_s, shortest / self.tuning.min_stretches)
+        numbers, first_number = np.empty(self.observed.rows, dtype=np.intp), 0
+        for start, stop in pairwise(starts):
+            blocks = max(int((stop - start) / rate / length), 1)
+            numbers[start:stop] = first_number + np.arange(stop - start) * blocks // (stop - start)
+            first_number += blocks
         for run, first in enumerate(self._first_of_motion()):
             if first == run:
                 continue

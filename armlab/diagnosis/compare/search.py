@@ -41,7 +41,7 @@ def _best_addition(table: ChangeTable, chosen: tuple[int, ...], banned: frozense
 
 def _settle(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> tuple[int, ...]:
     """The groups, each in place of a worse one, without those that the others explain."""
-    chosen = _without_unsure(table, _with_single_laws(table, chosen))
+    chosen = without_unsure(table, _with_single_laws(table, chosen, banned))
     for number in chosen:
         own = next((each for each in table.test(chosen) if each.group == number), None)
         if own is None:
@@ -51,12 +51,13 @@ def _settle(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int])
         best = int(np.argmin(deficits))
         if best != number and deficits[best] < 0:
             rest = tuple(each for each in chosen if each != number)
-            exchanged = _without_unsure(table, _with_single_laws(table, (*rest, best)))
+            exchanged = without_unsure(table, _with_single_laws(table, (*rest, best), banned))
             chosen = exchanged if best in exchanged else chosen
     return chosen
 
 
-def _without_unsure(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+def without_unsure(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+    """Chosen groups without those that are not sure, the one of the least evidence first."""
     while chosen:
         tested = table.test(chosen)
         worst = min(tested, key=lambda each: each.evidence)
@@ -66,7 +67,7 @@ def _without_unsure(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, .
     return chosen
 
 
-def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int, ...]:
+def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> tuple[int, ...]:
     """Laws of friction one by one where they did not change by one factor."""
     for number in chosen:
         group = table.groups[number]
@@ -74,7 +75,7 @@ def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...]) -> tuple[int,
             continue
         laws = [place_of(law) for law, _ in group.laws]
         plain = [(other, each) for other, each in enumerate(table.groups) if not each.laws and each.shaped is None]
-        single = [other for other, each in plain if place_of(each.candidate) in laws]
+        single = [other for other, each in plain if place_of(each.candidate) in laws and other not in banned]
         if set(single) & set(chosen):
             chosen = tuple(dict.fromkeys((*(each for each in chosen if each != number), *single)))
     return chosen
@@ -125,8 +126,4 @@ def between_runs(table: ChangeTable, chosen: Sequence[int], number: int) -> Arra
 def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:
     """Errors (rows,) of each joint without and with a change, each stretch predicted by the others."""
     without = table.columns_with([each for each in chosen if each != number])
-    folds = table.tuning.folds
-    return (
-        table.mixed.held_out_errors(without, folds),
-        table.mixed.held_out_errors(table.columns_with(chosen), folds),
-    )
+    return table.mixed.held_out_errors(without), table.mixed.held_out_errors(table.columns_with(chosen))

@@ -9,7 +9,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.compare.changes import ChangeTable, Tested
 from armlab.diagnosis.compare.numbers import as_wide_as_runs, between_ends, half_width_factor, laws_of, recording_values
 from armlab.diagnosis.compare.pooled import Pooled, is_body
-from armlab.diagnosis.compare.search import between_runs, find_changes, held_out_errors
+from armlab.diagnosis.compare.search import between_runs, find_changes, held_out_errors, without_unsure
 from armlab.diagnosis.fitted_model import inertial_parameters
 from armlab.effects.contract import Scene
 from armlab.effects.drive import ROTOR_INERTIA
@@ -34,19 +34,22 @@ def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Te
     """The changes without those by which runs of one recording differ as much, and without those that do not help on
     held-out stretches of every recording, the worst first.
     """
-    while wrong := next((each for each in found if runs_differ_as_much(table, found, each)), None):
-        found = table.test([each.group for each in found if each is not wrong])
     while found:
         chosen = [each.group for each in found]
-        gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}
-        worst = min(gains, key=lambda each: min(gains[each]))
-        if all(predicts_better(each, table.tuning.least_gain) for each in gains.values()):
+        failed = next((each.group for each in found if runs_differ_as_much(table, found, each)), None)
+        if failed is None:
+            failed = _least_helpful(table, chosen)
+        if failed is None:
             break
-        if predicts_better(gains[worst], table.tuning.least_gain):
-            worst = min(gains, key=lambda each: float(np.mean(gains[each])))
-        found = tuple(each for each in table.test([each for each in chosen if each != worst]) if table.is_sure(each))
-        found = table.test([each.group for each in found])
+        found = table.test(without_unsure(table, tuple(each for each in chosen if each != failed)))
     return found
+
+
+def _least_helpful(table: ChangeTable, chosen: Sequence[int]) -> int | None:
+    """The change that helps least on held-out stretches, where one does not help enough."""
+    gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}
+    failed = [each for each in chosen if not predicts_better(gains[each], table.tuning.least_gain)]
+    return min(failed, key=lambda each: float(np.mean(gains[each])), default=None)
 
 
 def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> str | None:
