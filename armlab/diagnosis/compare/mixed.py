@@ -223,7 +223,8 @@ class MixedModel:
             for joint, (_, own) in stretch.items():
                 others[np.ix_(places[joint], np.append(places[joint], at))] -= own
             scale = 1 / np.sqrt(np.diag(others[:, :at]))
-            values = scale * np.linalg.solve(others[:, :at] * np.outer(scale, scale), scale * others[:, at])
+            scaled = others[:, :at] * np.outer(scale, scale) + INDEPENDENT_POWER * np.eye(at)
+            values = scale * np.linalg.solve(scaled, scale * others[:, at])
             for joint, (rows, _) in stretch.items():
                 out[joint][rows] = self.joints[joint].rows.target[rows] - designs[joint][rows] @ values[places[joint]]
         return out

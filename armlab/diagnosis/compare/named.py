@@ -87,7 +87,7 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
         equation=equation,
         p_value=min(tested.p_value * len(table.groups), 1.0),
         evidence=tested.evidence,
-        gains=held_out_gains(table, errors),
+        gains=held_out_gains(table, tested.group, errors),
         rms_before=before,
         rms_after=after,
         probability=float(1 / weights.sum()),

@@ -47,9 +47,9 @@ def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Te
 
 def _least_helpful(table: ChangeTable, chosen: Sequence[int]) -> int | None:
     """The change that helps least on held-out stretches, where one does not help enough."""
-    gains = {each: held_out_gains(table, held_out_errors(table, chosen, each)) for each in chosen}
-    failed = [each for each in chosen if not predicts_better(gains[each], table.tuning.least_gain)]
-    return min(failed, key=lambda each: float(np.mean(gains[each])), default=None)
+    errors = {each: held_out_errors(table, chosen, each) for each in chosen}
+    failed = [each for each in chosen if not predicts_better(table, each, errors[each])]
+    return min(failed, key=lambda each: float(np.mean(held_out_gains(table, each, errors[each]))), default=None)
 
 
 def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> str | None:
@@ -123,19 +123,38 @@ def _rotors(pooled: Pooled) -> Array:
     return out
 
 
-def held_out_gains(table: ChangeTable, errors: tuple[list[Array], list[Array]]) -> tuple[float, ...]:
-    """Share by which the squared held-out error of each recording falls, joints weighted by their noise."""
-    out = []
-    for recording in range(len(table.contrast)):
-        less, left = 0.0, 0.0
-        for before, after, joint in zip(*errors, table.mixed.joints, strict=True):
-            own = joint.rows.members == recording
-            less += float(np.sum(before[own] ** 2 - after[own] ** 2)) / joint.variance
-            left += float(np.sum(after[own] ** 2)) / joint.variance
-        out.append(less / max(left, 1e-300))
-    return tuple(out)
+def held_out_gains(table: ChangeTable, tested: int, errors: tuple[list[Array], list[Array]]) -> tuple[float, ...]:
+    """Share by which the squared held-out error of each recording falls at the joints where a group acts.
+
+    Joints are weighted by their noise.
+    """
+    less, left = _sums_of_squares(table, tested, errors)
+    return tuple(less / np.maximum(left, 1e-300))
 
 
-def predicts_better(gains: Sequence[float], least: float) -> bool:
-    """Whether a change lowers the held-out error of each recording, and by this share in the mean."""
-    return min(gains) > 0 and float(np.mean(gains)) > least
+def predicts_better(table: ChangeTable, tested: int, errors: tuple[list[Array], list[Array]]) -> bool:
+    """Whether a change lowers the held-out error of all that moves alike, and by a least share in all.
+
+    Recordings of one motion err alike, and half of a change brings one nearer to that error and takes the other one
+    away from it: they are judged together.
+    """
+    less, left = _sums_of_squares(table, tested, errors)
+    shared = np.zeros((len(table.contrast),) * 2, dtype=bool)
+    for joint in table.mixed.joints:
+        pairs = np.unique(np.column_stack([joint.rows.stretches, joint.rows.members]), axis=0)
+        present = np.zeros((table.mixed.stretches, len(table.contrast)))
+        present[pairs[:, 0], pairs[:, 1]] = 1
+        shared |= present.T @ present > 0
+    together = shared @ less
+    return bool(together.min() > 0) and float(np.mean(less / np.maximum(left, 1e-300))) > table.tuning.least_gain
+
+
+def _sums_of_squares(table: ChangeTable, tested: int, errors: tuple[list[Array], list[Array]]) -> tuple[Array, Array]:
+    """By how much the weighted squares of each recording fall at the joints where a group acts, and what is left."""
+    less, left = np.zeros((2, len(table.contrast)))
+    for row in table.groups[tested].candidate.rows:
+        before, after = (part[row] for part in errors)
+        joint, count = table.mixed.joints[row], len(table.contrast)
+        less += np.bincount(joint.rows.members, (before**2 - after**2) / joint.variance, minlength=count)
+        left += np.bincount(joint.rows.members, after**2 / joint.variance, minlength=count)
+    return less, left
