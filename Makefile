@@ -6,7 +6,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure speed regression fuzz hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -57,6 +57,9 @@ search-space: .venv/run ## what a search space within all limits does for each a
 
 tune: .venv/dev ## every algorithm tuned with the same budget, judged on problems that took no part: results/tune/
 	$(BIN)/armlab tune
+
+landscape: .venv/run ## what makes an algorithm win, and which optimiser to take: results/landscape/, docs/which-optimiser.md
+	$(BIN)/armlab landscape
 
 best-known: .venv/run ## ten minutes more for the best trajectories known: results/best_known.json
 	$(BIN)/armlab best-known

@@ -45,7 +45,15 @@ def fingerprint(algorithm: AnyAlgorithm, problem: ProblemSettings) -> str:
     parts = [f"root {code.__module__}:{code.__qualname__}" for code in classes]
     unused = () if issubclass(algorithm, AsksDerivatives) else (_DERIVATIVES,)
     parts += _code_parts([_ROOT, *(code.__module__ for code in classes)], unused)
-    parts += _data_parts(problem)
+    return _digest([*parts, *_data_parts(problem)])
+
+
+def module_fingerprint(module: str, problem: ProblemSettings) -> str:
+    """The same of the code and data that decide what a module computes on a problem."""
+    return _digest([*_code_parts([module, type(problem).__module__], ()), *_data_parts(problem)])
+
+
+def _digest(parts: list[str]) -> str:
     return hashlib.sha256("\n".join(sorted(parts)).encode()).hexdigest()
 
 

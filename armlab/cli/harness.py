@@ -376,6 +376,41 @@ def tune(
     return written_files(tune_algorithms(config, options, trial_bar))
 
 
+@click.command()
+@click.option("--out", type=OutputPath(), default=Path("results/landscape"), show_default=True, help="Folder to write.")
+@click.option(
+    "--page",
+    type=OutputPath(),
+    default=Path("docs/which-optimiser.md"),
+    show_default=True,
+    help="File of the page that says which optimiser to take.",
+)
+@click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
+@click.option(
+    "--store",
+    type=_PATH,
+    default=Path(".armlab/landscape"),
+    show_default=True,
+    help="Folder that keeps what was measured.",
+)
+@click.option("--pages", is_flag=True, help="Measure nothing: new pages from the tables in --out.")
+@_RESULTS_OPTION
+@prints_result
+def landscape(out: Path, page: Path, workers: int | None, store: Path, pages: bool, results: Path) -> ResultLines:
+    """Say what makes an algorithm win, and which to take.
+
+    Measures features of each problem of the suites, correlates them with the standings of the algorithms in --results,
+    and writes the page that says which optimiser to take. You can stop it at any time; the next call continues from
+    there.
+    """
+    from joblib import cpu_count
+
+    from bench.studies.landscape.study import LandscapeOptions, make_landscape
+
+    options = LandscapeOptions(results, out, page, store, workers or cpu_count(), pages)
+    return written_files(make_landscape(options, trial_bar))
+
+
 @click.command("does-it-help")
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_RESULTS_OPTION

@@ -52,6 +52,7 @@ _GROUPS = {
         "paper": "armlab.cli.harness:paper",
         "study": "armlab.cli.harness:study",
         "search-space": "armlab.cli.harness:search_space",
+        "landscape": "armlab.cli.harness:landscape",
         "does-it-help": "armlab.cli.harness:does_it_help",
     },
     "Proof": {

@@ -22,7 +22,8 @@ from bench.tables import as_csv, tidy_frame
 from problem.registry import ProblemSettings
 
 CONFIG = "search_space.yaml"
-_MARK = " feasible"
+FEASIBLE_MARK = " feasible"
+"""Ends the label of a problem, or an algorithm, in the feasible search space."""
 
 
 def make_search_space(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
@@ -87,21 +88,21 @@ def comparison_table(frame: pd.DataFrame, pairs: Mapping[str, str]) -> pd.DataFr
     rows = []
     for plain, space in pairs.items():
         ours = frame[frame["problem"] == space]
-        both = pd.concat([frame[frame["problem"] == plain], ours.assign(algorithm=ours["algorithm"] + _MARK)])
+        both = pd.concat([frame[frame["problem"] == plain], ours.assign(algorithm=ours["algorithm"] + FEASIBLE_MARK)])
         ends = {
             label: summarise(group["value"].to_numpy(), group["violation"].to_numpy())
             for label, group in both.groupby("algorithm", sort=False)
         }
         names = [str(name) for name in ours["algorithm"].unique()]
-        for name, duel in zip(names, duels(both, [(name + _MARK, name) for name in names]), strict=True):
+        for name, duel in zip(names, duels(both, [(name + FEASIBLE_MARK, name) for name in names]), strict=True):
             rows.append(
                 {
                     "problem": plain,
                     "algorithm": name,
                     "median": ends[name].median,
                     "feasible_share": ends[name].feasible_share,
-                    "median_in_space": ends[name + _MARK].median,
-                    "feasible_share_in_space": ends[name + _MARK].feasible_share,
+                    "median_in_space": ends[name + FEASIBLE_MARK].median,
+                    "feasible_share_in_space": ends[name + FEASIBLE_MARK].feasible_share,
                     "superiority": duel.superiority,
                     "low": duel.low,
                     "high": duel.high,

@@ -1,0 +1,89 @@
+"""`armlab landscape`: measures what is missing, correlates, and writes tables, figure and both pages."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
+
+import pandas as pd
+
+from armlab.common.errors import InputError
+from armlab.common.files import write_texts, write_whole
+from bench.run import ProgressBar
+from bench.studies.best_known.records import RECORDS_FILE
+from bench.studies.landscape.choice import choice_page
+from bench.studies.landscape.features import Effort
+from bench.studies.landscape.figure import draw_landscape
+from bench.studies.landscape.measure import ends_table, feature_table, list_work, measure_all
+from bench.studies.landscape.page import PICTURE_STEM, landscape_page
+from bench.studies.landscape.sources import Comparison, Sources
+from bench.studies.landscape.standing import correlation_table, standings
+from bench.tables import as_csv
+
+FEATURES_FILE, ENDS_FILE, CORRELATIONS_FILE, PAGE_FILE = (
+    "landscape.csv",
+    "landscape_ends.csv",
+    "landscape_correlations.csv",
+    "landscape.md",
+)
+
+
+@dataclass(frozen=True)
+class LandscapeOptions:
+    """results: folder of the results that are read. out: folder to write into. page: file of the page of the choice.
+
+    store: folder that keeps what was measured. workers: processes. pages: take the tables of features and ends
+    from `out` and measure nothing.
+    """
+
+    results: Path
+    out: Path
+    page: Path
+    store: Path
+    workers: int
+    pages: bool = False
+    effort: Effort = field(default_factory=Effort)
+
+
+def make_landscape(options: LandscapeOptions, bar: ProgressBar) -> Iterator[Path]:
+    """Measure, compare and write; yields the written files.
+
+    It can be stopped at any time: what was measured is kept, and the same command goes on from there. Raises
+    InputError where results are missing, StoppedError.
+    """
+    suites = [Comparison.read(options.results, name) for name in ("suite", "suite_heldout")]
+    measured = _read_texts(options.out) if options.pages else _measure(suites, options, bar)
+    features, ends = (pd.read_csv(StringIO(text)) for text in measured.values())  # the same digits in both ways
+    first, second = (standings(each.table) for each in suites)
+    _check_problems(features, [*first.index, *second.index])
+    correlations = correlation_table(features, first, second)
+    page = choice_page(Sources.read(options.results, features, correlations))
+    texts: dict[str, str | bytes] = {
+        **measured,
+        CORRELATIONS_FILE: as_csv(correlations),
+        PAGE_FILE: landscape_page(features, correlations, options.effort),
+        **{f"{PICTURE_STEM}.{suffix}": image for suffix, image in draw_landscape(features, correlations, ends).items()},
+    }
+    yield from write_texts(texts, options.out)
+    write_whole(options.page, page)
+    yield options.page
+
+
+def _measure(suites: list[Comparison], options: LandscapeOptions, bar: ProgressBar) -> dict[str, str]:
+    labels = list(dict.fromkeys(str(name) for suite in suites for name in suite.table["problem"]))
+    work = list_work(labels, options.effort, options.results / RECORDS_FILE)
+    results = measure_all(work, options.effort, options.store, options.workers, bar)
+    return {FEATURES_FILE: as_csv(feature_table(work, results)), ENDS_FILE: as_csv(ends_table(work, results))}
+
+
+def _read_texts(out: Path) -> dict[str, str]:
+    for name in (FEATURES_FILE, ENDS_FILE):
+        if not (out / name).is_file():
+            raise InputError(f"{out / name}: there is no such table; `armlab landscape` without --pages makes it")
+    return {name: (out / name).read_text(encoding="utf-8") for name in (FEATURES_FILE, ENDS_FILE)}
+
+
+def _check_problems(features: pd.DataFrame, problems: list[str]) -> None:
+    unknown = sorted(set(problems) - set(features["problem"]))
+    if unknown:
+        raise InputError(f"{FEATURES_FILE}: has no row of '{unknown[0]}'; leave out --pages to measure it")
