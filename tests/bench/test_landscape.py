@@ -223,7 +223,7 @@ def test_the_features_of_a_problem_are_the_same_again(tmp_path: Path) -> None:
 def committed(tmp_path: Path) -> LandscapeOptions:
     out = tmp_path / "landscape"
     out.mkdir()
-    for name in ("landscape.csv", "landscape_ends.csv"):
+    for name in ("landscape.csv", "landscape_ends.csv", "landscape.settings.yaml"):
         (out / name).write_bytes((ROOT / "results" / "landscape" / name).read_bytes())
     return LandscapeOptions(ROOT / "results", out, tmp_path / "page.md", tmp_path / "store", 1, pages=True)
 
@@ -232,7 +232,7 @@ def test_the_committed_pages_say_what_the_results_say(tmp_path: Path) -> None:
     """If this fails after a new run of a study: `armlab landscape --pages`."""
     options = committed(tmp_path)
     written = list(make_landscape(options, silent_bar))
-    assert len(written) == 7
+    assert len(written) == 8
     assert options.page.read_text() == (ROOT / "docs" / "which-optimiser.md").read_text()
     assert (options.out / "landscape.md").read_text() == (ROOT / "results" / "landscape" / "landscape.md").read_text()
 
@@ -273,5 +273,5 @@ def test_pages_without_a_measured_problem_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"has no row of 'suite-1/irb120-arm-tool-h3-t10-origin'"):
         list(make_landscape(options, silent_bar))
     (options.out / "landscape.csv").unlink()
-    with pytest.raises(InputError, match="there is no such table"):
+    with pytest.raises(InputError, match="there is no such file"):
         list(make_landscape(options, silent_bar))

@@ -141,6 +141,12 @@ def _basin_text(landscapes: pd.DataFrame) -> Iterator[str]:
         f"{int(landscapes['descents'].sum())} descents in all, {landscapes['gradients'].sum():,} points with "
         "derivatives."
     )
+    unfinished = landscapes.loc[landscapes["negative"] > 0, "landscape"]
+    if len(unfinished):
+        yield (
+            "A negative curvature at the best point says that it is no minimum of the smooth criterion: descents stop "
+            f"early there, and their ends are more than the basins: {', '.join(unfinished)}."
+        )
     if landscapes["from_record"].any():
         names = ", ".join(landscapes.loc[landscapes["from_record"], "landscape"])
         yield f"The best known trajectory led to a better point than these descents on: {names}."
