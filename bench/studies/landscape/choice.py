@@ -1,19 +1,25 @@
 """The page that says which optimiser to take; every number on it is read from files of results."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from algorithms.registry import names_with_derivatives
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.printed import display_name
-from bench.studies.landscape.ratios import Ratio, mean_ratio, quartile_ratio_text
+from bench.studies.landscape.choice_studies import (
+    budget_section,
+    budget_sentence,
+    least_row,
+    median_number,
+    space_section,
+    space_sentence,
+    tuning_section,
+    tuning_sentence,
+)
+from bench.studies.landscape.ratios import Ratio, quartile_ratio_text
 from bench.studies.landscape.sources import Comparison, Sources
 from bench.studies.landscape.standing import BETTER, CANNOT_TELL, FEATURES, POWER, standings
-from bench.studies.search_space.study import FEASIBLE_MARK
-from bench.studies.tuning.report import TUNED
 
 FORMS = {"tool": "path of the tool point", "joint": "periodic series", "rest": "series from rest to rest"}
 CHOSEN_ON, CHECKED_ON = "suite 1", "the held-out suite"
@@ -39,9 +45,9 @@ def choice_page(sources: Sources) -> str:
         _READING,
         *_plain_section(sources),
         *_asking_section(sources),
-        *_budget_section(sources),
-        *_space_section(sources),
-        *_tuning_section(sources),
+        *budget_section(sources),
+        *space_section(sources),
+        *tuning_section(sources),
         *_kind_section(sources),
         *_feature_section(sources),
     )
@@ -53,9 +59,9 @@ def _short_answer(sources: Sources) -> Iterator[str]:
         f"- **Without derivatives**, {_evaluations(sources.suite)} evaluations: **{choice}**. "
         + _rivals_sentence(sources),
         _asking_sentence(sources),
-        _space_sentence(sources),
-        _budget_sentence(sources),
-        _tuning_sentence(sources),
+        space_sentence(sources),
+        budget_sentence(sources),
+        tuning_sentence(sources),
         _kind_sentence(sources),
     ]
     yield "\n".join(points)
@@ -164,167 +170,18 @@ def _asking_section(sources: Sources) -> Iterator[str]:
             shown = (
                 "1" if name == asking else quartile_ratio_text(rows.loc[name], rows.loc[asking], compared.repetitions)
             )
-            cells[name] += [_number(rows, name), shown]
+            cells[name] += [median_number(rows, name), shown]
     headings = ["algorithm", *(text for problem, *_, asking in winners for text in (problem, f"to {_name(asking)}"))]
     yield markdown_table(headings, [[_name(name), *each] for name, each in cells.items()], range(1, len(headings)))
 
 
 def _derivative_winners(compared: Comparison) -> list[tuple[str, pd.DataFrame, str, str]]:
     """By problem: its rows by algorithm, and the least medians without and with derivatives."""
-    found = []
-    for problem, group in compared.table.groupby("problem", sort=False):
-        rows = group.set_index("algorithm")
-        asking = [name for name in rows.index if name in names_with_derivatives()]
-        plain = [name for name in rows.index if name not in asking]
-        found.append(
-            (str(problem), rows, str(rows.loc[plain, "median"].idxmin()), str(rows.loc[asking, "median"].idxmin()))
-        )
-    return found
-
-
-_BUDGET_HEADINGS = ["problem", "evaluations", "least median", "next", "next to least"]
-
-
-def _budget_section(sources: Sources) -> Iterator[str]:
-    yield "## How many evaluations?"
-    compared = sources.budgets
-    yield f"Without derivatives, {compared.repetitions} repetitions; every run is planned for its budget."
-    rows = []
-    for problem, budget, group in _budget_groups(compared):
-        best, second = group.index[:2]
-        ratio = quartile_ratio_text(group.loc[second], group.loc[best], compared.repetitions)
-        rows.append([problem, f"{budget:,}", _median_text(group, best), _median_text(group, second), ratio])
-    yield markdown_table(_BUDGET_HEADINGS, rows, (1,))
-    compared = sources.derivative_budgets
-    yield f"With and without derivatives, {compared.repetitions} repetitions."
-    rows = []
-    for problem, budget, group in _budget_groups(compared):
-        asking = next(name for name in group.index if name in names_with_derivatives())
-        plain = next(name for name in group.index if name not in names_with_derivatives())
-        ratio = quartile_ratio_text(group.loc[plain], group.loc[asking], compared.repetitions)
-        rows.append([problem, f"{budget:,}", _median_text(group, asking), _median_text(group, plain), ratio])
-    yield markdown_table(["problem", "evaluations", "least with derivatives", "least without", "ratio"], rows, (1,))
-
-
-def _budget_groups(compared: Comparison) -> Iterator[tuple[str, int, pd.DataFrame]]:
-    """Problem, budget, and the rows by algorithm, the least median first."""
-    for names, group in compared.with_budgets().groupby(["problem", "budget"], sort=False):
-        problem, budget = np.atleast_1d(np.array(names, dtype=object))
-        yield str(problem), int(budget), group.set_index("algorithm").sort_values("median", kind="stable")
-
-
-def _median_text(group: pd.DataFrame, name: Any) -> str:
-    return f"{_name(str(name))} {_number(group, name)}"
-
-
-def _number(rows: pd.DataFrame, name: Any) -> str:
-    return f"{float(rows['median'][name]):.3g}"
-
-
-def _budget_sentence(sources: Sources) -> str:
-    parts = []
-    for problem in sources.budgets.table["problem"].unique():
-        told = [
-            f"{_median_text(group, group.index[0])} at {budget:,}"
-            for name, budget, group in _budget_groups(sources.budgets)
-            if name == problem
-        ]
-        parts.append(f"`{problem}`: {', '.join(told)}")
-    return f"- **With more evaluations**, without derivatives, the least medians are: {'; '.join(parts)}."
-
-
-def _space_rows(sources: Sources, problem: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Rows by algorithm of a problem in its coefficients and in the feasible search space."""
-    table = sources.space.table.set_index("algorithm")
-    return table[table["problem"] == problem], table[table["problem"] == f"{problem}{FEASIBLE_MARK}"]
-
-
-def _space_ratio(sources: Sources, name: str) -> Ratio:
-    rows = sources.space_duels[sources.space_duels["algorithm"] == name].set_index("problem")
-    return mean_ratio(rows["median"], rows["median_in_space"], pd.Series(rows.index, rows.index))
-
-
-def _space_sentence(sources: Sources) -> str:
-    duels = sources.space_duels
-    better, worse = (int((duels["better"] == side).sum()) for side in ("feasible", "coefficients"))
-    winners = {text: _space_winners(sources, asking=asking) for text, asking in (("without", False), ("with", True))}
-    told = "; ".join(f"{text} derivatives {winner}" for text, winner in winners.items())
-    return (
-        f"- **With a series in joint space, search the feasible space** (`search_space: feasible`): it is better in "
-        f"{better} and worse in {worse} of {len(duels)} duels of an algorithm with itself. Best there, and how many "
-        f"times as high the best in the coefficients ends: {told}."
-    )
-
-
-def _space_winners(sources: Sources, *, asking: bool) -> str:
-    told = []
-    for problem in sources.space_duels["problem"].unique():
-        both = [
-            rows[[(name in names_with_derivatives()) is asking for name in rows.index]]
-            for rows in _space_rows(sources, problem)
-        ]
-        plain, space = (rows.loc[str(rows["median"].idxmin())] for rows in both)
-        ratio = quartile_ratio_text(plain, space, sources.space.repetitions)
-        told.append(f"`{problem}` {_name(str(space.name))}, {ratio}")
-    return ", ".join(told)
-
-
-def _space_section(sources: Sources) -> Iterator[str]:
-    duels = sources.space_duels
-    problems = [str(problem) for problem in duels["problem"].unique()]
-    yield "## In the feasible search space"
-    yield (
-        f"Median in the space, and the ratio of the median in the coefficients to it; {sources.space.repetitions} "
-        "repetitions of equal budget."
-    )
-    rows = []
-    for name in [str(each) for each in duels["algorithm"].unique()]:
-        cells = [_name(name), _space_ratio(sources, name).text()]
-        for problem in problems:
-            plain, space = _space_rows(sources, problem)
-            ratio = quartile_ratio_text(plain.loc[name], space.loc[name], sources.space.repetitions)
-            cells.append(f"{_number(space, name)}; {ratio}")
-        rows.append(cells)
-    yield markdown_table(["algorithm", "mean ratio", *problems], rows, range(1, len(problems) + 2))
-
-
-def _tuning_ratio(sources: Sources, ours: str, theirs: str) -> Ratio:
-    judged = sources.tuned.T
-    return mean_ratio(judged[ours], judged[theirs], pd.Series(judged.index, judged.index))
-
-
-def _tuning_pairs(sources: Sources) -> list[str]:
-    return [name for name in sources.tuned.index if f"{name}{TUNED}" in sources.tuned.index]
-
-
-def _tuning_sentence(sources: Sources) -> str:
-    names = _tuning_pairs(sources)
-    gains = {name: _tuning_ratio(sources, name, f"{name}{TUNED}") for name in names}
-    helped = sorted((name for name in names if gains[name].low > 1), key=lambda name: -gains[name].value)
-    told = ", ".join(f"{_name(name)} {gains[name].text()}" for name in helped)
-    harmed = [name for name in names if gains[name].high < 1]
-    return (
-        f"- **Tuning** lowers the median on each of {sources.tuned.shape[1]} judging problems for {told or 'none'} "
-        f"(published to tuned), and raises it on each for {_names(harmed)}; for the others it depends on the problem."
-    )
-
-
-def _tuning_section(sources: Sources) -> Iterator[str]:
-    names = _tuning_pairs(sources)
-    losses = sources.tuned.loc[[f"{name}{TUNED}" for name in names]].rank().mean(axis=1).sort_values(kind="stable")
-    best = str(losses.index[0])
-    yield "## Tuned against published"
-    yield (
-        f"{sources.tuned.shape[1]} judging problems that took no part in the tuning. Rank among the tuned ones, ratio "
-        f"of published to tuned, and of tuned to the tuned {_name(best.removesuffix(TUNED))}."
-    )
-    rows = []
-    for label in map(str, losses.index):
-        name = label.removesuffix(TUNED)
-        to_best = "1" if label == best else _tuning_ratio(sources, label, best).text()
-        rows.append([_name(name), f"{losses[label]:.2f}", _tuning_ratio(sources, name, label).text(), to_best])
-    headings = ["algorithm", "rank", "published to tuned", f"tuned to {_name(best.removesuffix(TUNED))}"]
-    yield markdown_table(headings, rows, (1, 2, 3))
+    groups = [(str(name), rows.set_index("algorithm")) for name, rows in compared.table.groupby("problem", sort=False)]
+    return [
+        (problem, rows, str(least_row(rows, asking=False).name), str(least_row(rows, asking=True).name))
+        for problem, rows in groups
+    ]
 
 
 def _kinds(sources: Sources) -> Iterator[tuple[str, Comparison, Comparison]]:
