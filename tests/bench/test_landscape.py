@@ -12,6 +12,7 @@ import pytest
 
 from algorithms.registry import names_with_derivatives
 from armlab.common.errors import InputError
+from bench.errors import StoppedError
 from bench.studies.landscape import measure, standing, study
 from bench.studies.landscape.basins import Ends, find_symmetry
 from bench.studies.landscape.curvature import curvature_of, measure_curvature
@@ -201,6 +202,21 @@ def test_problems_that_differ_in_their_frame_are_measured_once_and_kept(
     monkeypatch.delattr(measure.Work, "measure")
     assert measure.measure_all([work], TINY, tmp_path / "store", 1, silent_bar) == [results]
     assert len(measure.ends_table([work], [results])) == 1
+
+
+def test_a_stopped_measurement_keeps_what_is_done(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    labels = ["suite-1/irb120-arm-joint-h3-t5-origin", "suite-1/irb120-arm-rest-h4-t5-shifted"]
+    first, second = work = measure.list_work(labels, TINY, tmp_path / "none.json")
+
+    def stop_at_second(self: measure.Work, effort: Effort) -> dict[str, Any]:
+        if self == second:
+            raise KeyboardInterrupt
+        return {"landscape": {}, "ends": []}
+
+    monkeypatch.setattr(measure.Work, "measure", stop_at_second)
+    with pytest.raises(StoppedError, match="the same command goes on"):
+        measure.measure_all(work, TINY, tmp_path / "store", 1, silent_bar)
+    assert [path.stem for path in (tmp_path / "store").iterdir()] == [first.key]
 
 
 def test_another_effort_is_another_key(tmp_path: Path) -> None:
