@@ -39,6 +39,19 @@ class Duel:
         return self.subject if self.superiority > 0.5 else self.rival
 
 
+def duel_row(duel: Duel) -> dict[str, str | float]:
+    """A duel as a row of a table; winner: empty where no difference is significant at 5 %."""
+    return {
+        "subject": duel.subject,
+        "rival": duel.rival,
+        "superiority": duel.superiority,
+        "low": duel.low,
+        "high": duel.high,
+        "p_holm": duel.p,
+        "winner": duel.winner() or "",
+    }
+
+
 def duels(frame: pd.DataFrame, pairs: Sequence[tuple[str, str]]) -> list[Duel]:
     """Duels of (subject, rival) labels in a tidy frame of one problem, swarm size and budget, with Holm's correction
     over all of them.

@@ -11,7 +11,7 @@ import pandas as pd
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
-from bench.statistics.pairwise import Duel, duels, duels_against_all
+from bench.statistics.pairwise import Duel, duel_row, duels, duels_against_all
 from bench.statistics.power import power_text
 
 CELL_COLUMNS = ["problem", "swarm_size", "budget"]
@@ -64,16 +64,7 @@ def variant_duels_table(frame: pd.DataFrame, default: str) -> pd.DataFrame:
 
 def _duel_table(frame: pd.DataFrame, fight: DuelChooser) -> pd.DataFrame:
     rows = [
-        {
-            **dict(zip(CELL_COLUMNS, names, strict=True)),
-            "subject": duel.subject,
-            "rival": duel.rival,
-            "superiority": duel.superiority,
-            "low": duel.low,
-            "high": duel.high,
-            "p_holm": duel.p,
-            "winner": duel.winner() or "",
-        }
+        dict(zip(CELL_COLUMNS, names, strict=True)) | duel_row(duel)
         for names, group in frame.groupby(CELL_COLUMNS, sort=False)
         for duel in fight(group)
     ]

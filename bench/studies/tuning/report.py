@@ -8,63 +8,19 @@ import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
 from bench.printed import display_name
-from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
-from bench.statistics.pairwise import Duel, duels, log_losses
+from bench.statistics.pairwise import Duel
 from bench.statistics.power import power_text
-from bench.studies.tuning.search import Tuned, median_ends, params_text
-from bench.studies.tuning.settings import TuningSettings
-
-TUNED = " tuned"
-"""Ends the label of an algorithm with its tuned hyper-parameters."""
-SUBJECT = "mupso"
-
-
-def sweep_label(algorithm: str, parameter: str, value: float) -> str:
-    """The label of one value of the sweep."""
-    return f"{algorithm} {parameter}={value:g}"
+from bench.studies.tuning.judged import SUBJECT, TUNED, JudgedRuns, ProblemDuels, count_wins
+from bench.studies.tuning.search import Tuned, params_text
 
 
 @dataclass(frozen=True, eq=False)
 class Judgement:
-    """frame: tidy outcomes on the judging problems, of each algorithm as published, as tuned, and of the sweep.
+    """What tuning found for each algorithm, and its judged runs; known: best condition numbers by problem."""
 
-    known: best condition numbers by problem.
-    """
-
-    settings: TuningSettings
     tuned: tuple[Tuned, ...]
-    frame: pd.DataFrame
+    runs: JudgedRuns
     known: Mapping[str, float]
-
-    def contest(self, *, as_published: bool = True) -> pd.DataFrame:
-        """The rows without the sweep; only the tuned ones if not `as_published`."""
-        labels = [f"{one.algorithm}{TUNED}" for one in self.tuned]
-        labels += [one.algorithm for one in self.tuned] if as_published else []
-        return self.frame[self.frame["algorithm"].isin(labels)].reset_index(drop=True)
-
-    def ranking(self, *, as_published: bool) -> CriticalDifference:
-        """Average ranks over the judging problems, of the tuned algorithms alone or beside the published ones."""
-        problems = self.contest(as_published=as_published).groupby("problem", sort=False)
-        return critical_difference(block_losses([log_losses(rows) for _, rows in problems]))
-
-    def table(self) -> pd.DataFrame:
-        """One row a label of the judged runs, one column a problem: the median of its ends."""
-        rows = [
-            {"algorithm": str(label), **median_ends(group)}
-            for label, group in self.frame.groupby("algorithm", sort=False)
-        ]
-        return pd.DataFrame(rows)[["algorithm", *self.settings.judge]]
-
-    def tuning_duels(self) -> list[tuple[str, list[Duel]]]:
-        """By problem: each tuned algorithm against itself as published, Holm over the algorithms."""
-        pairs = [(f"{one.algorithm}{TUNED}", one.algorithm) for one in self.tuned]
-        return [(str(name), duels(rows, pairs)) for name, rows in self.contest().groupby("problem", sort=False)]
-
-    def subject_duels(self) -> list[tuple[str, list[Duel]]]:
-        """By problem: tuned MuPSO against every other tuned algorithm, Holm over them."""
-        rivals = [one.algorithm for one in self.tuned if one.algorithm != SUBJECT]
-        pairs = [(f"{SUBJECT}{TUNED}", f"{rival}{TUNED}") for rival in rivals]
-        return [(str(name), duels(rows, pairs)) for name, rows in self.contest().groupby("problem", sort=False)]
 
 
 def configurations_table(tuned: Sequence[Tuned]) -> pd.DataFrame:
@@ -85,27 +41,29 @@ that of the published configuration. Nothing below is measured on a training pro
 the judging problems, which took no part in the tuning, in no frame of coordinates. An infeasible end counts as
 infinite. Duels: paired Wilcoxon on log10 of the ends, Holm within a problem, 5 %."""
 _SWEEP_READING = """\
-All other hyper-parameters as published. The last line but one is the least median of the other algorithms as published,
-the last one as tuned: where MuPSO's number is below, it would win there."""
+All other hyper-parameters as published. In brackets the duels with the other algorithms that this value wins and loses,
+first as published, then as tuned (Holm over all values and rivals within a problem). The last lines are the least
+medians of the others. The limit is read off the problems that judge it, so a win here is an upper bound."""
 
 
 def tuning_page(judged: Judgement) -> str:
     """The tables and their verdict as a Markdown page."""
-    settings = judged.settings
+    settings = judged.runs.settings
     effort = (
         f"{settings.configurations} configurations an algorithm x {len(settings.train)} problems x "
         f"{settings.train_repetitions} repetitions of {settings.evaluations} evaluations; judged on "
         f"{len(settings.judge)} problems with {settings.judge_repetitions} repetitions. All settings: "
-        f"`{settings.name}.settings.yaml`."
+        f"`{settings.name}.settings.yaml`; every judged end: `{settings.name}_ends.csv`; every duel with its A12 and "
+        f"95 % interval: `{settings.name}_duels.csv`."
     )
     sections = [
         "## What tuning found",
         markdown_table(_FOUND_HEADINGS, _found_rows(judged)),
         "## Medians on the problems that took no part",
         _medians_table(judged),
-        *_verdict(judged),
+        *_verdict(judged.runs),
         f"![Ranks on the judging problems]({settings.name}_ranking.png)",
-        *_sweep_section(judged),
+        *_sweep_section(judged.runs),
     ]
     return markdown_page(settings.name, _READING, effort, *sections)
 
@@ -126,62 +84,89 @@ def _found_rows(judged: Judgement) -> Iterator[list[str]]:
 
 
 def _medians_table(judged: Judgement) -> str:
-    table = judged.table().set_index("algorithm")
+    runs = judged.runs
+    table, signs = runs.medians(), _signs(runs.tuning_duels())
     rows = []
-    for one in judged.tuned:
-        before, after = table.loc[one.algorithm], table.loc[f"{one.algorithm}{TUNED}"]
-        cells = [f"{before[name]:.3g} -> {after[name]:.3g}{_sign(judged, name, one)}" for name in judged.settings.judge]
-        rows.append([display_name(one.algorithm), *cells])
+    for name in runs.settings.algorithms:
+        before, after = table.loc[name], table.loc[f"{name}{TUNED}"]
+        cells = [
+            f"{before[problem]:.3g} -> {after[problem]:.3g}{signs[problem, name]}" for problem in runs.settings.judge
+        ]
+        rows.append([display_name(name), *cells])
     if judged.known:
-        best = [f"{judged.known[name]:.3g}" if name in judged.known else "-" for name in judged.settings.judge]
-        rows.append(["best known", *best])
-    return markdown_table(["published -> tuned", *judged.settings.judge], rows)
+        known = [judged.known.get(problem) for problem in runs.settings.judge]
+        rows.append(["best known", *(f"{value:.3g}" if value else "-" for value in known)])
+    return markdown_table(["published -> tuned", *runs.settings.judge], rows)
 
 
-def _sign(judged: Judgement, problem: str, one: Tuned) -> str:
-    """`+` if tuning helped at 5 %, `-` if it harmed."""
-    found = dict(judged.tuning_duels())[problem]
-    duel = next(duel for duel in found if duel.rival == one.algorithm)
+def _signs(by_problem: ProblemDuels) -> dict[tuple[str, str], str]:
+    """By problem and rival: ` +` if the subject is significantly better, ` -` if worse."""
+    return {(problem, duel.rival): _sign(duel) for problem, found in by_problem for duel in found}
+
+
+def _sign(duel: Duel) -> str:
     return {duel.subject: " +", duel.rival: " -"}.get(str(duel.winner()), "")
 
 
-def _verdict(judged: Judgement) -> Iterator[str]:
-    ranks = judged.ranking(as_published=False).ranks
-    order = ", ".join(f"{_tuned_name(label)} {rank:.2f}" for label, rank in ranks.items())
-    problems = len(judged.settings.judge)
-    yield f"Average ranks over the {problems} judging problems, all tuned: {order}."
+def _verdict(runs: JudgedRuns) -> Iterator[str]:
+    settings = runs.settings
+    ranks = runs.ranking(runs.labels(tuned=True)).ranks
+    order = ", ".join(f"{display_name(label.removesuffix(TUNED))} {rank:.2f}" for label, rank in ranks.items())
+    yield f"Average ranks over the {len(settings.judge)} judging problems, all tuned: {order}."
     subject = f"{SUBJECT}{TUNED}"
     if subject not in ranks:
         return
-    place = list(ranks).index(subject) + 1
-    fought = [duel for _, found in judged.subject_duels() for duel in found]
-    won = sum(duel.winner() == duel.subject for duel in fought)
-    lost = sum(duel.winner() == duel.rival for duel in fought)
+    found = runs.subject_duels(tuned=True)
+    won, lost, fought = count_wins(found, subject)
     yield (
-        f"**Does the paper's ranking hold when everybody is tuned?** MuPSO has place {place} of {len(ranks)}; it is "
-        f"better in {won}, worse in {lost} of {len(fought)} duels with another tuned algorithm. "
-        f"{power_text(judged.settings.judge_repetitions, len(ranks) - 1)}."
+        f"**Does the paper's ranking hold when everybody is tuned?** MuPSO has place {list(ranks).index(subject) + 1} "
+        f"of {len(ranks)}; it is better in {won}, worse in {lost} of {fought} duels with another tuned algorithm. "
+        f"{power_text(settings.judge_repetitions, len(ranks) - 1)}."
     )
+    yield duels_by_rival(found)
 
 
-def _tuned_name(label: str) -> str:
-    return display_name(label.removesuffix(TUNED))
+def duels_by_rival(by_problem: ProblemDuels) -> str:
+    """One row a rival, one column a problem: A12 of the subject with its 95 % interval, and who wins."""
+    rivals = dict.fromkeys(duel.rival for _, found in by_problem for duel in found)
+    cells = {(problem, duel.rival): _effect_text(duel) for problem, found in by_problem for duel in found}
+    problems = [problem for problem, _ in by_problem]
+    rows = [
+        [display_name(rival.removesuffix(TUNED)), *(cells[problem, rival] for problem in problems)] for rival in rivals
+    ]
+    return markdown_table(["A12 against", *problems], rows)
 
 
-def _sweep_section(judged: Judgement) -> Iterator[str]:
-    sweep, problems = judged.settings.sweep, judged.settings.judge
+def _effect_text(duel: Duel) -> str:
+    return f"{duel.superiority:.2f} ({duel.low:.2f}-{duel.high:.2f}){_sign(duel)}"
+
+
+def _sweep_section(runs: JudgedRuns) -> Iterator[str]:
+    sweep, problems = runs.settings.sweep, list(runs.settings.judge)
     if sweep is None:
         return
-    table = judged.table().set_index("algorithm")
-    labels = {f"{value:g}": [sweep_label(sweep.algorithm, sweep.parameter, value)] for value in sweep.values}
-    others = [one.algorithm for one in judged.tuned if one.algorithm != sweep.algorithm]
-    if others:
-        labels |= {"best other, published": others, "best other, tuned": [f"{name}{TUNED}" for name in others]}
-    rows = [[text, *_format_medians(table.loc[chosen, list(problems)].min())] for text, chosen in labels.items()]
     yield f"## {display_name(sweep.algorithm)} against its `{sweep.parameter}`"
     yield _SWEEP_READING
-    yield markdown_table([sweep.parameter, *problems], rows)
+    yield markdown_table([sweep.parameter, *problems], _sweep_rows(runs, sweep.algorithm))
 
 
-def _format_medians(medians: "pd.Series[float]") -> list[str]:
-    return [f"{value:.3g}" if np.isfinite(value) else "-" for value in medians]
+def _sweep_rows(runs: JudgedRuns, algorithm: str) -> Iterator[list[str]]:
+    table, problems = runs.medians(), list(runs.settings.judge)
+    found = [dict(runs.sweep_duels(tuned=tuned)) for tuned in (False, True)]
+    for value, label in runs.sweep_labels.items():
+        medians = map(_median_text, table.loc[label])
+        counts = [", ".join(_wins_text(duels.get(problem, []), label) for duels in found) for problem in problems]
+        yield [f"{value:g}", *(f"{median} ({count})" for median, count in zip(medians, counts, strict=True))]
+    for text, tuned in (("best other, published", False), ("best other, tuned", True)):
+        others = runs.labels(tuned=tuned, without=algorithm)
+        if others:
+            yield [text, *map(_median_text, table.loc[others].min())]
+
+
+def _wins_text(found: list[Duel], label: str) -> str:
+    won, lost, _ = count_wins([("", found)], label)
+    return f"+{won} -{lost}"
+
+
+def _median_text(value: float) -> str:
+    return f"{value:.3g}" if np.isfinite(value) else "-"

@@ -23,8 +23,8 @@ from armlab.common.streams import named_generator
 from bench.config import find_algorithm, parse_params
 from bench.plan import Plan, plan_trials
 from bench.run import run_missing
-from bench.statistics import is_feasible, quantile
 from bench.store import RunStore
+from bench.studies.tuning.judged import median_ends
 from bench.studies.tuning.settings import ParameterRange, TuningSettings
 from bench.tables import tidy_frame
 
@@ -78,13 +78,6 @@ def tune_algorithm(settings: TuningSettings, name: str, store: RunStore, progres
         found.append(Configuration(params, loss))
         progress(1)
     return Tuned(name, tuple(found), _importance(study))
-
-
-def median_ends(frame: pd.DataFrame) -> dict[str, float]:
-    """Median of the ends by problem, infinite where half of them are infeasible; frame: tidy, of one algorithm."""
-    feasible = is_feasible(frame["value"].to_numpy(), frame["violation"].to_numpy())
-    ends = frame.assign(end=np.where(feasible, frame["value"], np.inf))
-    return {str(problem): quantile(rows["end"].to_numpy(), 0.5) for problem, rows in ends.groupby("problem")}
 
 
 def relative_loss(medians: Mapping[str, float], reference: Mapping[str, float]) -> float:

@@ -13,7 +13,8 @@ from bench.result_sets.formats import make_folder
 from bench.run import ProgressBar
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
-from bench.studies.tuning.report import TUNED, Judgement, configurations_table, sweep_label, tuning_page
+from bench.studies.tuning.judged import TUNED, JudgedRuns, ends_path, ends_table, sweep_label
+from bench.studies.tuning.report import Judgement, configurations_table, tuning_page
 from bench.studies.tuning.search import Tuned, run_frame, tune_algorithm
 from bench.studies.tuning.settings import TuningSettings, read_tuning
 from bench.tables import as_csv
@@ -48,12 +49,14 @@ def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Ite
         plan = plan_trials(settings.experiment(_contestants(settings, tuned), judging=True), "tuning")
         frame = run_frame(plan, store, options.workers)
     known = best_known_values(plan.first_entries(), options.records)
-    judgement = Judgement(settings, tuple(tuned), frame, known)
+    runs = JudgedRuns(settings, frame)
     files: dict[str, str | bytes] = {
         f"{settings.name}_configurations.csv": as_csv(configurations_table(tuned)),
-        f"{settings.name}_judged.csv": as_csv(judgement.table()),
-        **{f"{settings.name}_ranking.{suffix}": image for suffix, image in draw_ranking(judgement.contest()).items()},
-        f"{settings.name}.md": tuning_page(judgement),
+        f"{settings.name}_judged.csv": as_csv(runs.medians().reset_index()),
+        ends_path(options.results, settings.name).name: as_csv(ends_table(frame)),
+        f"{settings.name}_duels.csv": as_csv(runs.duels_table()),
+        **{f"{settings.name}_ranking.{suffix}": image for suffix, image in draw_ranking(runs.contest()).items()},
+        f"{settings.name}.md": tuning_page(Judgement(tuple(tuned), runs, known)),
         f"{settings.name}.settings.yaml": settings_to_yaml(settings),
     }
     for name, content in files.items():
