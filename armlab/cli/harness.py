@@ -303,6 +303,23 @@ def draw(results: Path, store: Path, out: Path, records: Path) -> ResultLines:
 
 
 @click.command()
+@click.argument("results", type=_PATH)
+@click.argument("algorithm")
+@_STORE_OPTION
+@click.option("--out", type=OutputPath(), required=True, help="Folder to write into.")
+@prints_result
+def duels(results: Path, algorithm: str, store: Path, out: Path) -> ResultLines:
+    """Compare ALGORITHM with every other of RESULTS.
+
+    Writes effect sizes (A12) with intervals, corrected tests and their power. ALGORITHM: its label. RESULTS: a
+    configuration file whose trials were run, or a folder that `share` wrote.
+    """
+    from bench.result_sets.duels import write_duels
+
+    return written_files(write_duels(results, store, algorithm, out))
+
+
+@click.command()
 @click.argument("damaged", type=_PATH)
 @click.option("--out", type=OutputPath(), required=True, help="File of the new store.")
 @prints_result

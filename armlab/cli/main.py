@@ -42,6 +42,7 @@ _GROUPS = {
         "compare": "armlab.cli.harness:compare",
         "share": "armlab.cli.harness:share",
         "draw": "armlab.cli.harness:draw",
+        "duels": "armlab.cli.harness:duels",
         "properties": "armlab.cli.harness:properties",
         "tune": "armlab.cli.harness:tune",
         "best-known": "armlab.cli.harness:best_known",

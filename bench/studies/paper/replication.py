@@ -26,6 +26,7 @@ from bench.studies.paper.settings import (
     read_settings,
 )
 from bench.studies.paper.tables import make_table1, make_table2, make_table4, table1_deviations, table2_differences
+from bench.studies.paper.tuned import TunedEvidence, read_tuned_evidence
 from bench.tables import as_csv, tidy_frame
 
 EXPERIMENTS = ("table3", "figure2", "figure2_equal_evaluations", "figure3", "ranking")
@@ -47,17 +48,19 @@ class _ItemSettings:
 def make_paper(configs: Path, options: RunOptions, records: Path, bar: ProgressBar) -> Iterator[Path]:
     """Run the missing trials and write all files into the results folder; yields the files as they are written.
 
-    configs: the folder with one configuration for each table and figure. records: the best known trajectories. Raises
-    the errors of `run_experiment`.
+    configs: the folder with one configuration for each table and figure. records: the best known trajectories, in the
+    folder that holds `tune` and `study`, the results of `armlab tune` and `armlab study`. Raises the errors of
+    `run_experiment`.
     """
     items = _read_items(configs)
+    tuned = read_tuned_evidence(records.parent / "tune", records.parent / "study")
     loaded = {name: load_experiment(configs / f"{name}.yaml") for name in EXPERIMENTS}
     for name in EXPERIMENTS:
         yield from run_experiment(configs / f"{name}.yaml", options, bar)
     evidence = _gather_evidence(items, loaded, options, records)
     files = _make_files(items, loaded, evidence, records) | _settings_files(items)
     yield from _write_files(options.results, files)
-    yield from _write_files(options.results, _report_files(evidence, options.results))
+    yield from _write_files(options.results, _report_files(evidence, tuned, options.results))
 
 
 def describe_paper(configs: Path, options: RunOptions) -> Iterator[str]:
@@ -135,10 +138,10 @@ def _settings_files(items: _ItemSettings) -> Files:
     return {f"{item.model_dump()['name']}.settings.yaml": settings_to_yaml(item) for item in every}
 
 
-def _report_files(evidence: Evidence, folder: Path) -> Files:
+def _report_files(evidence: Evidence, tuned: TunedEvidence, folder: Path) -> Files:
     from bench.studies.paper.report import FIGURE_CAPTIONS, markdown_to_html, replication_page
 
-    text = replication_page(evidence)
+    text = replication_page(evidence, tuned)
     images = {name: (folder / name).read_bytes() for name in FIGURE_CAPTIONS}
     return {"replication.md": text, "replication.html": markdown_to_html("What could be reproduced", text, images)}
 

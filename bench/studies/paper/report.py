@@ -16,6 +16,7 @@ from bench.studies.paper.claims_comparison import comparison_claims, conclusion_
 from bench.studies.paper.claims_identification import identification_claims, trajectory_claims, value_claims
 from bench.studies.paper.claims_swarm_size import swarm_size_claims
 from bench.studies.paper.ranking import SUBJECT, Standing, ranking_table
+from bench.studies.paper.tuned import TunedEvidence, tuned_section
 
 
 def markdown_to_html(title: str, text: str, images: Mapping[str, bytes]) -> str:
@@ -73,12 +74,13 @@ for every algorithm; at 2 s all are, since the circle alone then turns joint 1 a
 limit."""
 
 
-def replication_page(evidence: Evidence) -> str:
+def replication_page(evidence: Evidence, tuned: TunedEvidence) -> str:
     """The report as a Markdown page."""
     claims = {title: make(evidence) for title, make in CLAIM_SECTIONS.items()}
     parts = [_VERDICT_RULES, _verdict_table(claims), *_main_findings(evidence)]
     for title, found in claims.items():
         parts += [f"## {title}", _claims_table(found)]
+    parts += tuned_section(tuned, evidence.paper)
     parts += [
         "## The ranking under every choice that is left open",
         _RANKING_READING.format(circle=_circle_speed(2.0)),

@@ -1,14 +1,17 @@
 """The judged runs of a tuning: every algorithm as published and as tuned, and one hyper-parameter at several values."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from armlab.common.errors import InputError
+from armlab.common.markdown import markdown_table
 from bench.files import settings_path
+from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
 from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
 from bench.statistics.pairwise import Duel, duel_row, duels, log_losses
@@ -85,11 +88,8 @@ class JudgedRuns:
         rivals = [] if sweep is None else self.labels(tuned=tuned, without=sweep.algorithm)
         return self._duels([(label, rival) for label in self.sweep_labels.values() for rival in rivals])
 
-    def _duels(self, pairs: list[tuple[str, str]]) -> ProblemDuels:
-        if not pairs:
-            return []
-        rows = self.of([label for pair in pairs for label in pair]).groupby("problem", sort=False)
-        return [(str(problem), duels(group, pairs)) for problem, group in rows]
+    def _duels(self, pairs: Iterable[tuple[str, str]]) -> ProblemDuels:
+        return _fight(self, tuple(pairs))
 
     def duels_table(self) -> pd.DataFrame:
         """All duels with effect sizes and 95 % intervals; `comparison` says over what Holm's correction goes."""
@@ -109,12 +109,40 @@ class JudgedRuns:
         )
 
 
+@lru_cache(maxsize=16)  # the page, the tables and the figures ask for the same duels
+def _fight(runs: JudgedRuns, pairs: tuple[tuple[str, str], ...]) -> ProblemDuels:
+    if not pairs:
+        return []
+    rows = runs.of([label for pair in pairs for label in pair]).groupby("problem", sort=False)
+    return [(str(problem), duels(group, pairs)) for problem, group in rows]
+
+
 def count_wins(by_problem: ProblemDuels, subject: str) -> tuple[int, int, int]:
     """In how many duels a label is significantly better, in how many worse, and of how many."""
     fought = [duel for _, found in by_problem for duel in found if duel.subject == subject]
     won = sum(duel.winner() == duel.subject for duel in fought)
     lost = sum(duel.winner() == duel.rival for duel in fought)
     return won, lost, len(fought)
+
+
+def duel_sign(duel: Duel) -> str:
+    """` +` if the subject is significantly better, ` -` if worse, else nothing."""
+    return {duel.subject: " +", duel.rival: " -"}.get(str(duel.winner()), "")
+
+
+def duels_by_rival(by_problem: ProblemDuels) -> str:
+    """One row a rival, one column a problem: A12 of the subject with its 95 % interval, and who wins."""
+    rivals = dict.fromkeys(duel.rival for _, found in by_problem for duel in found)
+    cells = {(problem, duel.rival): _effect_text(duel) for problem, found in by_problem for duel in found}
+    problems = [problem for problem, _ in by_problem]
+    rows = [
+        [display_name(rival.removesuffix(TUNED)), *(cells[problem, rival] for problem in problems)] for rival in rivals
+    ]
+    return markdown_table(["A12 against", *problems], rows)
+
+
+def _effect_text(duel: Duel) -> str:
+    return f"{duel.superiority:.2f} ({duel.low:.2f}-{duel.high:.2f}){duel_sign(duel)}"
 
 
 _END_COLUMNS = [*GROUP_COLUMNS, "repetition", "value", "violation"]

@@ -10,7 +10,7 @@ from armlab.common.markdown import markdown_page, markdown_table
 from bench.printed import display_name
 from bench.statistics.pairwise import Duel
 from bench.statistics.power import power_text
-from bench.studies.tuning.judged import SUBJECT, TUNED, JudgedRuns, ProblemDuels, count_wins
+from bench.studies.tuning.judged import SUBJECT, TUNED, JudgedRuns, ProblemDuels, count_wins, duel_sign, duels_by_rival
 from bench.studies.tuning.search import Tuned, params_text
 
 
@@ -101,11 +101,7 @@ def _medians_table(judged: Judgement) -> str:
 
 def _signs(by_problem: ProblemDuels) -> dict[tuple[str, str], str]:
     """By problem and rival: ` +` if the subject is significantly better, ` -` if worse."""
-    return {(problem, duel.rival): _sign(duel) for problem, found in by_problem for duel in found}
-
-
-def _sign(duel: Duel) -> str:
-    return {duel.subject: " +", duel.rival: " -"}.get(str(duel.winner()), "")
+    return {(problem, duel.rival): duel_sign(duel) for problem, found in by_problem for duel in found}
 
 
 def _verdict(runs: JudgedRuns) -> Iterator[str]:
@@ -124,21 +120,6 @@ def _verdict(runs: JudgedRuns) -> Iterator[str]:
         f"{power_text(settings.judge_repetitions, len(ranks) - 1)}."
     )
     yield duels_by_rival(found)
-
-
-def duels_by_rival(by_problem: ProblemDuels) -> str:
-    """One row a rival, one column a problem: A12 of the subject with its 95 % interval, and who wins."""
-    rivals = dict.fromkeys(duel.rival for _, found in by_problem for duel in found)
-    cells = {(problem, duel.rival): _effect_text(duel) for problem, found in by_problem for duel in found}
-    problems = [problem for problem, _ in by_problem]
-    rows = [
-        [display_name(rival.removesuffix(TUNED)), *(cells[problem, rival] for problem in problems)] for rival in rivals
-    ]
-    return markdown_table(["A12 against", *problems], rows)
-
-
-def _effect_text(duel: Duel) -> str:
-    return f"{duel.superiority:.2f} ({duel.low:.2f}-{duel.high:.2f}){_sign(duel)}"
 
 
 def _sweep_section(runs: JudgedRuns) -> Iterator[str]:
