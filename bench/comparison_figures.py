@@ -116,7 +116,10 @@ def draw_ranking(frame: pd.DataFrame) -> dict[str, bytes]:
 
 
 def _block_name(frame: pd.DataFrame) -> str:
-    return "problems" if frame["problem"].nunique() > 1 else "repetitions"
+    cases = len(frame[["problem", "swarm_size", "budget"]].drop_duplicates())
+    if cases == 1:
+        return "repetitions"
+    return "problems" if cases == frame["problem"].nunique() else "cases (problem, swarm size, budget)"
 
 
 def _draw_ranks(axes: Axes, losses: pd.DataFrame, found: CriticalDifference) -> None:

@@ -148,6 +148,8 @@ def test_the_figure_of_ranks_orders_by_average_rank_and_says_when_nothing_can_be
     many = draw_ranking(_comparison(12))["svg"].decode()
     assert "<!-- rank (1: best) in 12 problems -->" in many
     assert "repetitions" in draw_ranking(_comparison(1))["svg"].decode()
+    budgets = pd.concat([_comparison(2).assign(budget=budget) for budget in (100, 200)])
+    assert "in 4 cases (problem, swarm size, budget)" in draw_ranking(budgets)["svg"].decode()
 
 
 def test_the_figure_of_budgets_has_a_tick_for_each_budget() -> None:
