@@ -133,5 +133,6 @@ def times_pi(fraction: Fraction) -> float:
 
 
 def display_name(label: str) -> str:
-    """An algorithm's name as the paper writes it; other labels stay as they are."""
-    return {"mupso": "MuPSO"}.get(label, label.upper() if label in read_printed().table2 else label)
+    """A label with the algorithm's name, its first word, as the paper writes it; other labels stay as they are."""
+    name, space, rest = label.partition(" ")
+    return {"mupso": "MuPSO"}.get(name, name.upper() if name in read_printed().table2 else name) + space + rest
