@@ -98,3 +98,15 @@ def test_predicted_standard_deviations_are_of_the_size_of_the_seen_ones(folder: 
     table = pd.read_csv(folder / "table4.csv")
     ratio = table["standard deviation"] / table["predicted"]
     assert 0.5 < ratio.median() < 2.0
+
+
+def test_the_ranking_leaves_out_the_choice_that_no_algorithm_can_meet(folder: Path) -> None:
+    duels = pd.read_csv(folder / "ranking_duels.csv", dtype=str)
+    assert duels["feasible"].to_list().count("0%") == 1
+    assert "rank (1: best) in 3 repetitions" in (folder / "ranking.svg").read_text()
+
+
+def test_the_page_says_which_claims_hold_when_every_algorithm_is_tuned(folder: Path) -> None:
+    text = (folder / "replication.md").read_text()
+    assert "## Table 3, tuned" in text
+    assert re.search(r"Of 7 claims about the comparison, \d hold as published and \d when everybody is tuned", text)

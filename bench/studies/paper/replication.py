@@ -118,9 +118,11 @@ def _make_files(
     from bench.studies.paper.figures import draw_figure4, draw_figure5
 
     known = best_known_values(loaded["table3"].entries, records)
+    usable = [standing.problem for standing in evidence.ranking if standing.usable]
+    ranking = evidence.frames["ranking"]
     figures = {
         "table3": draw_ends(evidence.frames["table3"], known),
-        "ranking": draw_ranking(evidence.frames["ranking"]),
+        "ranking": draw_ranking(ranking[ranking["problem"].isin(usable)]),
         items.figure4.name: draw_figure4(items.figure4, evidence.best),
         items.figure5.name: draw_figure5(items.figure5, evidence.best),
     }

@@ -51,7 +51,7 @@ FIGURE_CAPTIONS = {
     "figure2_times.png": "Figure 2: computing time against swarm size.",
     "figure2_equal_evaluations.png": "Figure 2 once more, every swarm size with the same number of evaluations.",
     "table3.png": "Table 3: every end of every run, with median and quartiles; the dashed line is the best known.",
-    "ranking.png": "The ranking: each algorithm's rank under each choice that the paper leaves open, and its average.",
+    "ranking.png": "The ranking: each algorithm's rank under each choice with feasible ends, and its average.",
     "figure3.png": "Figure 3: average convergence; right, what the algorithm itself holds, which a mutation forgets.",
     "figure4.png": "Figure 4: MuPSO's best trajectory of Table 3 in Cartesian space.",
     "figure5.png": "Figure 5: the same trajectory in joint space.",
