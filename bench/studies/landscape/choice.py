@@ -104,10 +104,12 @@ def _asking_sentence(sources: Sources) -> str:
             "- **With exact derivatives**, each point counted for the dimension plus one evaluations, "
             f"{_evaluations(sources.derivatives)} in all: {told}."
         )
-    ratio = sources.ratio(sources.held_out, sources.choice, sources.asking_choice)
+    is_checked = sources.asking_choice in sources.held_out.algorithms
+    runs, where = (sources.held_out, CHECKED_ON) if is_checked else (sources.suite, "suite 1, on which it was chosen,")
+    ratio = sources.ratio(runs, sources.choice, sources.asking_choice)
     return (
         f"- **With exact derivatives**, each counted for the dimension plus one evaluations: "
-        f"**{_name(sources.asking_choice)}**. On {CHECKED_ON} {_name(sources.choice)} ends {ratio.text()} times as high"
+        f"**{_name(sources.asking_choice)}**. On {where} {_name(sources.choice)} ends {ratio.text()} times as high"
         f"{_left_out(ratio)}."
     )
 

@@ -12,7 +12,7 @@ from bench.printed import display_name
 from bench.studies.landscape.ratios import Ratio, mean_ratio, quartile_ratio_text
 from bench.studies.landscape.sources import Comparison, Sources
 from bench.studies.search_space.study import FEASIBLE_MARK
-from bench.studies.tuning.report import TUNED
+from bench.studies.tuning.judged import TUNED
 
 _BUDGET_HEADINGS = ["problem", "evaluations", "least median", "next", "next to least"]
 
