@@ -230,6 +230,13 @@ def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Set
     return Observed(signals, calm, segments, rate / step, blocks, moving, tuning.min_segment_rows)
 
 
+def in_fixed_order(runs: Sequence[Run]) -> list[Run]:
+    """Runs that identify first, then the longest, then the widest: the order in which they are listed says nothing."""
+    return sorted(
+        runs, key=lambda run: (run.role != "identify", -run.samples, -float(np.ptp(run.position, axis=0).sum()))
+    )
+
+
 def _to_common_rate(runs: list[Run]) -> list[Run]:
     """The runs at the lowest of their rates, so that one noise model serves them all."""
     lowest = min(run.rate_hz for run in runs)

@@ -12,7 +12,7 @@ import numpy as np
 
 from armlab.diagnosis.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.claims import make_claims
-from armlab.diagnosis.data import observe
+from armlab.diagnosis.data import in_fixed_order, observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.evidence import Evidence, count_looks
 from armlab.diagnosis.expected_parts import claim_expected_parts
@@ -130,7 +130,7 @@ def prepare(
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason)
     progress("filtering")
-    observed = observe(recording.runs, simulation.arm, simulation.inertial, settings)
+    observed = observe(in_fixed_order(recording.runs), simulation.arm, simulation.inertial, settings)
     reason = observed.reason_too_short or reason_misread(observed, simulation, settings.tuning.soundness)
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason, observed)
