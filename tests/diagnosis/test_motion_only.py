@@ -210,11 +210,11 @@ def test_bad_input_is_inconclusive_with_a_reason_in_one_line(tmp_path: Path, dam
 
 
 def test_a_controller_that_the_replay_lacks_is_refused(tmp_path: Path) -> None:
-    controller = {"type": "pd", "kp": [8.0, 8.0], "kd": [0.0, 0.0], "ki": [1.0, 1.0]}
-    folder = write_recording(tmp_path / "pid", {}, seconds=4.0, controller=controller)
+    controller = {"type": "pd", "kp": [8.0, 8.0], "kd": [0.0, 0.0], "velocity_filter_hz": 20.0}
+    folder = write_recording(tmp_path / "filtered", {}, seconds=4.0, controller=controller)
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
     assert result.exit_code == 2
-    assert "controller.ki" in result.output
+    assert "controller.velocity_filter_hz" in result.output
 
 
 def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:

@@ -61,6 +61,7 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
     free = np.array(USUAL)
     start, nominal = _choose_damping(windows, nominal, free, tuning)
     base = fill_unknown(nominal)
+    windows = windows.with_integral(start.integral)
     odd = find_odd_windows(windows, start.values, tuning)
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
     few = thin_windows(sound, tuning.max_judged_windows)
@@ -70,15 +71,20 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
     while waiting:
         promising = _most_promising(few, fit, waiting)[: tuning.tried_parameters]
         tried = {number: _with_parameter(few, fit, number, tuning) for number in promising}
-        gains = {number: _gain(few, judged, errors) for number, (_, errors) in tried.items()}
+        gains = {number: gain_over_windows(len(few.position), judged, errors) for number, (_, errors) in tried.items()}
         best = max(gains, key=lambda number: gains[number].share)
         if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
             break
         fit, judged = tried[best]
         waiting.remove(best)
     gains = {number: _gain_of(few, fit, number, (base, judged), tuning) for number in np.flatnonzero(fit.free).tolist()}
-    worth = {number: gain for number, gain in gains.items() if _is_finding(gain, looks, tuning)}
+    worth = {number: gain for number, gain in gains.items() if is_finding(gain, looks, tuning)}
     return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free, tuning.max_evaluations), worth, odd)
+
+
+def first_fit(windows: Windows, nominal: Array, tuning: MotionTuning = DEFAULT) -> ServoFit:
+    """The fit of the usual parameters."""
+    return _choose_damping(windows, nominal, np.array(USUAL), tuning)[0]
 
 
 def _choose_damping(
@@ -113,6 +119,7 @@ def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEF
 
 def _most_promising(windows: Windows, fit: ServoFit, waiting: list[int]) -> list[int]:
     """The parameters, first those that a linear model of the errors gains most from: one replay each, and no fit."""
+    windows = windows.with_integral(fit.integral)
     guesses = np.stack([fit.values, *(first_guess(windows, fit.values, number) for number in waiting)])
     errors = joint_errors(windows, guesses)
     slopes = np.linalg.qr(jacobian(windows, fit.values, fit.free))[0]
@@ -132,7 +139,8 @@ def _with_parameter(windows: Windows, fit: ServoFit, number: int, tuning: Motion
     return more, _errors_on_other_half(windows, more.values, free, tuning)
 
 
-def _is_finding(gain: Gain, looks: int, tuning: MotionTuning) -> bool:
+def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
+    """Whether a gain matters, and is hardly chance. looks: number of tests in the diagnosis."""
     return gain.share > tuning.min_gain and gain.p_value * looks < tuning.max_p_value
 
 
@@ -157,7 +165,7 @@ def _errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool
     first, second = _halves(windows)
     for train, test in ((first, second), (second, first)):
         fitted = fit_servo(windows.select(train), values, free, tuning.refit_evaluations)
-        judged = windows.select(test)
+        judged = windows.select(test).with_integral(fitted.integral)
         squares[test] = np.bincount(judged.window, joint_errors(judged, fitted.values)[0] ** 2)
     return squares
 
@@ -166,10 +174,10 @@ def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, A
     """What a fitted parameter is worth. known: the simulation's numbers; squared error of each window with it."""
     base, judged = known
     if not np.isfinite(base[number]):
-        return _gain(windows, np.full(windows.count, np.inf), judged)
+        return gain_over_windows(len(windows.position), np.full(windows.count, np.inf), judged)
     fixed, held = fit.free.copy(), fit.values.copy()
     fixed[number], held[number] = False, base[number]
-    return _gain(windows, _errors_on_other_half(windows, held, fixed, tuning), judged)
+    return gain_over_windows(len(windows.position), _errors_on_other_half(windows, held, fixed, tuning), judged)
 
 
 def chance_of_gain(difference: Array) -> float:
@@ -182,9 +190,8 @@ def chance_of_gain(difference: Array) -> float:
     return float(wilcoxon(difference, alternative="greater").pvalue)
 
 
-def _gain(windows: Windows, without: Array, with_it: Array) -> Gain:
-    """Squared errors of each window without and with a parameter, (windows,) each."""
-    samples = len(windows.position)
+def gain_over_windows(samples: int, without: Array, with_it: Array) -> Gain:
+    """Squared errors of each window without and with a parameter, (windows,) each; samples: of all windows."""
     if not np.isfinite(without).all():
         return Gain(1.0, 0.0, np.inf, float(np.sqrt(with_it.sum() / samples)))
     difference = without - with_it

@@ -108,7 +108,8 @@ def compare_motion(
             for each, simulation in zip(pair, simulations, strict=True)
         ]
         sound = [
-            each.select(np.setdiff1d(np.arange(each.count), fit.odd)) for each, fit in zip(pair, fits, strict=True)
+            each.select(np.setdiff1d(np.arange(each.count), fit.odd)).with_integral(fit.fit.integral)
+            for each, fit in zip(pair, fits, strict=True)
         ]
         free = fits[0].fit.free | fits[1].fit.free
         thinned = tuple(thin_windows(each, tuning.max_judged_windows) for each in sound)

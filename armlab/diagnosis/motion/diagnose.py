@@ -12,12 +12,15 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.choose import ChosenServo, choose_servo
-from armlab.diagnosis.motion.estimate import fit_servo, thin_windows
+from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit
+from armlab.diagnosis.motion.couple import couple_joints
+from armlab.diagnosis.motion.estimate import fit_servo, settle, thin_windows
 from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.payload import PayloadFit, estimate_mass, find_payload
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import LOWEST, PARAMETERS, ServoParameter, Servos, place
@@ -28,6 +31,7 @@ from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
 
+HOLDING_GAIN = 100.0  # N m/rad, of a still joint whose gain is not known: it stays where it is
 NO_SERVO = "no joint follows its command as a position servo does: check the columns, or the controller is another"
 Status = Literal["mismatch", "none", "inconclusive"]
 
@@ -118,24 +122,34 @@ def diagnose_motion(
     progress: is told what is being done. Raises InputError where the simulation cannot be used.
     """
     started = time.perf_counter()
-    simulation = read_servo_simulation(recording)
+    simulation = given = read_servo_simulation(recording)
     reason = reason_unusable(recording)
     if reason is not None:
         return MotionDiagnosis(recording, simulation, "inconclusive", reason)
     learned, held_out = split_runs(recording, tuning.held_out_share)
+    progress("replaying the joints together")
     windows = make_windows(learned, simulation, tuning)
     still = [bool(np.ptp(joint.position) < MIN_MOVED) for joint in windows]
-    looks = len(windows) * len(PARAMETERS)
-    chosen: list[ChosenServo | None] = []
-    for number, joint in enumerate(windows):
-        progress(f"fitting joint {number + 1} of {len(windows)}")
-        fitted = None if still[number] else choose_servo(joint, simulation.nominal.values[number], looks, tuning)
-        chosen.append(fitted if fitted is not None and _explains(joint, fitted, tuning) else None)
+    firsts = [
+        None if still[number] else first_fit(joint, simulation.nominal.values[number], tuning).values
+        for number, joint in enumerate(windows)
+    ]
+    windows, chosen = fit_joints(learned, simulation, firsts, progress, tuning)
     if not any(chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
+    progress("weighing the tool")
+    fits = [None if each is None else each.fit for each in chosen]
+    payload = find_payload(windows, fits, len(windows) * len(PARAMETERS), tuning)
+    loaded = None if payload is None else simulation.with_payload(payload.mass)
+    if loaded is not None and loaded.is_physical():
+        simulation, firsts = loaded, [None if fit is None else fit.values for fit in fits]
+        windows, chosen = fit_joints(learned, simulation, firsts, progress, tuning)
     progress("replaying held-out runs")
-    judged = make_windows(held_out, simulation, tuning)
-    concluded = _conclude(recording, simulation, (windows, judged), chosen, held_out, tuning)
+    judged = coupled_windows(
+        held_out, simulation, [None if each is None else each.fit.values for each in chosen], tuning
+    )
+    found = simulation, payload if simulation.payload else None
+    concluded = _conclude(recording, given, found, (windows, judged), chosen, held_out, tuning)
     if concluded.servos is None:
         return concluded
     return replace(
@@ -143,6 +157,48 @@ def diagnose_motion(
         odd=tuple(_odd_stretches(learned, chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
+
+
+def fit_joints(
+    runs: Sequence[MotionRun],
+    simulation: ServoSimulation,
+    starts: Sequence[Array | None],
+    progress: Callable[[str], None],
+    tuning: MotionTuning = DEFAULT,
+) -> tuple[list[Windows], list[ChosenServo | None]]:
+    """The windows and the servo of each joint; None for one that stands still or follows no servo.
+
+    starts: numbers, (parameters,) of each joint, with which the arm is replayed; None for a joint that stands still.
+    """
+    windows, chosen = coupled_windows(runs, simulation, starts, tuning), list[ChosenServo | None]()
+    looks = len(windows) * len(PARAMETERS)
+    for number, joint in enumerate(windows):
+        progress(f"fitting joint {number + 1} of {len(windows)}")
+        moves = starts[number] is not None
+        fitted = choose_servo(joint, simulation.nominal.values[number], looks, tuning) if moves else None
+        chosen.append(fitted if fitted is not None and _explains(joint, fitted, tuning) else None)
+    return windows, chosen
+
+
+def coupled_windows(
+    runs: Sequence[MotionRun],
+    simulation: ServoSimulation,
+    fitted: Sequence[Array | None],
+    tuning: MotionTuning = DEFAULT,
+) -> list[Windows]:
+    """Windows of each joint whose loads come from a replay of the arm with fitted numbers, (parameters,) a joint."""
+    motions = couple_joints(runs, simulation, _fill_servos(simulation, fitted), tuning)
+    return make_windows(runs, simulation, tuning, motions)
+
+
+def _fill_servos(simulation: ServoSimulation, fitted: Sequence[Array | None]) -> Servos:
+    """Fitted numbers, (parameters,) a joint; those of the simulation for a joint without, or of a drive that holds."""
+    known = simulation.nominal.values
+    rows = [
+        values if values is not None else np.where(np.isnan(known[number]), HOLDING_GAIN, known[number])
+        for number, values in enumerate(fitted)
+    ]
+    return Servos(np.stack(rows))
 
 
 def reason_unusable(recording: MotionRecording) -> str | None:
@@ -176,34 +232,43 @@ def _explains(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bo
     free, values = chosen.fit.free.copy(), chosen.fit.values.copy()
     free[place("kp")], values[place("kp")] = False, LOWEST[place("kp")]
     passive = fit_servo(few, values, free, tuning.max_evaluations)
+    few = few.with_integral(chosen.fit.integral)
     return _rms(joint_errors(few, chosen.fit.values)[0]) < tuning.max_unexplained * passive.rms
 
 
 def _conclude(
     recording: MotionRecording,
-    simulation: ServoSimulation,
+    given: ServoSimulation,
+    found: tuple[ServoSimulation, PayloadFit | None],
     windows: tuple[Sequence[Windows], Sequence[Windows]],
     chosen: Sequence[ChosenServo | None],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning,
 ) -> MotionDiagnosis:
-    """Findings, replays and errors. windows: of the runs that identify, and of those that are held out."""
+    """Findings, replays and errors.
+
+    given: the simulation to be judged; found: that with the payload found. windows: of the runs that identify, and of
+    those that are held out.
+    """
     learned, judged = windows
+    simulation, payload = found
     named = [
         [] if each is None else name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
         for number, each in enumerate(chosen)
     ]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
-    before = tuple(replay(simulation, None, held_out)) if known else ()
+    before = tuple(replay(given, None, held_out)) if known else ()
     servos, after, named = replay_named(simulation, chosen, named, before, held_out)
     findings = [finding for own in named for finding in own]
+    if payload is not None:
+        findings.append(_name_payload(payload, servos, (learned, judged), chosen, tuning))
     errors = tuple(
         _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
     follows = {each.joint: each.follows_command(tuning) for each in errors}
     if not any(follows.values()):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
-    findings = [each for each in findings if follows[each.joint]]
+    findings = [each for each in findings if follows[each.joint] or each.effect == "payload"]
     status, reason = _status(findings, errors, chosen, tuning.same_error if known else None)
     tools = [
         float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
@@ -297,13 +362,13 @@ def name_differences(
     """
     learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
-    sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd))
+    sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
     confused = confused_parameters(sound, fit, tuning)
     scale = ("rotor_inertia", "inertial_parameter_error") if has_weak_load(sound, fit.values, tuning) else ()
     if not chosen.gains:
         return []
-    errors = joint_errors(judged, np.stack([_with_nominal(fit.values, chosen.nominal, each) for each in chosen.gains]))
-    after = _rms(joint_errors(judged, fit.values)[0])
+    errors = [_settled_errors(judged, _with_nominal(fit.values, chosen.nominal, each)) for each in chosen.gains]
+    after = _rms(_settled_errors(judged, fit.values))
     found = []
     for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
         parameter, nominal = PARAMETERS[place_of], float(chosen.nominal[place_of])
@@ -334,6 +399,44 @@ def name_differences(
     return found
 
 
+def _name_payload(
+    payload: PayloadFit,
+    servos: Servos,
+    windows: tuple[Sequence[Windows], Sequence[Windows]],
+    chosen: Sequence[ChosenServo | None],
+    tuning: MotionTuning,
+) -> ServoFinding:
+    """The mass at the tool, fitted once more beside the numbers that each joint's servo has in the end."""
+    learned, judged = windows
+    pairs = [
+        (joint.with_integral(each.fit.integral), each.fit)
+        for joint, each in zip(learned, chosen, strict=True)
+        if each is not None
+    ]
+    more, error = estimate_mass(pairs, tuning)
+    parameter, half = PARAMETERS[place("payload")], float(student.ppf(0.975, max(payload.windows - 1, 1))) * error
+    lighter = servos.values.copy()
+    lighter[:, place("payload")] = -payload.mass
+    errors = [
+        np.concatenate([_settled_errors(joint, row) for joint, row in zip(judged, values, strict=True)])
+        for values in (lighter, servos.values)
+    ]
+    mass = payload.mass + more
+    return ServoFinding(
+        parameter=parameter,
+        effect=parameter.effect,
+        name=parameter.name,
+        joint=len(learned),
+        value=mass,
+        interval=(mass - half, mass + half),
+        nominal=0.0,
+        before=_rms(errors[0]),
+        after=_rms(errors[1]),
+        p_value=min(payload.gain.p_value * len(learned) * len(PARAMETERS), 1.0),
+        rivals=parameter.rivals,
+    )
+
+
 def _named(
     parameter: ServoParameter, value: float, ends: tuple[float, float], kd: float
 ) -> tuple[str, str, float, tuple[float, float]]:
@@ -354,6 +457,11 @@ def _with_nominal(values: Array, nominal: Array, number: int) -> Array:
 
 def _rms(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
+
+
+def _settled_errors(windows: Windows, values: Array) -> Array:
+    """Errors (samples,) of a replay whose drive's integral at the start of each run fits best, rad."""
+    return np.asarray(joint_errors(settle(windows, values), values)[0])
 
 
 def _command_error(windows: Windows) -> Array:
@@ -385,8 +493,8 @@ def _errors(
     )
     return JointError(
         joint=number + 1,
-        before=_rms(joint_errors(judged, nominal)[0]) if known else None,
-        after=_rms(joint_errors(judged, servos.values[number])[0]),
+        before=_rms(_settled_errors(judged, nominal)) if known else None,
+        after=_rms(_settled_errors(judged, servos.values[number])),
         replay_before=float(joint_rms(before)[number]) if before else None,
         replay_after=float(joint_rms(after)[number]),
         command=_rms(commands),

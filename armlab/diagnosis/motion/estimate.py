@@ -5,6 +5,8 @@ regressors alike in a closed loop, so no number of theirs is reported. The inter
 J_w and r_w the Jacobian and the errors of window w (Huber 1967, clustered),
 
     cov = H^-1 (sum_w J_w^T r_w r_w^T J_w) H^-1,  H = J^T J
+
+Where the drive integrates its error, what the integral holds at the start of each run is fitted, too.
 """
 
 from dataclasses import dataclass
@@ -22,18 +24,21 @@ from armlab.diagnosis.motion.windows import Windows
 
 LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
 RELATIVE_STEP, SCALE_STEP = 0.01, 0.02  # of finite differences: large, because a joint that sticks is not smooth
+INTEGRAL_STEP = 0.005  # rad (m): position error whose torque is a step of an integral
 
 
 @dataclass(frozen=True, eq=False)
 class ServoFit:
     """Parameters of one joint. values: (parameters,); free: which of them were fitted; covariance: of the coordinates
-    (see `to_coordinates`) that are free, from blocks. rms: of the errors, rad. windows: number of blocks."""
+    (see `to_coordinates`) that are free, from blocks. rms: of the errors, rad. windows: number of blocks. integral:
+    of the drive at the start of each run, (runs,), N m."""
 
     values: Array
     free: NDArray[np.bool_]
     covariance: Array
     rms: float
     windows: int
+    integral: Array
 
     def standard_errors(self) -> Array:
         """Of the coordinates, (parameters,); 0 for those that were not fitted."""
@@ -81,29 +86,53 @@ def fit_servo(
     """The fit of the free parameters from a start, (parameters,); the others keep their values."""
     values = np.clip(start, LOWEST, HIGHEST)
     chosen = np.flatnonzero(free)
+    runs = np.unique(windows.run) if values[place("ki")] > 0 else np.zeros(0, dtype=np.int64)
+    wound_up, push = float(values[place("integral_limit")]), INTEGRAL_STEP * float(values[place("kp")])
 
-    def whole(part: Array) -> Array:
-        coordinates = to_coordinates(values)
-        coordinates[chosen] = part
-        return from_coordinates(coordinates)
+    def whole(part: Array) -> tuple[Windows, Array]:
+        coordinates, integral = to_coordinates(values), windows.integral.copy()
+        coordinates[chosen], integral[runs] = part[: len(chosen)], part[len(chosen) :]
+        return windows.with_integral(integral) if len(runs) else windows, from_coordinates(coordinates)
 
-    if len(chosen):
-        low, high = to_coordinates(LOWEST)[chosen], to_coordinates(HIGHEST)[chosen]
+    def slopes(part: Array) -> Array:
+        moved, at = whole(part)
+        return np.concatenate([jacobian(moved, at, free), _integral_slopes(moved, at, runs, push)], axis=1)
+
+    part = np.concatenate([to_coordinates(values)[chosen], windows.integral[runs]])
+    if len(part):
+        low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -wound_up)])
+        high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), wound_up)])
         margin = 1e-9 * (high - low)
-        found = least_squares(
-            lambda part: joint_errors(windows, whole(part))[0],
-            np.clip(to_coordinates(values)[chosen], low + margin, high - margin),
-            jac=lambda part: jacobian(windows, whole(part), free),
+        part = least_squares(
+            lambda part: joint_errors(*whole(part))[0],
+            np.clip(part, low + margin, high - margin),
+            jac=slopes,
             bounds=(low, high),
-            x_scale=np.where(LOGARITHMIC, 0.2, SCALE)[chosen],
+            x_scale=np.concatenate([np.where(LOGARITHMIC, 0.2, SCALE)[chosen], np.full(len(runs), push)]),
             max_nfev=evaluations,
             ftol=1e-5,
             xtol=1e-5,
-        )
-        values = whole(found.x)
-    errors = joint_errors(windows, values)[0]
-    covariance = _block_covariance(jacobian(windows, values, free), errors, windows.window)
-    return ServoFit(values, free, covariance, float(np.sqrt(np.mean(errors**2))), windows.count)
+        ).x
+    moved, values = whole(part)
+    errors = joint_errors(moved, values)[0]
+    covariance = _block_covariance(slopes(part), errors, windows.window)[: len(chosen), : len(chosen)]
+    rms = float(np.sqrt(np.mean(errors**2)))
+    return ServoFit(values, free, covariance, rms, windows.count, moved.integral)
+
+
+def settle(windows: Windows, values: Array) -> Windows:
+    """The windows with the integrals that fit a servo best, (parameters,), at the start of each run."""
+    if values[place("ki")] == 0:
+        return windows
+    return windows.with_integral(fit_servo(windows, values, np.zeros(len(values), dtype=bool)).integral)
+
+
+def _integral_slopes(windows: Windows, values: Array, runs: NDArray[np.int64], push: float) -> Array:
+    """Derivative (samples, runs) of the errors by the integrals at the start of the runs."""
+    if len(runs) == 0:
+        return np.zeros((len(windows.position), 0))
+    ends = [joint_errors(windows.with_integral(windows.integral + side * push), values)[0] for side in (1, -1)]
+    return np.where(windows.run[windows.window][:, None] == runs, ((ends[0] - ends[1]) / (2 * push))[:, None], 0.0)
 
 
 def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
@@ -123,7 +152,8 @@ def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning
     errors = joint_errors(few, starts)
     best = np.argsort(np.mean(errors**2, axis=1))[: tuning.starts]
     fits = [fit_servo(few, starts[each], free, tuning.start_evaluations) for each in best]
-    return fit_servo(windows, min(fits, key=lambda fit: fit.rms).values, free, tuning.max_evaluations)
+    first = min(fits, key=lambda fit: fit.rms)
+    return fit_servo(windows.with_integral(first.integral), first.values, free, tuning.max_evaluations)
 
 
 def thin_windows(windows: Windows, most: int) -> Windows:

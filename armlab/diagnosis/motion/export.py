@@ -58,6 +58,8 @@ def lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterator
             )
         if delay < 0:
             yield f"{name}: the position was read {-1e3 * delay:.3g} ms after its stamp (no field is needed)"
+    if simulation.payload:
+        yield f"{simulation.payload:.4g} kg more at the tool: simulation.xml and robot.urdf have it (payload)"
     if simulation.rate_hz is not None:
         yield f"the servos take a command over {simulation.rate_hz:g} times a second and hold it: send it at that rate"
     if simulation.supply is not None:

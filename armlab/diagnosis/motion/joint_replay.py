@@ -1,12 +1,16 @@
 """Replays one joint in all windows for many parameter sets at once: the output error that estimates parameters.
 
-One step of Moreau's time stepping (Moreau 1988), in which friction is an impulse bounded by its level, as MuJoCo's
-friction loss but without its slip at rest; damping is implicit, gravity and drive are explicit:
+One step of Moreau's midpoint rule (Moreau 1988), in which friction is an impulse bounded by its level, as MuJoCo's
+friction loss but without its slip at rest; it is of second order between events. q_m is the position at half the step:
 
-    u  = s clip(kp d(c - q) - kd v*, -limit, limit) - load - slope (q - q measured)
-    v* = (m v + h u) / (m + h damping),  m = inertia + armature
-    v  = sgn(v*) max(|v*| - h (friction + load_friction |load|) / (m + h damping), 0)
-    q  = q + h v
+    q_m = q + h v / 2
+    i   = clip(i + h ki d(c - q_m), -integral_limit, integral_limit)
+    u   = s clip(kp d(c - q_m) - kd (v + v*) / 2 + i, -limit, limit) - load - slope (q_m - q_m measured)
+    v*  = v + h (u - damping (v + v*) / 2) / m,  m = inertia + armature
+    v'  = sgn(v*) max(|v*| - h (friction + load_friction |load|) / (m + h (damping + s kd) / 2), 0)
+    q'  = q_m + h v' / 2
+
+The integral at the first step of a window is that of its run there, along the measured motion.
 """
 
 import numpy as np
@@ -16,7 +20,7 @@ from armlab.diagnosis.motion._joint_replay import ffi, lib
 from armlab.diagnosis.motion.servo import PARAMETERS, place
 from armlab.diagnosis.motion.windows import Windows
 
-MAX_STEP_PHASE = 0.5  # of kp h^2 / m: above it the explicit drive would not be stable
+MAX_STEP_PHASE = 0.5  # of kp h^2 / m: above it the explicit drive would not be stable, whatever the payload
 
 
 def replay_joint(windows: Windows, values: Array) -> Array:
@@ -31,16 +35,29 @@ def replay_joint(windows: Windows, values: Array) -> Array:
     stiffest = MAX_STEP_PHASE * (windows.inertia.min() + servos[:, place("armature")]) / windows.step_s**2
     servos[:, place("kp")] = np.minimum(servos[:, place("kp")], stiffest)
     out = np.empty((len(servos), len(windows.position)))
-    names = ("command", "inertia", "load", "slope", "measured", "first_velocity", "fraction")
+    names: tuple[str, ...] = (
+        "command",
+        "inertia",
+        "load",
+        "slope",
+        "measured",
+        "first_velocity",
+        "fraction",
+        "integral",
+    )
+    names = (*names, "unit_inertia", "unit_load", "unit_slope", "path_command", "path_measured")
     stretch = ffi.new("Stretch *")
     stretch.windows, stretch.steps = windows.measured.shape
     stretch.columns, stretch.history, stretch.step = windows.command.shape[1], windows.history, windows.step_s
+    stretch.path_columns = windows.path_command.shape[1]
     for name in names:
         setattr(stretch, name, ffi.from_buffer("double[]", getattr(windows, name)))
     stretch.supply = ffi.NULL if windows.supply is None else ffi.from_buffer("double[]", windows.supply)
-    stretch.begin = ffi.from_buffer("int64_t[]", windows.begin)
-    stretch.row = ffi.from_buffer("int64_t[]", windows.row)
-    lib.replay_joint(stretch, len(servos), ffi.from_buffer("Servo[]", servos), ffi.from_buffer("double[]", out))
+    for name in ("begin", "row", "run", "start"):
+        setattr(stretch, name, ffi.from_buffer("int64_t[]", getattr(windows, name)))
+    integrals = ffi.new("double[]", windows.count)
+    places = (ffi.from_buffer("Servo[]", servos), integrals, ffi.from_buffer("double[]", out))
+    lib.replay_joint(stretch, len(servos), *places)
     return out
 
 

@@ -6,16 +6,18 @@ import cffi
 
 DECLARED = """
 typedef struct {
-    double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction;
+    double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, ki,
+        integral_limit, payload;
 } Servo;
 typedef struct {
-    int64_t windows, steps, columns, history;
+    int64_t windows, steps, columns, history, path_columns;
     double step;
     const double *command, *inertia, *load, *slope, *measured, *supply, *first_velocity;
-    const int64_t *begin, *row;
+    const double *unit_inertia, *unit_load, *unit_slope, *path_command, *path_measured, *integral;
+    const int64_t *begin, *row, *run, *start;
     const double *fraction;
 } Stretch;
-void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *out);
+void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *out);
 """
 
 ffibuilder = cffi.FFI()

@@ -46,16 +46,28 @@ def replay(simulation: ServoSimulation, servos: Servos | None, runs: Sequence[Mo
     limits of the command are off: only drives and inertias are compared. Joints that were not recorded are held at
     zero.
     """
-    mujoco = import_mujoco()
-    model = simulation.model()
     if servos is None and not simulation.as_given:
         servos = simulation.nominal
+    model = _free_model(simulation, servos)
+    return [_replay_run(model, simulation, servos, run) for run in runs]
+
+
+def replay_paths(simulation: ServoSimulation, servos: Servos, runs: Sequence[MotionRun], step_s: float) -> list[Array]:
+    """The same with another step: positions (steps, joints) of the recorded joints from the first stamp on, rad."""
+    model = _free_model(simulation, servos)
+    model.opt.timestep = step_s
+    return [_path(model, simulation, servos, run)[:, list(simulation.joints)] for run in runs]
+
+
+def _free_model(simulation: ServoSimulation, servos: Servos | None) -> Any:
+    """The model with servos, without contact, joint limits and limits of the command."""
+    model = simulation.model()
     if servos is not None:
         model = with_servos(model, simulation, servos)
-    flags = mujoco.mjtDisableBit
+    flags = import_mujoco().mjtDisableBit
     model.opt.disableflags |= int(flags.mjDSBL_LIMIT) | int(flags.mjDSBL_CONTACT) | int(flags.mjDSBL_CLAMPCTRL)
     _hold_others(model, simulation)
-    return [_replay_run(model, simulation, servos, run) for run in runs]
+    return model
 
 
 def _hold_others(model: Any, simulation: ServoSimulation) -> None:
@@ -66,6 +78,17 @@ def _hold_others(model: Any, simulation: ServoSimulation) -> None:
 
 
 def _replay_run(model: Any, simulation: ServoSimulation, servos: Servos | None, run: MotionRun) -> Replayed:
+    joints, path = list(simulation.joints), _path(model, simulation, servos, run)
+    time = run.time[0] + model.opt.timestep * np.arange(len(path))
+    position = np.stack([np.interp(run.time, time, path[:, joint]) for joint in joints], axis=1)
+    distance = np.linalg.norm(
+        tool_positions(model, joints, position) - tool_positions(model, joints, run.position), axis=1
+    )
+    return Replayed(run, position, distance)
+
+
+def _path(model: Any, simulation: ServoSimulation, servos: Servos | None, run: MotionRun) -> Array:
+    """Positions (steps, joints) of all joints at each step from the first measured state on."""
     mujoco = import_mujoco()
     data = mujoco.MjData(model)
     joints = list(simulation.joints)
@@ -80,19 +103,13 @@ def _replay_run(model: Any, simulation: ServoSimulation, servos: Servos | None, 
         offset = 0.0 if servos is None else float(servos.get("offset")[row])
         control[:, actuator_of(model, joint)] = held_command(run, row, time - delay, simulation.rate_hz) + offset
     if servos is not None and _needs_steps(simulation, servos, run):
-        path = _step_through(model, data, simulation, servos, run, control)
-    else:
-        path = _roll_out(model, data, control)
-    position = np.stack([np.interp(run.time, time, path[:, joint]) for joint in joints], axis=1)
-    distance = np.linalg.norm(
-        tool_positions(model, joints, position) - tool_positions(model, joints, run.position), axis=1
-    )
-    return Replayed(run, position, distance)
+        return _step_through(model, data, simulation, servos, run, control)
+    return _roll_out(model, data, control)
 
 
 def _needs_steps(simulation: ServoSimulation, servos: Servos, run: MotionRun) -> bool:
     """Whether the law has parts that no field of MuJoCo holds."""
-    parts = (servos.get("dead_band"), servos.get("load_friction"))
+    parts = (servos.get("dead_band"), servos.get("load_friction"), servos.get("ki"))
     return any(part.any() for part in parts) or (simulation.supply is not None and run.voltage is not None)
 
 
@@ -117,6 +134,8 @@ def _step_through(
     actuators = [actuator_of(model, joint) for joint in joints]
     half, share, level = servos.get("dead_band") / 2, servos.get("load_friction"), servos.get("friction")
     limit, kp, kd = servos.get("limit"), servos.get("kp"), servos.get("kd")
+    wound_up, gain = servos.get("integral_limit"), servos.get("ki") * model.opt.timestep
+    integral = _resting_integral(data, simulation, servos, control[0][actuators])
     time = run.time[0] + model.opt.timestep * np.arange(len(control))
     factors = [supply_factor(run, row, time, simulation.supply) for row in range(len(joints))]
     path = np.empty((len(control), model.nq))
@@ -124,7 +143,8 @@ def _step_through(
         path[number] = now = data.qpos
         error = command[actuators] - now[joints]
         error -= np.clip(error, -half, half)
-        data.ctrl[actuators] = now[joints] + error
+        integral = np.clip(integral + gain * error, -wound_up, wound_up)
+        data.ctrl[actuators] = now[joints] + error + integral / kp
         if share.any():
             model.dof_frictionloss[joints] = level + share * np.abs(data.qfrc_bias[joints])
         for row, factor in enumerate(factors):
@@ -135,6 +155,13 @@ def _step_through(
                 model.actuator_forcerange[actuators[row]] = factor[number] * limit[row] * np.array([-1.0, 1.0])
         mujoco.mj_step(model, data)
     return path
+
+
+def _resting_integral(data: Any, simulation: ServoSimulation, servos: Servos, command: Array) -> Array:
+    """What the integrals hold at the first sample, (joints,), N m: the drives carry the weight of the arm."""
+    joints, wound_up = list(simulation.joints), servos.get("integral_limit")
+    held = data.qfrc_bias[joints] - servos.get("kp") * (command - data.qpos[joints])
+    return np.asarray(np.where(servos.get("ki") > 0, np.clip(held, -wound_up, wound_up), 0.0))
 
 
 def tool_positions(model: Any, joints: Sequence[int], position: Array) -> Array:

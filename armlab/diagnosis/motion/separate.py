@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import ServoFit, jacobian
-from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, USUAL, place
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, SHARED, USUAL, place
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
@@ -17,7 +17,7 @@ TORQUE_SCALED = ("kp", "kd", "damping", "friction", "limit", "armature")  # one 
 
 def confused_parameters(windows: Windows, fit: ServoFit, tuning: MotionTuning = DEFAULT) -> dict[int, tuple[int, ...]]:
     """For each fitted parameter, the places of the parameters that these data do not separate from it."""
-    every = np.array(USUAL) | np.array(OPTIONAL)
+    every = np.array(USUAL) | np.array(OPTIONAL) | np.array(SHARED)
     every[place("limit")] = fit.values[place("limit")] < INFINITE_LIMIT
     slopes = jacobian(windows, fit.values, every)
     columns = dict(zip(np.flatnonzero(every).tolist(), slopes.T, strict=True))

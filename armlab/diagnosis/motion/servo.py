@@ -1,13 +1,15 @@
 """The law of a position servo at one joint, its parameters, and the effects that name them.
 
-    torque  = s clip(kp d(c(t - delay) + offset - q) - kd qd, -limit, limit)
-    d(e)    = sgn(e) max(|e| - dead_band / 2, 0)
+    torque  = s clip(kp e - kd qd + i, -limit, limit)
+    e       = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
+    i'      = ki e,  |i| <= integral_limit
     torque  = (inertia + armature) qdd + load + damping qd + (friction + load_friction |load|) f
 
-f is the sign of the velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load
-is the torque of gravity and of the other joints. s is 1, or the supply voltage over its nominal value. Where nothing
-saturates, kd and damping are one column; damping also holds back-EMF, with which the torque limit of a drive that is
-limited by its voltage falls with speed. So kd is either that of the simulation or none, and damping is fitted.
+Inertia and load also hold a mass at the tool, `payload`, which is the same at all joints. f is the sign of the
+velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load is the torque of
+gravity and of the other joints. s is 1, or the supply voltage over its nominal value. Where nothing saturates, kd and
+damping are one column; damping also holds back-EMF, with which the torque limit of a drive that is limited by its
+voltage falls with speed. So kd is either that of the simulation or none, and damping is fitted.
 """
 
 from dataclasses import dataclass
@@ -23,8 +25,9 @@ class ServoParameter:
     """One parameter of the law. effect, name: in a verdict. neutral: the value without effect.
 
     lowest, highest: bounds of a fit; scale: a step that matters. role: a `usual` one is part of every fit, an
-    `optional` one has to earn its place, a `given` one is never fitted. equation: for the verdict, with {value} and
-    {joint}. rivals: effects that fit these data as well, or nearly. mjcf: the field of MJCF that holds it.
+    `optional` one has to earn its place, a `shared` one is that of all joints, a `given` one is never fitted.
+    equation: for the verdict, with {value} and {joint}. rivals: effects that fit these data as well, or nearly. mjcf:
+    the field of MJCF that holds it.
     """
 
     key: str
@@ -35,7 +38,7 @@ class ServoParameter:
     lowest: float
     highest: float
     scale: float
-    role: Literal["usual", "optional", "given"]
+    role: Literal["usual", "optional", "shared", "given"]
     equation: str
     rivals: tuple[str, ...] = ()
     mjcf: str = ""
@@ -192,11 +195,65 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         "",
         "repeat one motion with two payloads",
     ),
+    ServoParameter(
+        "ki",
+        "controller_gain_error",
+        "ki",
+        "N.m/(rad.s)",
+        0.0,
+        0.0,
+        1e6,
+        1.0,
+        "given",
+        "tau_{joint} += {value} integral of (command_{joint} - q_{joint})",
+    ),
+    ServoParameter(
+        "integral_limit",
+        "torque_saturation",
+        "integral_limit",
+        "N.m",
+        INFINITE_LIMIT,
+        0.0,
+        INFINITE_LIMIT,
+        0.5,
+        "given",
+        "|integral part of tau_{joint}| <= {value}",
+    ),
+    ServoParameter(
+        "payload",
+        "payload",
+        "mass",
+        "kg",
+        0.0,
+        -1e2,
+        1e2,
+        0.02,
+        "shared",
+        "{value} kg at the tool",
+        ("inertial_parameter_error",),
+        "mass, pos and fullinertia of the last body",
+        "weigh the tool and what it holds",
+    ),
 )
 KEYS = tuple(parameter.key for parameter in PARAMETERS)
 USUAL = tuple(parameter.role == "usual" for parameter in PARAMETERS)
+SHARED = tuple(parameter.role == "shared" for parameter in PARAMETERS)
 OPTIONAL = tuple(parameter.role == "optional" for parameter in PARAMETERS)
-Key = Literal["kp", "damping", "friction", "kd", "armature", "limit", "delay", "offset", "dead_band", "load_friction"]
+Key = Literal[
+    "kp",
+    "damping",
+    "friction",
+    "kd",
+    "armature",
+    "limit",
+    "delay",
+    "offset",
+    "dead_band",
+    "load_friction",
+    "ki",
+    "integral_limit",
+    "payload",
+]
 NEUTRAL = np.array([parameter.neutral for parameter in PARAMETERS])
 LOWEST = np.array([parameter.lowest for parameter in PARAMETERS])
 HIGHEST = np.array([parameter.highest for parameter in PARAMETERS])

@@ -1,7 +1,7 @@
 """The simulation that a recording of motion only is compared with: a MuJoCo model and the numbers of its servos."""
 
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,10 @@ from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.recording_file import FILE_NAME, ControllerEntry
-from problem.arm import Arm
-from problem.mjcf import compile_mjcf, import_mujoco
+from problem.arm import Arm, Link
+from problem.mjcf import arm_of, compile_mjcf, import_mujoco
 
 UNSUPPORTED = {
-    "ki": "an integral gain",
-    "integral_limit": "an integral gain",
     "velocity_filter_hz": "a filtered velocity",
     "kt": "a motor constant (give torque_limit and kp in N m)",
     "resistance": "a winding resistance (give torque_limit and kp in N m)",
@@ -35,7 +33,7 @@ class ServoSimulation:
     path: of the robot's file; document: its MJCF where the file is another format. nominal: of the recorded joints, NaN
     where unknown. joints: places of the recorded joints in the arm. as_given: the MJCF alone is the simulation.
     rate_hz: how often the command is taken over. supply: nominal supply voltage, V, of drives that command a voltage;
-    None for others.
+    None for others. payload: mass that is added at the tool, kg.
     """
 
     arm: Arm
@@ -46,6 +44,7 @@ class ServoSimulation:
     as_given: bool
     rate_hz: float | None = None
     supply: float | None = None
+    payload: float = 0.0
 
     def spec(self) -> Any:
         """The simulation as mujoco.MjSpec, with a position actuator at each joint; their gain is 1 where none was."""
@@ -59,7 +58,26 @@ class ServoSimulation:
             if joint.name not in driven:
                 kind = mujoco.mjtTrn.mjTRN_JOINT
                 spec.add_actuator(name=f"servo-{joint.name}", target=joint.name, trntype=kind).set_to_position(kp=1.0)
+        if self.payload:
+            _add_payload(spec, self.payload)
         return spec
+
+    def is_physical(self) -> bool:
+        """Whether MuJoCo takes the inertias: a payload that is less than nothing may leave impossible ones."""
+        try:
+            self.model()
+        except ValueError:
+            return False
+        return True
+
+    def with_payload(self, mass: float) -> "ServoSimulation":
+        """The simulation with a point mass at the tool, kg: less than nothing where the simulation has too much."""
+        with_mass = replace(self, payload=self.payload + mass)
+        seen = [arm_of(each.spec().compile(), self.path) for each in (self, replace(self, payload=self.payload + 1.0))]
+        unit = seen[1].parameters - seen[0].parameters
+        moved = (self.arm.parameters + mass * unit).reshape(-1, 10)
+        links = tuple(Link(float(row[0]), tuple(row[1:4].tolist()), tuple(row[4:].tolist())) for row in moved)
+        return replace(with_mass, arm=replace(self.arm, links=links))
 
     def model(self) -> Any:
         """The same, compiled: mujoco.MjModel."""
@@ -96,6 +114,25 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
         rate_hz=controller.rate_hz if controller is not None else None,
         supply=controller.supply if controller is not None else None,
     )
+
+
+def _add_payload(spec: Any, mass: float) -> None:
+    """Adds a point mass at the last site of the model or, without sites, at the frame of its last body."""
+    mujoco = import_mujoco()
+    model = spec.compile()
+    tool = spec.sites[-1] if spec.sites else None
+    body, point = (spec.bodies[-1], np.zeros(3)) if tool is None else (tool.parent, np.array(tool.pos))
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, model.body_iquat[body.id])
+    own, axes, centre = model.body_mass[body.id], turn.reshape(3, 3), model.body_ipos[body.id]
+    whole = own + mass
+    middle = (own * centre + mass * point) / whole
+    inertia = axes @ np.diag(model.body_inertia[body.id]) @ axes.T
+    for each, place_of in ((own, centre), (mass, point)):
+        arm = place_of - middle
+        inertia = inertia + each * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    body.mass, body.ipos, body.iquat, body.explicitinertial = whole, middle, [1.0, 0.0, 0.0, 0.0], True
+    body.inertia, body.fullinertia = np.zeros(3), inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
 
 
 def _check_supported(controller: ControllerEntry, where: str) -> None:
@@ -145,7 +182,8 @@ def _with_controller(nominal: Array, controller: ControllerEntry) -> Array:
     """The numbers of `recording.yaml` in place of those of the robot's file, where it gives any."""
     values, joints = nominal.copy(), len(nominal)
     given = {"kp": controller.kp, "kd": controller.kd, "limit": controller.torque_limit, "offset": controller.offset}
-    for key, numbers in {**given, "dead_band": controller.dead_band}.items():
+    given |= {"ki": controller.ki, "integral_limit": controller.integral_limit, "dead_band": controller.dead_band}
+    for key, numbers in given.items():
         for row, value in enumerate(numbers or ()):
             if value is not None:
                 values[row, KEYS.index(key)] = value

@@ -18,13 +18,28 @@ class MotionTuning:
     wanted_windows: int = tuned(
         24, unit="windows", meaning="blocks for the statistics, where the recording is long enough", least=2
     )
-    longest_step_s: float = tuned(0.0025, unit="s", meaning="longest step of the integration", least=1e-5)
+    longest_step_s: float = tuned(0.00125, unit="s", meaning="longest step of the integration", least=1e-5)
+    warm_up_s: float = tuned(
+        0.5, unit="s", meaning="replay before a window, in which a servo forgets an error of the first state", least=0.0
+    )
     history_s: float = tuned(0.3, unit="s", meaning="commands before a window, for delays", least=0.3)
     cutoff_hz: float = tuned(
         10.0,
         unit="Hz",
         meaning="cut-off of the motion that makes loads and couplings; the joint itself is simulated",
         least=0.1,
+    )
+    residual_cutoff_hz: float = tuned(
+        3.0,
+        unit="Hz",
+        meaning="cut-off of measured minus simulated motion, which loads and couplings get beside the simulated one",
+        least=0.1,
+    )
+    coupling_step_s: float = tuned(
+        0.0005, unit="s", meaning="step of the replay of the arm that loads and couplings are taken of", least=1e-5
+    )
+    coupling_stride: int = tuned(
+        5, unit="steps", meaning="of that replay, between two instants at which loads are computed", least=1
     )
     held_out_share: float = tuned(
         1 / 3, unit="of each run", meaning="its end, held out where no run validates", least=0.05, most=0.9

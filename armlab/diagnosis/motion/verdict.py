@@ -65,7 +65,10 @@ def make_motion_verdict(diagnosis: MotionDiagnosis) -> VerdictFile:
         summary=summary_of(diagnosis),
         story=_story(diagnosis),
         located=_located(diagnosis),
-        findings=tuple(map(_finding, diagnosis.findings, _shares(diagnosis))),
+        findings=tuple(
+            _finding(each, share, len(diagnosis.chosen))
+            for each, share in zip(diagnosis.findings, _shares(diagnosis), strict=True)
+        ),
         unexplained=_unexplained(diagnosis),
         fit=tuple(_fit(each) for each in diagnosis.errors),
     )
@@ -105,7 +108,8 @@ def _located(diagnosis: MotionDiagnosis) -> tuple[LocatedEntry, ...]:
     return tuple(sorted(located, key=lambda entry: -entry.share))
 
 
-def _finding(each: ServoFinding, share: float) -> FindingEntry:
+def _finding(each: ServoFinding, share: float, last: int) -> FindingEntry:
+    """An entry of the verdict. last: the link that carries the tool."""
     parameter = ParameterEntry(
         value=each.value, ci95=(float(each.interval[0]), float(each.interval[1])), unit=each.parameter.unit
     )
@@ -121,7 +125,9 @@ def _finding(each: ServoFinding, share: float) -> FindingEntry:
         heldout_rms_after=each.after,
         p_value=each.p_value,
         share_of_gap=share,
-        rivals=tuple(RivalEntry(effect=rival, joint=each.joint) for rival in each.rivals),
+        rivals=tuple(
+            RivalEntry(effect=rival, joint=last if rival == "payload" else each.joint) for rival in each.rivals
+        ),
         next_experiment=(each.parameter.experiment or effect_named(each.effect).experiment) if each.rivals else None,
     )
 
@@ -157,7 +163,7 @@ def model_text(diagnosis: MotionDiagnosis, folder: Path) -> str:
     robot = recording.robot
     if robot not in built_in_arms():
         robot = Path(os.path.relpath(recording.folder / robot, folder)).as_posix()
-    ten = recording.arm.parameters.reshape(-1, 10)
+    ten = diagnosis.simulation.arm.parameters.reshape(-1, 10)
     content: dict[str, Any] = {
         "schema": "model/1",
         "robot": robot,

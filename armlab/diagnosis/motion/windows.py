@@ -3,8 +3,9 @@
     (M_jj(q) + armature) qdd_j + load_j(t) + slope_j(t) (q_j - q_j measured) = drive - friction
 
 load_j: gravity and the torque of all other joints' motion, at the measured positions. slope_j: derivative of the
-gravity torque by the joint's own position. Each window starts from the measured position and velocity, so that errors
-do not pile up over a run, and is one block of the statistics.
+gravity torque by the joint's own position. Each window is one block of the statistics. Its replay starts from the
+measured position and velocity, so that errors do not pile up over a run, and earlier than the window by `warm_up_s`, so
+that the encoder's error in the first state is forgotten where samples count.
 """
 
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.recordings.recording import MotionRun
@@ -23,6 +25,7 @@ from problem.arm import Arm
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
+LOADS = ("inertia", "load", "slope", "unit_inertia", "unit_load", "unit_slope")
 SLOPE_STEP = 1e-3  # rad (m), of the central difference
 
 
@@ -30,9 +33,12 @@ SLOPE_STEP = 1e-3  # rad (m), of the central difference
 class Windows:
     """One joint in all windows, on a common grid of step_s; a shorter window repeats its last values.
 
-    command: (windows, history + steps + history), rad; the first step of a window is column `history`. inertia, load,
-    slope, measured: (windows, steps). supply: the same, factor of the torque, or None. first_velocity: (windows,),
-    rad/s. run: (windows,), the run that a window was cut from. begin: (windows + 1,), the first sample of each window;
+    command: (windows, history + steps + history), rad, means over steps; the first step of a window is column
+    `history`. measured: (windows, steps), smooth; inertia, load, slope: the same, in the middle of each step;
+    unit_inertia, unit_load, unit_slope: those of 1 kg at the tool. supply: (windows, steps), factor of the torque, or
+    None. first_velocity: (windows,), rad/s. run: (windows,), the run that a window was cut from; start: (windows,), its
+    first step there. path_command: (runs, history + steps of a run), path_measured: (runs, steps of a run), rad;
+    integral: (runs,), of the drive at the start of a run, N m. begin: (windows + 1,), the first sample of each window;
     row, fraction: (samples,), where on the grid a measured sample lies; position: (samples,), rad.
     """
 
@@ -42,10 +48,17 @@ class Windows:
     inertia: Array
     load: Array
     slope: Array
+    unit_inertia: Array
+    unit_load: Array
+    unit_slope: Array
     measured: Array
     supply: Array | None
     first_velocity: Array
-    run: NDArray[np.intp]
+    run: NDArray[np.int64]
+    start: NDArray[np.int64]
+    path_command: Array
+    path_measured: Array
+    integral: Array
     begin: NDArray[np.int64]
     row: NDArray[np.int64]
     fraction: Array
@@ -61,6 +74,10 @@ class Windows:
         """The window of each sample, (samples,)."""
         return np.repeat(np.arange(self.count), np.diff(self.begin))
 
+    def with_integral(self, integral: Array) -> "Windows":
+        """The windows with other integrals of the drive at the start of each run, (runs,), N m."""
+        return replace(self, integral=np.ascontiguousarray(integral))
+
     def select(self, chosen: NDArray[np.intp]) -> "Windows":
         """Some of the windows, in the given order, which has to be that of time."""
         kept = np.isin(self.window, chosen)
@@ -71,10 +88,14 @@ class Windows:
             inertia=self.inertia[chosen],
             load=self.load[chosen],
             slope=self.slope[chosen],
+            unit_inertia=self.unit_inertia[chosen],
+            unit_load=self.unit_load[chosen],
+            unit_slope=self.unit_slope[chosen],
             measured=self.measured[chosen],
             supply=None if self.supply is None else self.supply[chosen],
             first_velocity=self.first_velocity[chosen],
             run=self.run[chosen],
+            start=self.start[chosen],
             begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
             row=self.row[kept],
             fraction=self.fraction[kept],
@@ -82,18 +103,39 @@ class Windows:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class TimedMotion:
+    """A motion of all recorded joints that makes loads and couplings; time: (samples,), s, of a run's stamps."""
+
+    time: Array
+    motion: Motion
+
+
 def smooth_motion(run: MotionRun, tuning: MotionTuning = DEFAULT) -> Motion:
-    """Measured positions through a zero-phase low-pass, with their derivatives, at the stamps of the run."""
+    """Measured positions through a zero-phase low-pass, with their derivatives, evenly from first to last stamp."""
     time = np.linspace(run.time[0], run.time[-1], run.samples)
     rate_hz = (run.samples - 1) / (run.time[-1] - run.time[0])
     even = np.stack([np.interp(time, run.time, column) for column in run.position.T], axis=1)
-    cutoff = min(tuning.cutoff_hz, 0.2 * rate_hz)
-    smooth = sosfiltfilt(butter(2, cutoff, fs=rate_hz, output="sos"), even, axis=0)
-    velocity = np.gradient(smooth, 1 / rate_hz, axis=0)
-    return Motion(smooth, velocity, np.gradient(velocity, 1 / rate_hz, axis=0))
+    return motion_of(low_pass(even, rate_hz, min(tuning.cutoff_hz, 0.2 * rate_hz)), rate_hz)
 
 
-def joint_loads(arm: Arm, joints: Sequence[int], motion: Motion) -> tuple[Array, Array, Array]:
+def low_pass(signals: Array, rate_hz: float, cutoff_hz: float) -> Array:
+    """Signals (samples, joints) without what is faster than a cut-off, and without delay."""
+    return np.asarray(sosfiltfilt(butter(2, cutoff_hz, fs=rate_hz, output="sos"), signals, axis=0))
+
+
+def motion_of(position: Array, rate_hz: float) -> Motion:
+    """A motion of positions (samples, joints) at a constant rate."""
+    acceleration = np.diff(position, 2, axis=0) * rate_hz**2
+    return Motion(
+        position, np.gradient(position, 1 / rate_hz, axis=0), np.pad(acceleration, ((1, 1), (0, 0)), mode="edge")
+    )
+
+
+Loads = tuple[Array, Array, Array]  # own inertia, load and slope
+
+
+def joint_loads(arm: Arm, joints: Sequence[int], motion: Motion) -> Loads:
     """Own inertia, load and slope of the recorded joints, (samples, joints) each.
 
     motion: of the recorded joints; the other joints of the arm are at zero and still.
@@ -117,6 +159,13 @@ def joint_loads(arm: Arm, joints: Sequence[int], motion: Motion) -> tuple[Array,
     return inertia, load, slope
 
 
+def _loads_and_units(simulation: ServoSimulation, loaded: Arm, motion: Motion) -> tuple[Array, ...]:
+    """The LOADS of a motion; loaded: the arm with 1 kg at the tool."""
+    own = joint_loads(simulation.arm, simulation.joints, motion)
+    more = joint_loads(loaded, simulation.joints, motion)
+    return (*own, *(each - before for each, before in zip(more, own, strict=True)))
+
+
 def _whole_arm(arm: Arm, joints: Sequence[int], motion: Motion) -> Motion:
     parts = []
     for signal in (motion.position, motion.velocity, motion.acceleration):
@@ -128,23 +177,34 @@ def _whole_arm(arm: Arm, joints: Sequence[int], motion: Motion) -> Motion:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """A window of a run: time of its first and last sample, and the samples."""
+    """A window of a run: the sample at which its replay starts, and the first and the last one that count."""
 
     run: int
+    warm: int
     first: int
     last: int
 
 
 def make_windows(
-    runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: MotionTuning = DEFAULT
+    runs: Sequence[MotionRun],
+    simulation: ServoSimulation,
+    tuning: MotionTuning = DEFAULT,
+    motions: Sequence[TimedMotion] | None = None,
 ) -> list[Windows]:
-    """The windows of each recorded joint; runs are cut into stretches of about the same length."""
+    """The windows of each recorded joint; runs are cut into stretches of about the same length.
+
+    motions: of the runs, that make loads and couplings; without them the measured ones through a low-pass.
+    """
     pieces = _cut_runs(runs, tuning)
     sample = min(1 / run.rate_hz for run in runs)
     step = sample / np.ceil(sample / tuning.longest_step_s)
-    motions = [smooth_motion(run, tuning) for run in runs]
-    loads = [joint_loads(simulation.arm, simulation.joints, motion) for motion in motions]
-    steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.first]) / step)) + 2 for p in pieces)
+    if motions is None:
+        motions = [
+            TimedMotion(np.linspace(run.time[0], run.time[-1], run.samples), smooth_motion(run, tuning)) for run in runs
+        ]
+    loaded = simulation.with_payload(1.0).arm
+    loads = [_loads_and_units(simulation, loaded, each.motion) for each in motions]
+    steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.warm]) / step)) + 2 for p in pieces)
     history = int(np.ceil(tuning.history_s / step))
     made = []
     for joint in range(len(simulation.joints)):
@@ -152,20 +212,43 @@ def make_windows(
             _column(runs[p.run], motions[p.run], loads[p.run], p, joint, simulation, (step, steps, history))
             for p in pieces
         ]
-        made.append(_stack(columns, np.array([p.run for p in pieces]), step, history))
+        paths = [_path(run, joint, simulation, step, history) for run in runs]
+        windows = _stack(columns, paths, np.array([p.run for p in pieces], dtype=np.int64), step, history)
+        made.append(windows.with_integral(_resting_integrals(windows, simulation.nominal.values[joint])))
     return made
 
 
 def _cut_runs(runs: Sequence[MotionRun], tuning: MotionTuning) -> list[_Piece]:
     whole = sum(float(run.time[-1] - run.time[0]) for run in runs)
     seconds = min(max(whole / tuning.wanted_windows, tuning.shortest_window_s), tuning.longest_window_s)
-    return [piece for number, run in enumerate(runs) for piece in _cut(run, number, seconds)]
+    return [piece for number, run in enumerate(runs) for piece in _cut(run, number, seconds, tuning.warm_up_s)]
 
 
-def _cut(run: MotionRun, number: int, seconds: float) -> list[_Piece]:
+def _cut(run: MotionRun, number: int, seconds: float, warm_up_s: float) -> list[_Piece]:
     count = max(round((run.time[-1] - run.time[0]) / seconds), 1)
     edges = np.linspace(0, run.samples, count + 1).astype(int)
-    return [_Piece(number, int(first), int(last) - 1) for first, last in pairwise(edges)]
+    warm = np.searchsorted(run.time, run.time[edges[:-1]] - warm_up_s)
+    return [
+        _Piece(number, int(before), int(first), int(last) - 1)
+        for before, (first, last) in zip(warm, pairwise(edges), strict=True)
+    ]
+
+
+def mean_command(run: MotionRun, joint: int, time: Array, width: float, rate_hz: float | None) -> Array:
+    """Mean of the held command over [time, time + width]: exact wherever the command changes within a step."""
+    assert run.reference_position is not None
+    if rate_hz is None:
+        instants, values = run.time, run.reference_position[:, joint]
+    else:
+        instants = np.arange(run.time[0], run.time[-1] + 1 / rate_hz, 1 / rate_hz)
+        values = held_command(run, joint, instants, rate_hz)
+    areas = np.append(0.0, np.cumsum(values[:-1] * np.diff(instants)))
+
+    def area(at: Array) -> Array:
+        before, after = np.minimum(at - instants[0], 0.0), np.maximum(at - instants[-1], 0.0)
+        return np.asarray(np.interp(at, instants, areas) + before * values[0] + after * values[-1])
+
+    return np.asarray((area(time + width) - area(time)) / width)
 
 
 def held_command(run: MotionRun, joint: int, time: Array, rate_hz: float | None) -> Array:
@@ -186,8 +269,8 @@ def supply_factor(run: MotionRun, joint: int, time: Array, supply: float | None)
 
 def _column(
     run: MotionRun,
-    motion: Motion,
-    loads: tuple[Array, Array, Array],
+    motion: TimedMotion,
+    loads: tuple[Array, ...],
     piece: _Piece,
     joint: int,
     simulation: ServoSimulation,
@@ -195,46 +278,76 @@ def _column(
 ) -> dict[str, Array | None]:
     """One window of one joint on the grid: its step, the number of steps, and those before and after for delays."""
     step, steps, history = grid
-    start = run.time[piece.first]
+    start = run.time[piece.warm]
     time = start + step * np.arange(steps)
     inside = np.minimum(time, run.time[piece.last])
     around = start + step * np.arange(-history, steps + history)
-    inertia, load, slope = (np.interp(inside, run.time, signal[:, joint]) for signal in loads)
-    place = (run.time[piece.first : piece.last + 1] - start) / step
+    own = [np.interp(inside + step / 2, motion.time, signal[:, joint]) for signal in loads]
+    rows = (run.time[piece.first : piece.last + 1] - start) / step
     return {
-        "command": held_command(run, joint, around, simulation.rate_hz),
-        "inertia": inertia,
-        "load": load,
-        "slope": slope,
-        "measured": np.interp(inside, run.time, run.position[:, joint]),
+        **dict(zip(LOADS, own, strict=True)),
+        "command": mean_command(run, joint, around, step, simulation.rate_hz),
+        "measured": np.interp(inside, motion.time, motion.motion.position[:, joint]),
         "supply": supply_factor(run, joint, inside, simulation.supply),
-        "velocity": motion.velocity[piece.first, joint],
-        "place": place,
+        "velocity": np.interp(start, motion.time, motion.motion.velocity[:, joint]),
+        "start": np.round((start - run.time[0]) / step),
+        "row": rows,
         "position": run.position[piece.first : piece.last + 1, joint],
     }
 
 
-def _stack(columns: list[dict[str, Array | None]], run: NDArray[np.intp], step: float, history: int) -> Windows:
+def _path(run: MotionRun, joint: int, simulation: ServoSimulation, step: float, history: int) -> tuple[Array, Array]:
+    """Commands from `history` steps before a run on, and measured positions, on a grid of the whole run."""
+    time = run.time[0] + step * np.arange(int(np.ceil((run.time[-1] - run.time[0]) / step)) + 1)
+    around = np.concatenate([time[0] + step * np.arange(-history, 0), time])
+    return mean_command(run, joint, around, step, simulation.rate_hz), np.interp(time, run.time, run.position[:, joint])
+
+
+def _resting_integrals(windows: Windows, nominal: Array) -> Array:
+    """What an integral gain would hold at the first sample of each run, (runs,), N m: a start for its fit."""
+    kp, ki, limit = (float(nominal[place(key)]) for key in ("kp", "ki", "integral_limit"))
+    held = np.zeros(len(windows.path_command))
+    if ki > 0 and np.isfinite(kp):
+        for window in np.flatnonzero(windows.start == 0):
+            error = windows.command[window, windows.history] - windows.measured[window, 0]
+            held[windows.run[window]] = np.clip(windows.load[window, 0] - kp * error, -limit, limit)
+    return held
+
+
+def _stack(
+    columns: list[dict[str, Array | None]],
+    paths: list[tuple[Array, Array]],
+    run: NDArray[np.int64],
+    step: float,
+    history: int,
+) -> Windows:
+    def joined(signals: list[Array]) -> Array:
+        """Runs of different lengths as rows, each with its last value to the end."""
+        longest = max(map(len, signals))
+        return np.stack([np.pad(each, (0, longest - len(each)), mode="edge") for each in signals])
+
     def grid(name: str) -> Array:
         return np.ascontiguousarray(np.stack([np.asarray(column[name]) for column in columns]))
 
-    place = np.concatenate([np.asarray(column["place"]) for column in columns])
-    row = np.floor(place + 1e-9).astype(np.int64)
-    sizes = [len(np.asarray(column["place"])) for column in columns]
+    rows = np.concatenate([np.asarray(column["row"]) for column in columns])
+    whole = np.floor(rows + 1e-9).astype(np.int64)
+    sizes = [len(np.asarray(column["row"])) for column in columns]
     return Windows(
         step_s=step,
         history=history,
         command=grid("command"),
-        inertia=grid("inertia"),
-        load=grid("load"),
-        slope=grid("slope"),
+        **{name: grid(name) for name in LOADS},
         measured=grid("measured"),
         supply=None if columns[0]["supply"] is None else grid("supply"),
         first_velocity=np.array([float(np.asarray(column["velocity"])) for column in columns]),
         run=run,
+        start=np.array([int(np.asarray(column["start"])) for column in columns], dtype=np.int64),
+        path_command=joined([command for command, _ in paths]),
+        path_measured=joined([measured for _, measured in paths]),
+        integral=np.zeros(len(paths)),
         begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
-        row=row,
-        fraction=place - row,
+        row=whole,
+        fraction=rows - whole,
         position=np.concatenate([np.asarray(column["position"]) for column in columns]),
     )
 
