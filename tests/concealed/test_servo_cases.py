@@ -4,12 +4,18 @@ import json
 
 import numpy as np
 import pytest
+from jsonschema import Draft202012Validator
 
+from armlab.concealed import sealed_set
+from armlab.concealed.prove import judged_seed
+from armlab.concealed.servo import prove
 from armlab.concealed.servo.hidden import KINDS, Hidden
 from armlab.concealed.servo.make import make_case, write_case
 from armlab.concealed.servo.oracle import Oracle, find_size
 from armlab.concealed.servo.plan import ServoCase, draw_cases
 from armlab.concealed.servo.score import judge
+from armlab.concealed.servo.truth import TRUTH_SCHEMA_FILE, truth_schema
+from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.recordings.motion import load_motion_recording
 
 
@@ -65,9 +71,38 @@ def test_a_written_case_is_a_recording_of_motion_and_its_answer_stays_outside(tm
     assert len(recording.joints) == 2
     assert [run.role for run in recording.runs] == [run.role for run in case.runs]
     truth = json.loads((tmp_path / "truth.json").read_text())
+    Draft202012Validator(truth_schema()).validate(truth)
     assert [each["kind"] for each in truth["injected"]] == [each.kind for each in made.hidden]
     named = {path.name for path in (tmp_path / "observation").iterdir()}
     assert named == {"arm.xml", "recording.yaml", *(f"run-{each + 1}.csv" for each in range(len(case.runs)))}
+
+
+def test_the_shipped_schema_of_answers_is_that_of_the_model():
+    shipped = json.loads(TRUTH_SCHEMA_FILE.read_text(encoding="utf-8"))
+    assert shipped == truth_schema(), f"write armlab.concealed.servo.truth.truth_schema() to {TRUTH_SCHEMA_FILE}"
+
+
+@pytest.mark.parametrize(("seed", "lines"), [(1990, 0), (judged_seed("a" * 40), 1)])
+def test_a_judged_set_is_logged_once_and_one_for_development_is_not(tmp_path, monkeypatch, seed, lines):
+    monkeypatch.setattr(sealed_set, "JUDGED_LOG", tmp_path / "log.jsonl")
+    monkeypatch.setattr(sealed_set, "head_commit", lambda: "a" * 40)
+    for _ in range(2):
+        list(prove.prove_motion(prove.MotionSet(0, 0, seed), tmp_path / "work", tmp_path / "results", 1))
+    logged = (tmp_path / "log.jsonl").read_text().splitlines() if lines else []
+    assert len(logged) == lines
+    for line in map(json.loads, logged):
+        assert (line["set"], line["seed"], line["cases"]) == ("motion", seed, 0)
+        assert "nulls_with_a_false_claim" in line["score"]["motion"]
+
+
+def test_an_integral_drive_whose_simulation_is_right_replays_down_to_its_encoder(tmp_path):
+    case = small_case("null", law="pid")
+    write_case(make_case(case), tmp_path / "observation", tmp_path / "truth.json")
+    result = diagnose_motion(load_motion_recording(tmp_path / "observation"))
+    assert result.status == "none"
+    floors = [each.after / each.floor for each in result.errors]
+    print("replay in windows over the floor of the encoder:", floors)
+    assert max(floors) < 3
 
 
 TRUTH = {

@@ -9,12 +9,13 @@ import numpy as np
 import pandas as pd
 import yaml
 
-from armlab.common.settings import to_plain_data
+from armlab.common.settings import to_plain_data, validate
 from armlab.concealed.servo.arms import write_mjcf
 from armlab.concealed.servo.engine import ServoArm
 from armlab.concealed.servo.hidden import Hidden, servo_parameters
 from armlab.concealed.servo.oracle import Oracle, find_size, record
 from armlab.concealed.servo.plan import ServoCase
+from armlab.concealed.servo.truth import MotionTruth
 
 MAX_DRAWS = 12  # of what is hidden, until it can be seen
 
@@ -91,7 +92,8 @@ def write_case(made: MadeCase, observation: Path, truth: Path) -> None:
     }
     text = yaml.safe_dump(to_plain_data(settings), sort_keys=False, default_flow_style=None, width=110)
     (observation / "recording.yaml").write_text(text, encoding="utf-8")
-    truth.write_text(json.dumps(answer(made), indent=1) + "\n", encoding="utf-8")
+    content = validate(MotionTruth, json.loads(json.dumps(answer(made))), case.name)
+    truth.write_text(content.model_dump_json(by_alias=True, indent=1) + "\n", encoding="utf-8")
 
 
 def _controller(case: ServoCase, arm: ServoArm) -> dict[str, Any]:

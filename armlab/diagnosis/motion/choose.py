@@ -52,6 +52,17 @@ class ChosenServo:
     gains: dict[int, Gain]
     odd: NDArray[np.intp]
 
+    def without_extras(self, windows: Windows, tuning: MotionTuning = DEFAULT) -> ServoFit:
+        """A fit of the usual numbers and of those that may be findings; the others are the simulation's."""
+        free, values = np.array(USUAL), self.fit.values.copy()
+        free[list(self.gains)] = True
+        back = self.fit.free & ~free
+        if not back.any():
+            return self.fit
+        values[back] = fill_unknown(self.nominal)[back]
+        sound = windows.select(np.setdiff1d(np.arange(windows.count), self.odd)).with_integral(self.fit.integral)
+        return fit_servo(sound, values, free, tuning.refit_evaluations)
+
 
 def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
     """The servo of one joint. nominal: (parameters,), NaN where unknown. looks: number of tests in the diagnosis.
@@ -77,6 +88,8 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
             break
         fit, judged = tried[best]
         waiting.remove(best)
+        if best == place("limit") and np.isnan(nominal[place("kp")]):
+            fit, judged = _with_damping_inside(few, fit, judged, base, tuning)
     gains = {number: _gain_of(few, fit, number, (base, judged), tuning) for number in np.flatnonzero(fit.free).tolist()}
     worth = {number: gain for number, gain in gains.items() if is_finding(gain, looks, tuning)}
     return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free, tuning.max_evaluations), worth, odd)
@@ -137,6 +150,21 @@ def _with_parameter(windows: Windows, fit: ServoFit, number: int, tuning: Motion
     free[number] = True
     more = fit_servo(windows, first_guess(windows, fit.values, number), free, tuning.refit_evaluations)
     return more, _errors_on_other_half(windows, more.values, free, tuning)
+
+
+def _with_damping_inside(
+    windows: Windows, fit: ServoFit, judged: Array, base: Array, tuning: MotionTuning
+) -> tuple[ServoFit, Array]:
+    """The same, or the fit of an unknown drive whose damping acts within its torque limit, where that is better.
+
+    judged: squared error of each window. base: the simulation's numbers, with the damping of the joint.
+    """
+    inside = fit.values.copy()
+    inside[place("kd")] = max(fit.values[place("damping")] - base[place("damping")], 0.0)
+    inside[place("damping")] -= inside[place("kd")]
+    other = fit_servo(windows, inside, fit.free, tuning.refit_evaluations)
+    errors = _errors_on_other_half(windows, other.values, fit.free, tuning)
+    return (other, errors) if errors.sum() < judged.sum() else (fit, judged)
 
 
 def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:

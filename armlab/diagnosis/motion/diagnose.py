@@ -138,7 +138,10 @@ def diagnose_motion(
     if not any(chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("weighing the tool")
-    fits = [None if each is None else each.fit for each in chosen]
+    fits = [
+        None if each is None else each.without_extras(joint, tuning)
+        for joint, each in zip(windows, chosen, strict=True)
+    ]
     payload = find_payload(windows, fits, len(windows) * len(PARAMETERS), tuning)
     loaded = None if payload is None else simulation.with_payload(payload.mass)
     if loaded is not None and loaded.is_physical():
@@ -364,7 +367,10 @@ def name_differences(
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
     confused = confused_parameters(sound, fit, tuning)
-    scale = ("rotor_inertia", "inertial_parameter_error") if has_weak_load(sound, fit.values, tuning) else ()
+    unknown_gain = bool(np.isnan(simulation.nominal.values[number, place("kp")]))
+    scale: tuple[str, ...] = ("inertial_parameter_error",) if unknown_gain else ()
+    if has_weak_load(sound, fit.values, tuning):
+        scale = ("rotor_inertia", "inertial_parameter_error")
     if not chosen.gains:
         return []
     errors = [_settled_errors(judged, _with_nominal(fit.values, chosen.nominal, each)) for each in chosen.gains]
@@ -374,9 +380,12 @@ def name_differences(
         parameter, nominal = PARAMETERS[place_of], float(chosen.nominal[place_of])
         if low[place_of] <= nominal <= high[place_of] or (np.isfinite(nominal) and _rms(error) < after):
             continue
-        ends_of = (float(low[place_of]), float(high[place_of]))
+        ends_of, fitted = (float(low[place_of]), float(high[place_of])), float(fit.values[place_of])
         kd = float(simulation.nominal.get("kd")[number])
-        effect, name, value, ends = _named(parameter, float(fit.values[place_of]), ends_of, kd)
+        if parameter.key == "damping" and unknown_gain:  # of joint and drive together
+            within = float(fit.values[place("kd")])
+            fitted, ends_of = fitted + within, (ends_of[0] + within, ends_of[1] + within)
+        effect, name, value, ends = _named(parameter, fitted, ends_of, kd)
         rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in confused[place_of]))
         rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
         if effect != parameter.effect:

@@ -6,6 +6,11 @@ J_w and r_w the Jacobian and the errors of window w (Huber 1967, clustered),
 
     cov = H^-1 (sum_w J_w^T r_w r_w^T J_w) H^-1,  H = J^T J
 
+What the law and the encoder in the loop leave out is alike in all windows, and such blocks do not see it. So a window
+counts as at most one independent sample: with N samples in W windows, no variance is less than that of
+
+    cov = (N / W) mean(r^2) H^-1
+
 Where the drive integrates its error, what the integral holds at the start of each run is fitted, too.
 """
 
@@ -139,7 +144,11 @@ def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) ->
     scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
     blocks = len(scores)
-    return np.asarray(inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1))
+    clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
+    least = len(errors) / blocks * np.mean(errors**2) * np.diag(inverse)
+    own = np.maximum(np.diag(clustered), 1e-300)
+    wider = np.sqrt(np.maximum(least / own, 1.0))
+    return np.asarray(clustered * np.outer(wider, wider))
 
 
 def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning: MotionTuning = DEFAULT) -> ServoFit:
