@@ -195,7 +195,10 @@ def test_the_command_says_why_nothing_can_be_said(tmp_path: Path) -> None:
     ("damage", "reason"),
     [
         (lambda table: table.assign(c1=np.degrees(table["c1"]), c2=np.degrees(table["c2"])), "degrees for radians"),
+        (lambda table: table.assign(c1=table["c1"] * 4096 / (2 * np.pi)), "counts of 4096 a turn for radians"),
         (lambda table: table.rename(columns={"c1": "c2", "c2": "c1"}), "exchanged columns"),
+        (lambda table: table.assign(c1=0.1, c2=0.1, q1=0.1, q2=0.1), "no joint moves"),
+        (lambda table: table.assign(q1=table["c1"].cumsum() / 50, q2=table["c2"].cumsum() / 50), "no joint follows"),
         (lambda table: table.assign(q1=np.sin(table["t"] * 1.7), q2=np.cos(table["t"] * 2.9)), "no joint follows"),
     ],
 )

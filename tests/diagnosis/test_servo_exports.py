@@ -178,6 +178,39 @@ def test_ros_2_files_have_the_names_and_the_torque_of_their_sources(
     assert content["controller_manager"]["ros__parameters"]["update_rate"] == 1000
 
 
+def test_the_integral_gain_stands_where_there_is_a_field_and_is_said_elsewhere(simulation: ServoSimulation) -> None:
+    servos = make_servos(**NUMBERS, ki=3.0, integral_limit=0.4)
+    content = yaml.safe_load(controllers_text(simulation, servos, STEP_S))
+    gains = content["servo_controller"]["ros__parameters"]["gains"]["elbow"]
+    assert set(gains) <= set(SOURCES["pid_controller"]["gains"])
+    assert (gains["i"], gains["antiwindup"], gains["i_clamp_max"], gains["i_clamp_min"]) == (3.0, True, 0.4, -0.4)
+    assert "integral" not in ros_urdf_text(simulation, servos)
+    for text in (isaac_lab_text(simulation, servos, STEP_S), mjlab_text(simulation, servos, STEP_S)):
+        assert "elbow: add 3 N m/(rad s) times the integral of the error, at most 0.4 N m" in text
+
+
+def test_the_plug_in_integrates_as_the_replay_of_armlab_does(
+    recording: MotionRecording, simulation: ServoSimulation, tmp_path: Path
+) -> None:
+    servos = make_servos(**{**NUMBERS, "kd": 0.0}, ki=6.0, integral_limit=0.3)
+    (tmp_path / "servos.json").write_text(servos_json(simulation, servos))
+    model = mujoco.MjModel.from_xml_string(arm_text(kp=60))
+    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+    run = recording.runs[0]
+    expected = replay(simulation, servos, [run])[0].position
+    data = mujoco.MjData(model)
+    data.qpos[:] = run.position[0]
+    data.qvel[:] = smooth_motion(run).velocity[0]
+    mujoco.mj_forward(model, data)
+    weight = data.qfrc_bias - NUMBERS["kp"] * (run.reference_position[0] - run.position[0])
+    with installed(model, read_servos(tmp_path / "servos.json")) as plugin:
+        plugin.integral = np.clip(weight, -0.3, 0.3)
+        moved = follow(model, run)
+    difference = np.abs(moved - expected).max()
+    print(f"plug-in with an integral gain against replay, largest difference: {1e6 * difference:.3g} microrad")
+    assert difference < 1e-6
+
+
 def test_the_urdf_is_the_arm_that_it_was_made_of(simulation: ServoSimulation, tmp_path: Path) -> None:
     (tmp_path / "robot.urdf").write_text(ros_urdf_text(simulation, make_servos(**NUMBERS)))
     arm = load_arm("robot.urdf", tmp_path)

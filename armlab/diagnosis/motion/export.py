@@ -7,7 +7,7 @@ the motion better. The friction loss gets a `solimpfriction` that sticks: with M
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Servos
 from armlab.diagnosis.motion.servo_plugin import NUMBERS, STICKING
@@ -41,8 +41,8 @@ def mjcf_text(simulation: ServoSimulation, servos: Servos) -> str:
     return written_mjcf(spec, simulation.path)
 
 
-def lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterator[str]:
-    """What no simulator that armlab writes for has a field for, one line a number, with what to do instead."""
+def lines_without_field(simulation: ServoSimulation, servos: Servos, with_field: Sequence[str] = ()) -> Iterator[str]:
+    """What a simulator has no field for, one line a number, with what to do instead; with_field: what it has."""
     for row, place in enumerate(simulation.joints):
         name = simulation.arm.joints[place].name
         offset, band = float(servos.get("offset")[row]), float(servos.get("dead_band")[row])
@@ -56,6 +56,11 @@ def lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterator
                 f"{name}: add {share:.4g} |load| to the friction at each step; load: torque of gravity and velocities, "
                 "qfrc_bias in MuJoCo (friction that grows with load)"
             )
+        gain = float(servos.get("ki")[row])
+        if gain and "integral gain" not in with_field:
+            most = float(servos.get("integral_limit")[row])
+            wound_up = f", at most {most:.4g} N m" if most < INFINITE_LIMIT else ""
+            yield f"{name}: add {gain:.4g} N m/(rad s) times the integral of the error{wound_up} (integral gain)"
         if delay < 0:
             yield f"{name}: the position was read {-1e3 * delay:.3g} ms after its stamp (no field is needed)"
     if simulation.payload:

@@ -3,15 +3,16 @@
 `pid_controller/PidController` (ros2_controllers 4.22.0, `pid_controller.cpp`) with the interfaces position and velocity
 and the command interface effort computes at each cycle
 
-    effort = p (reference - position) + d (reference_dot - velocity)
+    effort = p (reference - position) + d (reference_dot - velocity) + i-term,  d/dt i-term = i (reference - position)
 
-so p is kp, and d is kd as long as reference_dot is zero. The hardware (in simulation gz_ros2_control, whose position
-interface is a velocity proportional to the error, and so no servo) limits the effort to `min` and `max` of its command
-interface. Damping and friction stand in `dynamics` of the URDF: N m s/rad and N m (N s/m, N).
+with the i-term within i_clamp_min and i_clamp_max where `antiwindup` is set. So p is kp, i is ki, and d is kd as long
+as reference_dot is zero. The hardware (in simulation gz_ros2_control, whose position interface is a velocity
+proportional to the error, and so no servo) limits the effort to `min` and `max` of its command interface. Damping and
+friction stand in `dynamics` of the URDF: N m s/rad and N m (N s/m, N).
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -72,10 +73,7 @@ def _add_interfaces(control: ElementTree.Element, name: str, limit: float) -> No
 def controllers_text(simulation: ServoSimulation, servos: Servos, step_s: float) -> str:
     """`controllers.yaml`: a PID controller with the gains found. step_s: a cycle of the controller, s."""
     names = [simulation.arm.joints[number].name for number in simulation.joints]
-    gains = {
-        name: {"p": float(f"{kp:.6g}"), "i": 0.0, "d": float(f"{kd:.6g}")}
-        for name, kp, kd in zip(names, servos.get("kp").tolist(), servos.get("kd").tolist(), strict=True)
-    }
+    gains = {name: _gains(servos.of_joint(row)) for row, name in enumerate(names)}
     manager = {
         "update_rate": round(1 / step_s),
         "joint_state_broadcaster": {"type": "joint_state_broadcaster/JointStateBroadcaster"},
@@ -97,6 +95,17 @@ def controllers_text(simulation: ServoSimulation, servos: Servos, step_s: float)
     return head + yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=110)
 
 
+def _gains(servo: Mapping[str, float | None]) -> dict[str, float | bool]:
+    """Parameters of one PID: a limit of its integral where the servo has one."""
+    names = {"p": "kp", "i": "ki", "d": "kd"}
+    gains: dict[str, float | bool] = {name: float(f"{servo[key] or 0.0:.6g}") for name, key in names.items()}
+    most = servo["integral_limit"]
+    if not servo["ki"] or most is None:
+        return gains
+    clamp = float(f"{most:.6g}")
+    return gains | {"antiwindup": True, "i_clamp_max": clamp, "i_clamp_min": -clamp}
+
+
 def _lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterator[str]:
     """What neither the URDF nor the controller's parameters hold."""
     for row, number in enumerate(simulation.joints):
@@ -107,7 +116,7 @@ def _lines_without_field(simulation: ServoSimulation, servos: Servos) -> Iterato
         if delay > 0:
             yield f"{name}: the command arrives {1e3 * delay:.3g} ms late: send it that much later"
     yield "friction at rest: Gazebo's joint friction depends on its physics engine, and may creep"
-    yield from lines_without_field(simulation, servos)
+    yield from lines_without_field(simulation, servos, ("integral gain",))
 
 
 def _over_arm(simulation: ServoSimulation, values: Array) -> Array:

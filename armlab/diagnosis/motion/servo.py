@@ -281,4 +281,5 @@ class Servos:
     def of_joint(self, row: int) -> dict[str, float | None]:
         """All parameters of one joint by their keys; a limit of None is no limit."""
         numbers: dict[str, float | None] = dict(zip(KEYS, self.values[row].tolist(), strict=True))
-        return numbers | ({"limit": None} if self.values[row, place("limit")] >= INFINITE_LIMIT else {})
+        limits: tuple[Key, ...] = ("limit", "integral_limit")
+        return numbers | {key: None for key in limits if self.values[row, place(key)] >= INFINITE_LIMIT}

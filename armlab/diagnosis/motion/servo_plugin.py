@@ -9,13 +9,15 @@ A copy of this file stands beside each verdict, with the numbers in `servos.json
 
 The law of a joint, with q and qd as MuJoCo has them and c the command that held at a time:
 
-    torque = s clip(kp d(c(t - delay) + offset - q) - kd qd, -limit, limit)
-    d(e)   = sgn(e) max(|e| - dead_band / 2, 0)
+    torque = s clip(kp e - kd qd + i, -limit, limit)
+    e      = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
+    i'     = ki e,  |i| <= integral_limit
     friction loss = friction + load_friction |qfrc_bias|
 
 kp, kd, limit, damping, friction and armature are written into the model. A callback (`mujoco.set_mjcb_passive`) adds
 to `qfrc_passive` what the torque of the law has more than that of the actuator, and sets the friction loss of the next
-step. `data.ctrl` stays the user's. One plug-in serves one MjData at a time; `mj_resetData` empties its history.
+step. `data.ctrl` stays the user's. One plug-in serves one MjData at a time; `mj_resetData` empties its history and its
+integrals.
 """
 
 import json
@@ -27,7 +29,7 @@ from typing import Any
 import numpy as np
 
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
-LAW = ("kp", "kd", "limit", "delay", "offset", "dead_band", "friction", "load_friction")
+LAW = ("kp", "kd", "ki", "integral_limit", "limit", "delay", "offset", "dead_band", "friction", "load_friction")
 NUMBERS = (*LAW, "damping", "armature")
 SAME_TIME_S = 1e-9  # below it two instants are one
 JOINT_TRANSMISSION = 0  # mjTRN_JOINT
@@ -68,13 +70,16 @@ class ServoPlugin:
 
     model: mujoco.MjModel with a position actuator of gear 1 at each joint of servos; its fields are set. servos: as
     `servos.json` has them. Raises ValueError for a joint that the model does not have, or without such an actuator.
-    supply: voltage over its nominal value, which scales the drives; set it where it varies.
+    supply: voltage over its nominal value, which scales the drives; set it where it varies. integral: what the drives
+    hold before the next step, (servos,), N m; set it where they do not start empty.
     """
 
     def __init__(self, model: Any, servos: Mapping[str, Any]) -> None:
         entries: Sequence[Mapping[str, Any]] = servos["servos"]
         joints = [_find_joint(model, entry["joint"]) for entry in entries]
         self.supply = 1.0
+        self.integral = np.zeros(len(entries))
+        self._begun: tuple[float, Any] = (-np.inf, self.integral)  # time of a step, and the integrals before it
         self._rate_hz: float | None = servos.get("rate_hz")
         self._actuators = np.array([_servo_actuator(model, joint) for joint in joints], dtype=np.intp)
         self._positions, self._dofs = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
@@ -97,7 +102,9 @@ class ServoPlugin:
         self._remember(data.time, data.ctrl[self._actuators])
         error = self._held_commands(data.time) + law["offset"] - position
         error -= np.clip(error, -law["dead_band"] / 2, law["dead_band"] / 2)
-        drive = np.clip(law["kp"] * error - law["kd"] * velocity, -law["limit"], law["limit"])
+        self._integrate(data.time, model.opt.timestep, error)
+        drive = law["kp"] * error - law["kd"] * velocity + self.integral
+        drive = np.clip(drive, -law["limit"], law["limit"])
         actuator = law["kp"] * (command - position) - law["kd"] * velocity
         actuator = np.clip(actuator, -law["limit"], law["limit"])
         data.qfrc_passive[self._dofs] += self.supply * drive - actuator
@@ -106,9 +113,18 @@ class ServoPlugin:
             level = law["friction"] + law["load_friction"] * np.abs(self._load[self._dofs])
             model.dof_frictionloss[self._dofs] = level
 
+    def _integrate(self, time: float, step: float, error: Any) -> None:
+        """The integrals at the end of a step; an evaluation at the time of the last one replaces its result."""
+        if time > self._begun[0] + SAME_TIME_S:
+            self._begun = time, self.integral
+        limit = self._law["integral_limit"]
+        self.integral = np.clip(self._begun[1] + step * self._law["ki"] * error, -limit, limit)
+
     def _remember(self, time: float, command: Any) -> None:
         if self._times and time < self._times[-1] - SAME_TIME_S:
             self._times, self._commands = [], []
+            self._begun = (-np.inf, np.zeros_like(self.integral))
+            self.integral = self._begun[1]
         if self._times and np.array_equal(command, self._commands[-1]):
             return
         if self._times and time < self._times[-1] + SAME_TIME_S:

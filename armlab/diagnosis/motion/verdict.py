@@ -206,6 +206,9 @@ def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:
     entry: dict[str, Any] = {"type": "pd", "kp": servos.get("kp").tolist(), "kd": servos.get("kd").tolist()}
     entry |= {"reference_velocity": "zero", "feedforward": "none", "torque_limit": limits}
     entry |= {"delay": np.maximum(delays, 0.0).tolist()}
-    others = {"offset": servos.get("offset"), "dead_band": servos.get("dead_band")}
+    others = {"offset": servos.get("offset"), "dead_band": servos.get("dead_band"), "ki": servos.get("ki")}
+    if servos.get("ki").any():
+        bounds = servos.get("integral_limit").tolist()
+        entry |= {"integral_limit": [each if each < INFINITE_LIMIT else None for each in bounds]}
     others["read_delay"] = np.maximum(-delays, 0.0)
     return entry | {name: values.tolist() for name, values in others.items() if values.any()}
