@@ -65,12 +65,14 @@ class Servo:
 class ServoArm:
     """An arm with servos. hold_s: how long a drive holds a command. sag: fall of the supply when all drives push fully.
 
-    A drive takes a command over at multiples of hold_s. The limits of all drives follow the supply.
+    A drive takes a command over at phase_s and multiples of hold_s after it. The limits of all drives follow the
+    supply.
     """
 
     bodies: tuple[Body, ...]
     servos: tuple[Servo, ...]
     hold_s: float = STEP_S
+    phase_s: float = 0.0
     sag: float = 0.0
 
     @property
@@ -88,7 +90,7 @@ def simulate(arm: ServoArm, command: Array, period: float, first: Array) -> Arra
     steps = round(count * period / STEP_S)
     command, first = (np.ascontiguousarray(each, dtype=float) for each in (command, first))
     out = np.empty((steps + 1, joints))
-    settings = ffi.new("ArmData *", [list(GRAVITY), STEP_S, arm.hold_s, period, arm.sag])
+    settings = ffi.new("ArmData *", [list(GRAVITY), STEP_S, arm.hold_s, arm.phase_s, period, arm.sag])
     pointers = (ffi.from_buffer("double *", each) for each in (command, first, out))
     given = (joints, _bodies(arm), _servos(arm), settings, steps, count)
     if lib.simulate(*given, *pointers) != 0:

@@ -75,7 +75,8 @@ class ServoCase:
     def drawn(self) -> tuple[ServoArm, Array]:
         """The arm as the simulation file has it, and its home, (joints,), rad."""
         arm, home = draw_arm(self.stream("arm"), self.law)
-        return ServoArm(arm.bodies, arm.servos, self.hold / self.rate_hz), home
+        phase = int(self.stream("phase").integers(self.hold)) / self.rate_hz
+        return ServoArm(arm.bodies, arm.servos, self.hold / self.rate_hz, phase), home
 
     @property
     def rate_hz(self) -> float:
@@ -101,8 +102,8 @@ class ServoCase:
 
     @property
     def jitter_s(self) -> float:
-        """Standard deviation by which stamps are late; none where a held command would be taken for the next one."""
-        return 0.0 if self.hold > 1 else float(self.stream("jitter").uniform(*ARMS.jitter_s))
+        """Standard deviation by which stamps are late."""
+        return float(self.stream("jitter").uniform(*ARMS.jitter_s))
 
     @cached_property
     def runs(self) -> tuple[MotionRun, ...]:

@@ -202,11 +202,11 @@ static int solve_friction(int joints, const double *A, const double *b, const do
     return -1;
 }
 
-/* The position that a command asks for at an instant: taken over at ticks of `hold`, late by the delay. */
-static double wanted(const ServoData *servo, double t, double hold, double period, int64_t commands,
+/* The position that a command asks for at an instant: taken over at ticks of `hold` from `phase` on, late by the delay. */
+static double wanted(const ServoData *servo, double t, double hold, double phase, double period, int64_t commands,
     const double *command, int joints, int joint)
 {
-    double tick = floor((t - servo->delay) / hold + 1e-6) * hold;
+    double tick = floor((t - servo->delay - phase) / hold + 1e-6) * hold + phase;
     int64_t row = (int64_t)floor(tick / period + 1e-6);
     row = row < 0 ? 0 : row >= commands ? commands - 1 : row;
     return command[row * joints + joint] + servo->offset;
@@ -235,7 +235,8 @@ int simulate(int joints, const BodyData *body, const ServoData *servo, const Arm
         for (int i = 0; i < joints; i++) {
             const ServoData *own = servo + i;
             double read = own->count > 0 ? rint(middle[i] / own->count) * own->count : middle[i];
-            double error = wanted(own, (step + 0.5) * h, arm->hold, arm->period, commands, command, joints, i) - read;
+            double asked = wanted(own, (step + 0.5) * h, arm->hold, arm->phase, arm->period, commands, command, joints, i);
+            double error = asked - read;
             error = sign(error) * fmax(fabs(error) - own->dead_band / 2, 0);
             if (own->cascaded) {
                 double slow = own->position_gain * error - speed[i];

@@ -15,7 +15,7 @@ typedef struct {
     double armature, damping, friction, static_extra, stribeck_velocity, load_friction;
 } ServoData;
 typedef struct {
-    double gravity[3], step, hold, period, sag;
+    double gravity[3], step, hold, phase, period, sag;
 } ArmData;
 """
 FUNCTIONS = """

@@ -19,6 +19,7 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit
 from armlab.diagnosis.motion.couple import couple_joints
 from armlab.diagnosis.motion.estimate import fit_servo, settle, thin_windows
+from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.payload import PayloadFit, estimate_mass, find_payload
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
@@ -55,6 +56,10 @@ class ServoFinding:
     after: float
     p_value: float
     rivals: tuple[str, ...]
+
+    def is_shorter(self, sample: float) -> bool:
+        """Whether it is a delay or a late reading within one sample, s, which the clock of a drive that holds makes."""
+        return self.parameter.key == "delay" and abs(abs(self.value) - abs(self.nominal)) < sample
 
     @property
     def equation(self) -> str:
@@ -134,6 +139,11 @@ def diagnose_motion(
         None if still[number] else first_fit(joint, simulation.nominal.values[number], tuning).values
         for number, joint in enumerate(windows)
     ]
+    held = holds_samples(recording.runs, given.rate_hz)
+    if held:
+        progress("finding the clock of the drives")
+        learned = hold_commands(learned, given, firsts, tuning)
+        simulation = replace(given, rate_hz=None)
     windows, chosen = fit_joints(learned, simulation, firsts, progress, tuning)
     if not any(chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
@@ -148,15 +158,18 @@ def diagnose_motion(
         simulation, firsts = loaded, [None if fit is None else fit.values for fit in fits]
         windows, chosen = fit_joints(learned, simulation, firsts, progress, tuning)
     progress("replaying held-out runs")
-    judged = coupled_windows(
-        held_out, simulation, [None if each is None else each.fit.values for each in chosen], tuning
-    )
+    values = [None if each is None else each.fit.values for each in chosen]
+    if held:
+        held_out = hold_commands(held_out, given, values, tuning)
+    judged = coupled_windows(held_out, simulation, values, tuning)
     found = simulation, payload if simulation.payload else None
-    concluded = _conclude(recording, given, found, (windows, judged), chosen, held_out, tuning)
+    bare = replace(given, rate_hz=simulation.rate_hz)
+    concluded = _conclude(recording, bare, found, (windows, judged), chosen, held_out, tuning)
     if concluded.servos is None:
         return concluded
     return replace(
         concluded,
+        simulation=replace(concluded.simulation, rate_hz=given.rate_hz),
         odd=tuple(_odd_stretches(learned, chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
@@ -259,6 +272,9 @@ def _conclude(
         [] if each is None else name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
         for number, each in enumerate(chosen)
     ]
+    if recording.controller is not None and recording.controller.rate_hz is not None:
+        sample = max(1 / run.rate_hz for run in held_out)
+        named = [[each for each in own if not each.is_shorter(sample)] for own in named]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(given, None, held_out)) if known else ()
     servos, after, named = replay_named(simulation, chosen, named, before, held_out)
