@@ -10,7 +10,7 @@ from armlab.concealed import sealed_set
 from armlab.concealed.prove import judged_seed
 from armlab.concealed.servo import prove
 from armlab.concealed.servo.hidden import KINDS, Hidden
-from armlab.concealed.servo.make import make_case, write_case
+from armlab.concealed.servo.make import MadeCase, make_case, write_case
 from armlab.concealed.servo.oracle import Oracle, find_size
 from armlab.concealed.servo.plan import ServoCase, draw_cases
 from armlab.concealed.servo.score import judge
@@ -103,6 +103,18 @@ def test_an_integral_drive_whose_simulation_is_right_replays_down_to_its_encoder
     floors = [each.after / each.floor for each in result.errors]
     print("replay in windows over the floor of the encoder:", floors)
     assert max(floors) < 3
+
+
+def test_a_payload_is_named_with_its_mass_and_no_gain_is(tmp_path):
+    case = small_case("null")
+    hidden = Hidden("payload", 0, size=0.3)
+    arm = hidden.apply(case.drawn[0])
+    write_case(MadeCase(case, arm, (), (), (), ()), tmp_path / "observation", tmp_path / "truth.json")
+    result = diagnose_motion(load_motion_recording(tmp_path / "observation"))
+    mass = hidden.parameters(arm)["mass"][0]
+    print([(each.effect, each.joint, each.value, each.interval, mass) for each in result.findings])
+    assert [(each.effect, each.joint) for each in result.findings] == [("payload", 2)]
+    assert result.findings[0].value == pytest.approx(mass, rel=0.1)
 
 
 TRUTH = {

@@ -29,6 +29,8 @@ from armlab.diagnosis.motion.words import motion_lines
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
 
 SECONDS = 20.0
 TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1}
@@ -218,6 +220,20 @@ def test_a_controller_that_the_replay_lacks_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
     assert result.exit_code == 2
     assert "controller.velocity_filter_hz" in result.output
+
+
+def test_a_payload_at_the_tool_loads_arm_and_model_alike(soft: Path) -> None:
+    simulation = read_servo_simulation(load_motion_recording(soft)).with_payload(0.15)
+    model, position = simulation.model(), np.array([[0.4, -0.3]])
+    data = mujoco.MjData(model)
+    data.qpos[:] = position[0]
+    mujoco.mj_forward(model, data)
+    still = np.zeros_like(position)
+    np.testing.assert_allclose(
+        rigid_body_torque(simulation.arm, Motion(position, still, still))[0], data.qfrc_bias, rtol=1e-6
+    )
+    assert sum(model.body_mass) == pytest.approx(0.65)
+    assert not simulation.with_payload(-1.0).is_physical()
 
 
 def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:
