@@ -5,7 +5,7 @@ where the model without it (the parameter at the value of the simulation) predic
 matters and hardly by chance. It is a finding where that holds after a correction for all tests.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,16 +52,25 @@ class ChosenServo:
     gains: dict[int, Gain]
     odd: NDArray[np.intp]
 
-    def without_extras(self, windows: Windows, tuning: MotionTuning = DEFAULT) -> ServoFit:
-        """A fit of the usual numbers and of those that may be findings; the others are the simulation's."""
-        free, values = np.array(USUAL), self.fit.values.copy()
+    def with_damping_inside(self) -> "ChosenServo | None":
+        """The same with the change of damping in kd, on which the torque limit acts; None where there is no change.
+
+        Where nothing saturates, both are the same servo.
+        """
+        kd, damping = place("kd"), place("damping")
+        moved = float(self.fit.values[kd] + self.fit.values[damping] - self.nominal[damping])
+        if damping not in self.gains or self.fit.values[kd] != self.nominal[kd] or moved < 0:
+            return None
+        values = self.fit.values.copy()
+        values[[kd, damping]] = moved, self.nominal[damping]
+        return replace(self, fit=replace(self.fit, values=values))
+
+    @property
+    def named(self) -> tuple[Array, NDArray[np.bool_]]:
+        """The numbers of the simulation with those in their place that may be findings; which these are."""
+        free = np.zeros(len(self.nominal), dtype=bool)
         free[list(self.gains)] = True
-        back = self.fit.free & ~free
-        if not back.any():
-            return self.fit
-        values[back] = fill_unknown(self.nominal)[back]
-        sound = windows.select(np.setdiff1d(np.arange(windows.count), self.odd)).with_integral(self.fit.integral)
-        return fit_servo(sound, values, free, tuning.refit_evaluations)
+        return np.where(free, self.fit.values, fill_unknown(self.nominal)), free
 
 
 def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
@@ -77,11 +86,11 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
     few = thin_windows(sound, tuning.max_judged_windows)
     fit = fit_servo(few, start.values, free, tuning.max_evaluations)
-    judged = _errors_on_other_half(few, fit.values, free, tuning)
+    judged = errors_on_other_half(few, fit.values, free, tuning)
     waiting = np.flatnonzero(OPTIONAL).tolist()
     while waiting:
-        promising = _most_promising(few, fit, waiting)[: tuning.tried_parameters]
-        tried = {number: _with_parameter(few, fit, number, tuning) for number in promising}
+        promising = _most_promising(few, fit, waiting, tuning)[: tuning.tried_parameters]
+        tried = {number: _with_parameter(few, fit, number, start, tuning) for number, start in promising}
         gains = {number: gain_over_windows(len(few.position), judged, errors) for number, (_, errors) in tried.items()}
         best = max(gains, key=lambda number: gains[number].share)
         if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
@@ -130,26 +139,36 @@ def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEF
     return np.sort(odd[np.argsort(-sizes[odd])][: int(tuning.max_odd_share * windows.count)])
 
 
-def _most_promising(windows: Windows, fit: ServoFit, waiting: list[int]) -> list[int]:
-    """The parameters, first those that a linear model of the errors gains most from: one replay each, and no fit."""
+def _most_promising(
+    windows: Windows, fit: ServoFit, waiting: list[int], tuning: MotionTuning
+) -> list[tuple[int, Array]]:
+    """The parameters, each with a start from which it has a slope, (parameters,).
+
+    First come those that a linear model of the errors gains most from: one replay of each start, and no fit.
+    """
     windows = windows.with_integral(fit.integral)
-    guesses = np.stack([fit.values, *(first_guess(windows, fit.values, number) for number in waiting)])
-    errors = joint_errors(windows, guesses)
+    starts = [(number, start) for number in waiting for start in first_guesses(windows, fit.values, number, tuning)]
+    errors = joint_errors(windows, np.stack([fit.values, *(start for _, start in starts)]))
     slopes = np.linalg.qr(jacobian(windows, fit.values, fit.free))[0]
     left = errors[0] - slopes @ (slopes.T @ errors[0])
     columns = (errors[1:] - errors[0]).T
     columns = columns - slopes @ (slopes.T @ columns)
     sizes = np.linalg.norm(columns, axis=0)
     gains = np.abs(left @ columns) / np.where(sizes > 0, sizes, np.inf)
-    return [waiting[number] for number in np.argsort(-gains)]
+    best: dict[int, Array] = {}
+    for place_of in np.argsort(-gains).tolist():
+        best.setdefault(*starts[place_of])
+    return list(best.items())
 
 
-def _with_parameter(windows: Windows, fit: ServoFit, number: int, tuning: MotionTuning) -> tuple[ServoFit, Array]:
+def _with_parameter(
+    windows: Windows, fit: ServoFit, number: int, start: Array, tuning: MotionTuning
+) -> tuple[ServoFit, Array]:
     """The fit with one parameter more, and its squared error of each window, learned on the other half."""
     free = fit.free.copy()
     free[number] = True
-    more = fit_servo(windows, first_guess(windows, fit.values, number), free, tuning.refit_evaluations)
-    return more, _errors_on_other_half(windows, more.values, free, tuning)
+    more = fit_servo(windows, start, free, tuning.refit_evaluations)
+    return more, errors_on_other_half(windows, more.values, free, tuning)
 
 
 def _with_damping_inside(
@@ -163,7 +182,7 @@ def _with_damping_inside(
     inside[place("kd")] = max(fit.values[place("damping")] - base[place("damping")], 0.0)
     inside[place("damping")] -= inside[place("kd")]
     other = fit_servo(windows, inside, fit.free, tuning.refit_evaluations)
-    errors = _errors_on_other_half(windows, other.values, fit.free, tuning)
+    errors = errors_on_other_half(windows, other.values, fit.free, tuning)
     return (other, errors) if errors.sum() < judged.sum() else (fit, judged)
 
 
@@ -172,14 +191,19 @@ def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
     return gain.share > tuning.min_gain and gain.p_value * looks < tuning.max_p_value
 
 
-def first_guess(windows: Windows, values: Array, number: int) -> Array:
-    """A start from which a parameter that was not fitted yet has a slope."""
-    guess = values.copy()
+def first_guesses(windows: Windows, values: Array, number: int, tuning: MotionTuning = DEFAULT) -> list[Array]:
+    """Starts from which a parameter that was not fitted yet has a slope; a limit cuts a little or much."""
+    starts = [float(values[number] + 2 * SCALE[number])]
     if number == place("limit"):
-        guess[number] = min(guess[number], 0.6 * unsaturated_limit(windows, values))
-    else:
-        guess[number] += 2 * SCALE[number]
-    return guess
+        starts = [
+            level * min(float(values[number]), unsaturated_limit(windows, values)) for level in tuning.limit_levels
+        ]
+    out = []
+    for start in starts:
+        guess = values.copy()
+        guess[number] = start
+        out.append(guess)
+    return out
 
 
 def _halves(windows: Windows) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -187,15 +211,24 @@ def _halves(windows: Windows) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return numbers[0::2], numbers[1::2]
 
 
-def _errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool_], tuning: MotionTuning) -> Array:
+def errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool_], tuning: MotionTuning) -> Array:
     """Squared error of each window, (windows,), by parameters that were fitted on the other half."""
     squares = np.zeros(windows.count)
     first, second = _halves(windows)
     for train, test in ((first, second), (second, first)):
-        fitted = fit_servo(windows.select(train), values, free, tuning.refit_evaluations)
-        judged = windows.select(test).with_integral(fitted.integral)
-        squares[test] = np.bincount(judged.window, joint_errors(judged, fitted.values)[0] ** 2)
+        squares[test] = learned_errors((windows.select(train), windows.select(test)), values, free, tuning)
     return squares
+
+
+def learned_errors(
+    halves: tuple[Windows, Windows], values: Array, free: NDArray[np.bool_], tuning: MotionTuning
+) -> Array:
+    """Squared error of each window of the second half, by parameters that were fitted on the first."""
+    train, test = halves
+    fitted = fit_servo(train, values, free, tuning.refit_evaluations)
+    judged = test.with_integral(fitted.integral)
+    errors = joint_errors(judged, fitted.values)[0]
+    return np.bincount(judged.window, errors**2, judged.count).astype(float)
 
 
 def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, Array], tuning: MotionTuning) -> Gain:
@@ -205,7 +238,7 @@ def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, A
         return gain_over_windows(len(windows.position), np.full(windows.count, np.inf), judged)
     fixed, held = fit.free.copy(), fit.values.copy()
     fixed[number], held[number] = False, base[number]
-    return gain_over_windows(len(windows.position), _errors_on_other_half(windows, held, fixed, tuning), judged)
+    return gain_over_windows(len(windows.position), errors_on_other_half(windows, held, fixed, tuning), judged)
 
 
 def chance_of_gain(difference: Array) -> float:

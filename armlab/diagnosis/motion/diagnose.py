@@ -16,15 +16,16 @@ from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit
-from armlab.diagnosis.motion.couple import couple_joints
-from armlab.diagnosis.motion.estimate import fit_servo, settle, thin_windows
+from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
+from armlab.diagnosis.motion.choose import ChosenServo, first_fit
+from armlab.diagnosis.motion.couple import coupled_windows
+from armlab.diagnosis.motion.estimate import settle
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.joint_replay import joint_errors
-from armlab.diagnosis.motion.payload import PayloadFit, estimate_mass, find_payload
+from armlab.diagnosis.motion.payload import JointModel, Payload, estimate_mass, weigh_tool
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
-from armlab.diagnosis.motion.servo import LOWEST, PARAMETERS, ServoParameter, Servos, place
+from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
@@ -32,7 +33,6 @@ from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
 
-HOLDING_GAIN = 100.0  # N m/rad, of a still joint whose gain is not known: it stays where it is
 NO_SERVO = "no joint follows its command as a position servo does: check the columns, or the controller is another"
 Status = Literal["mismatch", "none", "inconclusive"]
 
@@ -144,77 +144,36 @@ def diagnose_motion(
         progress("finding the clock of the drives")
         learned = hold_commands(learned, given, firsts, tuning)
         simulation = replace(given, rate_hz=None)
-    windows, chosen = fit_joints(learned, simulation, firsts, progress, tuning)
-    if not any(chosen):
+    bare = fit_arm(learned, simulation, firsts, progress, tuning)
+    if not any(bare.chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("weighing the tool")
-    fits = [
-        None if each is None else each.without_extras(joint, tuning)
-        for joint, each in zip(windows, chosen, strict=True)
-    ]
-    payload = find_payload(windows, fits, len(windows) * len(PARAMETERS), tuning)
-    loaded = None if payload is None else simulation.with_payload(payload.mass)
-    if loaded is not None and loaded.is_physical():
-        simulation, firsts = loaded, [None if fit is None else fit.values for fit in fits]
-        windows, chosen = fit_joints(learned, simulation, firsts, progress, tuning)
+    loaded = weigh_tool(learned, bare, progress, tuning)
     progress("replaying held-out runs")
-    values = [None if each is None else each.fit.values for each in chosen]
-    if held:
-        held_out = hold_commands(held_out, given, values, tuning)
-    judged = coupled_windows(held_out, simulation, values, tuning)
-    found = simulation, payload if simulation.payload else None
-    bare = replace(given, rate_hz=simulation.rate_hz)
-    concluded = _conclude(recording, bare, found, (windows, judged), chosen, held_out, tuning)
+
+    def judged_windows(fit: ArmFit) -> tuple[list[MotionRun], list[Windows]]:
+        """The held-out runs with the commands that the drives take, and the windows of each joint."""
+        taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
+        return taken, coupled_windows(taken, fit.simulation, fit.values, tuning)
+
+    fit, payload = loaded or (bare, None)
+    taken, judged = judged_windows(fit)
+    if payload is not None:
+        without, with_it = _errors_without_and_with(payload, fit, judged)
+        if without <= with_it:
+            fit, payload = bare, None
+            taken, judged = judged_windows(fit)
+    fit = replace(fit, chosen=_place_damping(fit, judged, tuning))
+    bare_simulation = replace(given, rate_hz=simulation.rate_hz)
+    concluded = _conclude(recording, bare_simulation, (fit, payload), judged, taken, tuning)
     if concluded.servos is None:
         return concluded
     return replace(
         concluded,
         simulation=replace(concluded.simulation, rate_hz=given.rate_hz),
-        odd=tuple(_odd_stretches(learned, chosen, tuning)),
+        odd=tuple(_odd_stretches(learned, concluded.chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
-
-
-def fit_joints(
-    runs: Sequence[MotionRun],
-    simulation: ServoSimulation,
-    starts: Sequence[Array | None],
-    progress: Callable[[str], None],
-    tuning: MotionTuning = DEFAULT,
-) -> tuple[list[Windows], list[ChosenServo | None]]:
-    """The windows and the servo of each joint; None for one that stands still or follows no servo.
-
-    starts: numbers, (parameters,) of each joint, with which the arm is replayed; None for a joint that stands still.
-    """
-    windows, chosen = coupled_windows(runs, simulation, starts, tuning), list[ChosenServo | None]()
-    looks = len(windows) * len(PARAMETERS)
-    for number, joint in enumerate(windows):
-        progress(f"fitting joint {number + 1} of {len(windows)}")
-        moves = starts[number] is not None
-        fitted = choose_servo(joint, simulation.nominal.values[number], looks, tuning) if moves else None
-        chosen.append(fitted if fitted is not None and _explains(joint, fitted, tuning) else None)
-    return windows, chosen
-
-
-def coupled_windows(
-    runs: Sequence[MotionRun],
-    simulation: ServoSimulation,
-    fitted: Sequence[Array | None],
-    tuning: MotionTuning = DEFAULT,
-) -> list[Windows]:
-    """Windows of each joint whose loads come from a replay of the arm with fitted numbers, (parameters,) a joint."""
-    motions = couple_joints(runs, simulation, _fill_servos(simulation, fitted), tuning)
-    return make_windows(runs, simulation, tuning, motions)
-
-
-def _fill_servos(simulation: ServoSimulation, fitted: Sequence[Array | None]) -> Servos:
-    """Fitted numbers, (parameters,) a joint; those of the simulation for a joint without, or of a drive that holds."""
-    known = simulation.nominal.values
-    rows = [
-        values if values is not None else np.where(np.isnan(known[number]), HOLDING_GAIN, known[number])
-        for number, values in enumerate(fitted)
-    ]
-    return Servos(np.stack(rows))
 
 
 def reason_unusable(recording: MotionRecording) -> str | None:
@@ -242,32 +201,40 @@ def split_runs(
     return learned, held_out
 
 
-def _explains(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bool:
-    """Whether the command explains the motion: a servo without gain, the rest fitted anew, does much worse."""
-    few = thin_windows(windows, tuning.max_start_windows)
-    free, values = chosen.fit.free.copy(), chosen.fit.values.copy()
-    free[place("kp")], values[place("kp")] = False, LOWEST[place("kp")]
-    passive = fit_servo(few, values, free, tuning.max_evaluations)
-    few = few.with_integral(chosen.fit.integral)
-    return _rms(joint_errors(few, chosen.fit.values)[0]) < tuning.max_unexplained * passive.rms
+def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
+    """The servos with a change of damping in joint or drive, whichever the held-out windows tell.
+
+    The torque limit acts on that of the drive alone. The windows that identify have to allow both.
+    """
+    out: list[ChosenServo | None] = []
+    for each, learned, held in zip(fit.chosen, fit.windows, judged, strict=True):
+        inside = None if each is None else each.with_damping_inside()
+        if each is not None and inside is not None:
+            sound = learned.select(np.setdiff1d(np.arange(learned.count), each.odd)).with_integral(each.fit.integral)
+            own, other = (_rms(joint_errors(sound, one.fit.values)[0]) for one in (each, inside))
+            allowed = other**2 * (1 - tuning.min_gain) <= own**2
+            if allowed and _rms(_settled_errors(held, inside.fit.values)) < _rms(
+                _settled_errors(held, each.fit.values)
+            ):
+                each = inside
+        out.append(each)
+    return out
 
 
 def _conclude(
     recording: MotionRecording,
     given: ServoSimulation,
-    found: tuple[ServoSimulation, PayloadFit | None],
-    windows: tuple[Sequence[Windows], Sequence[Windows]],
-    chosen: Sequence[ChosenServo | None],
+    found: tuple[ArmFit, Payload | None],
+    judged: Sequence[Windows],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning,
 ) -> MotionDiagnosis:
     """Findings, replays and errors.
 
-    given: the simulation to be judged; found: that with the payload found. windows: of the runs that identify, and of
-    those that are held out.
+    given: the simulation to be judged; found: servos and payload. judged: windows of the held-out runs.
     """
-    learned, judged = windows
-    simulation, payload = found
+    fit, payload = found
+    simulation, chosen, learned = fit.simulation, fit.chosen, fit.windows
     named = [
         [] if each is None else name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
         for number, each in enumerate(chosen)
@@ -280,7 +247,7 @@ def _conclude(
     servos, after, named = replay_named(simulation, chosen, named, before, held_out)
     findings = [finding for own in named for finding in own]
     if payload is not None:
-        findings.append(_name_payload(payload, servos, (learned, judged), chosen, tuning))
+        findings.append(_name_payload(payload, fit, judged, tuning))
     errors = tuple(
         _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
@@ -393,90 +360,117 @@ def name_differences(
     after = _rms(_settled_errors(judged, fit.values))
     found = []
     for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
-        parameter, nominal = PARAMETERS[place_of], float(chosen.nominal[place_of])
-        if low[place_of] <= nominal <= high[place_of] or (np.isfinite(nominal) and _rms(error) < after):
+        parameter = PARAMETERS[place_of]
+        fitted, ends = float(fit.values[place_of]), (float(low[place_of]), float(high[place_of]))
+        said = _named(parameter, fitted, ends, float(chosen.nominal[place_of]))
+        if parameter.key == "damping":
+            said = _name_damping(chosen, simulation.nominal.values[number])
+        if said.ends[0] <= said.nominal <= said.ends[1] or (np.isfinite(said.nominal) and _rms(error) < after):
             continue
-        ends_of, fitted = (float(low[place_of]), float(high[place_of])), float(fit.values[place_of])
-        kd = float(simulation.nominal.get("kd")[number])
-        if parameter.key == "damping" and unknown_gain:  # of joint and drive together
-            within = float(fit.values[place("kd")])
-            fitted, ends_of = fitted + within, (ends_of[0] + within, ends_of[1] + within)
-        effect, name, value, ends = _named(parameter, fitted, ends_of, kd)
         rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in confused[place_of]))
         rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
-        if effect != parameter.effect:
+        if said.effect != parameter.effect:
             rivals = (parameter.effect, *rivals)
         found.append(
             ServoFinding(
                 parameter=parameter,
-                effect=effect,
-                name=name,
+                effect=said.effect,
+                name=said.name,
                 joint=number + 1,
-                value=value,
-                interval=ends,
-                nominal=kd if name == "kd" else nominal,
-                before=_rms(error) if np.isfinite(nominal) else _rms(_command_error(judged)),
+                value=said.value,
+                interval=said.ends,
+                nominal=said.nominal,
+                before=_rms(error) if np.isfinite(said.nominal) else _rms(_command_error(judged)),
                 after=after,
-                p_value=min(gain.p_value * len(simulation.joints) * len(PARAMETERS), 1.0),
-                rivals=tuple(dict.fromkeys(each for each in rivals if each != effect)),
+                p_value=min(gain.p_value * number_of_tests(len(simulation.joints)), 1.0),
+                rivals=tuple(dict.fromkeys(each for each in rivals if each != said.effect)),
             )
         )
     return found
 
 
-def _name_payload(
-    payload: PayloadFit,
-    servos: Servos,
-    windows: tuple[Sequence[Windows], Sequence[Windows]],
-    chosen: Sequence[ChosenServo | None],
-    tuning: MotionTuning,
-) -> ServoFinding:
+def _name_payload(payload: Payload, fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> ServoFinding:
     """The mass at the tool, fitted once more beside the numbers that each joint's servo has in the end."""
-    learned, judged = windows
-    pairs = [
-        (joint.with_integral(each.fit.integral), each.fit)
-        for joint, each in zip(learned, chosen, strict=True)
+    models = [
+        JointModel(joint.with_integral(each.fit.integral), each.fit.values, each.fit.free)
+        for joint, each in zip(fit.windows, fit.chosen, strict=True)
         if each is not None
     ]
-    more, error = estimate_mass(pairs, tuning)
+    more, error = estimate_mass(models, tuning)
     parameter, half = PARAMETERS[place("payload")], float(student.ppf(0.975, max(payload.windows - 1, 1))) * error
-    lighter = servos.values.copy()
-    lighter[:, place("payload")] = -payload.mass
-    errors = [
-        np.concatenate([_settled_errors(joint, row) for joint, row in zip(judged, values, strict=True)])
-        for values in (lighter, servos.values)
-    ]
-    mass = payload.mass + more
+    before, after = _errors_without_and_with(payload, fit, judged)
+    mass = fit.simulation.payload + more
     return ServoFinding(
         parameter=parameter,
         effect=parameter.effect,
         name=parameter.name,
-        joint=len(learned),
+        joint=len(judged),
         value=mass,
         interval=(mass - half, mass + half),
         nominal=0.0,
-        before=_rms(errors[0]),
-        after=_rms(errors[1]),
-        p_value=min(payload.gain.p_value * len(learned) * len(PARAMETERS), 1.0),
+        before=before,
+        after=after,
+        p_value=min(payload.gain.p_value * number_of_tests(len(judged)), 1.0),
         rivals=parameter.rivals,
     )
 
 
-def _named(
-    parameter: ServoParameter, value: float, ends: tuple[float, float], kd: float
-) -> tuple[str, str, float, tuple[float, float]]:
-    """Effect, name, value and interval of a difference, where the sign or the simulation decides the name."""
-    low, high = float(ends[0]), float(ends[1])
-    if parameter.key == "damping" and high < kd:  # friction cannot be negative: the gain kd is too large
-        return "controller_gain_error", "kd", float(value), (0.0, high)
+def _errors_without_and_with(payload: Payload, fit: ArmFit, judged: Sequence[Windows]) -> tuple[float, float]:
+    """Error on held-out windows of the joints that carry a mass at the tool, without and with it, rad."""
+    joints = [(judged[number], fit.values[number]) for number in payload.squares]
+    errors = []
+    for mass in (-fit.simulation.payload, 0.0):
+        rows = [(joint, _with_payload(values, mass)) for joint, values in joints if values is not None]
+        errors.append(_rms(np.concatenate([_settled_errors(joint, values) for joint, values in rows])))
+    return errors[0], errors[1]
+
+
+def _with_payload(values: Array, mass: float) -> Array:
+    changed = values.copy()
+    changed[place("payload")] = mass
+    return changed
+
+
+@dataclass(frozen=True)
+class _Said:
+    """How a difference is named: effect, name of the number, its value and interval, and that of the simulation."""
+
+    effect: str
+    name: str
+    value: float
+    ends: tuple[float, float]
+    nominal: float
+
+
+def _named(parameter: ServoParameter, value: float, ends: tuple[float, float], nominal: float) -> _Said:
     if parameter.key == "delay" and value < 0:  # what is early is read late
-        return "channel_skew", "seconds", -float(value), (-high, -low)
-    return parameter.effect, parameter.name, float(value), (low, high)
+        return _Said("channel_skew", "seconds", -value, (-ends[1], -ends[0]), nominal)
+    return _Said(parameter.effect, parameter.name, value, ends, nominal)
+
+
+def _name_damping(chosen: ChosenServo, given: Array) -> _Said:
+    """The damping of a joint beside the simulation's kd, or another kd. given: numbers of the simulation.
+
+    With an unknown kp, it is that of joint and drive together. Friction is not negative: below none, kd is too large.
+    """
+    kd, damping = place("kd"), place("damping")
+    values, nominal = chosen.fit.values, float(given[damping])
+    half = float(chosen.fit.interval()[1, damping] - values[damping])
+    value = float(values[damping] + values[kd] - given[kd])
+    if values[kd] != chosen.nominal[kd] and np.isfinite(given[place("kp")]):
+        found = value - nominal + float(given[kd])
+        return _Said("controller_gain_error", "kd", found, (max(found - half, 0.0), found + half), float(given[kd]))
+    if value + half < 0:
+        found = value + float(given[kd])
+        return _Said("controller_gain_error", "kd", found, (0.0, found + half), float(given[kd]))
+    return _Said("viscous_friction", "coefficient", value, (max(value - half, 0.0), value + half), nominal)
 
 
 def _with_nominal(values: Array, nominal: Array, number: int) -> Array:
     changed = values.copy()
     changed[number] = nominal[number] if np.isfinite(nominal[number]) else values[number]
+    if number == place("damping"):
+        changed[place("kd")] = nominal[place("kd")]
     return changed
 
 
@@ -518,7 +512,7 @@ def _errors(
     )
     return JointError(
         joint=number + 1,
-        before=_rms(_settled_errors(judged, nominal)) if known else None,
+        before=_rms(_settled_errors(judged, _with_payload(nominal, -simulation.payload))) if known else None,
         after=_rms(_settled_errors(judged, servos.values[number])),
         replay_before=float(joint_rms(before)[number]) if before else None,
         replay_after=float(joint_rms(after)[number]),

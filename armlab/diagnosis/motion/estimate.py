@@ -120,7 +120,9 @@ def fit_servo(
         ).x
     moved, values = whole(part)
     errors = joint_errors(moved, values)[0]
-    covariance = _block_covariance(slopes(part), errors, windows.window)[: len(chosen), : len(chosen)]
+    covariance = np.zeros((0, 0))
+    if len(chosen):
+        covariance = _block_covariance(slopes(part), errors, windows.window)[: len(chosen), : len(chosen)]
     rms = float(np.sqrt(np.mean(errors**2)))
     return ServoFit(values, free, covariance, rms, windows.count, moved.integral)
 

@@ -1,107 +1,242 @@
-"""A mass at the tool that the simulation does not have: one number for all joints, with the usual ones of each free.
+"""A mass at the tool that the simulation does not have: one number that explains the motion of several joints.
 
 At one joint a mass looks like another gain, damping and friction. It loads all joints that carry the tool, in shares of
 gravity and inertia that follow from its place. With m_j and its variance from the fit of joint j,
 
     mass = sum_j (m_j / var_j) / sum_j (1 / var_j)
+
+The arm is replayed anew with each mass, because it moves the joints that push each other.
+
+A mass competes with servos that differ from the simulation. Both models are judged on windows that took no part, with
+the numbers that are named free and all others as in the simulation. k numbers cost
+
+    sum_j log(mean squared error of joint j) - k log(1 - min_gain)
+
+so that each number has to take as much off the error as one of a servo. The mass alone is tried first, with the servos
+of the simulation where it has them, then the mass beside the numbers that were named without it.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.motion.choose import Gain, find_odd_windows, gain_over_windows, is_finding
-from armlab.diagnosis.motion.estimate import ServoFit, fit_servo, thin_windows
-from armlab.diagnosis.motion.joint_replay import joint_errors
+from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
+from armlab.diagnosis.motion.choose import (
+    ChosenServo,
+    Gain,
+    errors_on_other_half,
+    gain_over_windows,
+    is_finding,
+    learned_errors,
+)
+from armlab.diagnosis.motion.couple import coupled_windows
+from armlab.diagnosis.motion.estimate import fit_servo, thin_windows
 from armlab.diagnosis.motion.servo import place
+from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
+from armlab.recordings.recording import MotionRun
 
 MIN_WORK = 1e-9  # N m per kg, or kg m2 per kg: below it a joint does not carry the tool
 
 
-@dataclass(frozen=True)
-class PayloadFit:
-    """A mass at the tool, kg. error: its standard error. windows: number of blocks. gain: on windows that took no part,
-    of errors over the noise of each joint."""
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """A joint in windows, with numbers (parameters,) of which some are free."""
 
-    mass: float
+    windows: Windows
+    values: Array
+    free: NDArray[np.bool_]
+
+    def loaded(self, mass: float) -> Array:
+        """The numbers with a mass at the tool beside that of the windows, kg."""
+        values = self.values.copy()
+        values[place("payload")] = mass
+        return values
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A mass at the tool.
+
+    simulation: with the mass; error: its standard error, kg; windows: number of blocks; squares: mean squared error of
+    each joint that carries it, rad2, and gain: both on windows that took no part, the gain of errors over the noise.
+    """
+
+    simulation: ServoSimulation
     error: float
     windows: int
+    squares: dict[int, float]
     gain: Gain
 
 
+def weigh_tool(
+    runs: Sequence[MotionRun],
+    bare: ArmFit,
+    progress: Callable[[str], None],
+    tuning: MotionTuning = DEFAULT,
+) -> tuple[ArmFit, Payload] | None:
+    """The arm with a mass at the tool; None where servos alone explain the motion as well at less cost.
+
+    bare: the fit of the servos alone.
+    """
+    for models, starts in _hypotheses(bare):
+        found = find_payload(runs, replace(bare, starts=starts), models, tuning)
+        if found is None or not _can_pay(found, bare, tuning):
+            continue
+        loaded = fit_arm(runs, found.simulation, starts, progress, tuning)
+        again = find_payload(runs, loaded, named_models(loaded), tuning)
+        if again is not None and abs(again.simulation.payload - found.simulation.payload) > again.error:
+            loaded = fit_arm(runs, again.simulation, starts, progress, tuning)
+            again = find_payload(runs, loaded, named_models(loaded), tuning)
+        if again is not None and _cost(loaded, bare, tuning) < _cost(bare, loaded, tuning):
+            return loaded, again
+    return None
+
+
+def named_models(fit: ArmFit) -> list[JointModel | None]:
+    """Each joint with the numbers that are named free, and all others as in the simulation; None without a servo."""
+    return [
+        None if each is None else JointModel(joint.with_integral(each.fit.integral), *each.named)
+        for joint, each in zip(fit.windows, fit.chosen, strict=True)
+    ]
+
+
+def _hypotheses(bare: ArmFit) -> Iterator[tuple[list[JointModel | None], Sequence[Array | None]]]:
+    """What may stand beside a mass: the simulation's servos where it has them, and those that were named.
+
+    Each with the numbers with which the arm is replayed.
+    """
+    nominal = bare.simulation.nominal.values
+    named = named_models(bare)
+    if all(np.isfinite(row).all() for row, each in zip(nominal, named, strict=True) if each is not None):
+        none = np.zeros(nominal.shape[1], dtype=bool)
+        alone = [
+            None if each is None else JointModel(each.windows, row.copy(), none)
+            for row, each in zip(nominal, named, strict=True)
+        ]
+        yield alone, [None if each is None else each.values for each in alone]
+    if any(each is not None and each.free.any() for each in named):
+        yield named, bare.starts
+
+
 def find_payload(
-    windows: Sequence[Windows], fits: Sequence[ServoFit | None], looks: int, tuning: MotionTuning = DEFAULT
-) -> PayloadFit | None:
+    runs: Sequence[MotionRun], fit: ArmFit, models: Sequence[JointModel | None], tuning: MotionTuning = DEFAULT
+) -> Payload | None:
     """The mass that explains the motion of all joints better, None without one.
 
-    fits: of each joint, None for one that stands still. looks: number of tests in the diagnosis.
+    fit: whose windows are looked at first, and with whose starts the arm is replayed. models: of each joint, in these
+    windows.
     """
-    carried = [
-        (joint, fit) for joint, fit in zip(windows, fits, strict=True) if fit is not None and _carries_tool(joint)
-    ]
-    if not carried:
-        return None
-    odd = np.unique(np.concatenate([find_odd_windows(joint, fit.values, tuning) for joint, fit in carried]))
-    sound = np.setdiff1d(np.arange(windows[0].count), odd)
-    few = [
-        (thin_windows(joint.select(sound), tuning.max_judged_windows).with_integral(fit.integral), fit)
-        for joint, fit in carried
-    ]
-    without, with_it = (_errors_on_other_half(few, loaded, tuning) for loaded in (False, True))
-    gain = gain_over_windows(len(few[0][0].position), without.sum(axis=0), with_it.sum(axis=0))
-    share = float(np.max(1 - with_it.sum(axis=1) / without.sum(axis=1)))
-    gain = Gain(share, gain.p_value, gain.rms_without, gain.rms_with)
-    if not is_finding(gain, looks, tuning):
-        return None
-    mass, error = estimate_mass(few, tuning)
-    return PayloadFit(mass, error, few[0][0].count, gain)
+    simulation, odd = fit.simulation, _odd_windows(fit.chosen)
+    for remaining in reversed(range(tuning.payload_replays)):
+        joints = {
+            number: JointModel(_sound(each.windows, odd, tuning), each.values, each.free)
+            for number, each in enumerate(models)
+            if each is not None and _carries_tool(each.windows)
+        }
+        if not joints:
+            return None
+        without, with_it = _errors_without_and_with(list(joints.values()), simulation.payload, tuning)
+        gain = _gain_of_all(joints, without, with_it)
+        if not is_finding(gain, number_of_tests(len(models)), tuning):
+            return None
+        more, error = estimate_mass(list(joints.values()), tuning)
+        simulation = simulation.with_payload(more)
+        if not simulation.is_physical():
+            return None
+        if abs(more) < 0.5 * error or not remaining:
+            break
+        windows = coupled_windows(runs, simulation, fit.starts, tuning)
+        models = [
+            None if each is None else JointModel(joint.with_integral(each.windows.integral), each.values, each.free)
+            for joint, each in zip(windows, models, strict=True)
+        ]
+    squares = dict(zip(joints, with_it.mean(axis=1).tolist(), strict=True))
+    return Payload(simulation, error, without.shape[1], squares, gain)
 
 
-def estimate_mass(joints: Sequence[tuple[Windows, ServoFit]], tuning: MotionTuning = DEFAULT) -> tuple[float, float]:
-    """A mass at the tool and its standard error, kg, beside the free parameters of each joint's fit."""
+def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning = DEFAULT) -> tuple[float, float]:
+    """A mass at the tool beside that of the windows, and its standard error, kg."""
     weights, masses = [], []
-    for windows, fit in joints:
-        free = fit.free.copy()
+    for joint in joints:
+        free = joint.free.copy()
         free[place("payload")] = True
-        found = fit_servo(windows, fit.values, free, tuning.refit_evaluations)
+        found = fit_servo(joint.windows, joint.values, free, tuning.refit_evaluations)
         weights.append(1 / max(float(found.standard_errors()[place("payload")]) ** 2, 1e-300))
         masses.append(float(found.values[place("payload")]))
     return float(np.average(masses, weights=weights)), float(1 / np.sqrt(np.sum(weights)))
 
 
-def _carries_tool(windows: Windows) -> bool:
-    return max(float(np.abs(windows.unit_load).max()), float(np.abs(windows.unit_inertia).max())) > MIN_WORK
+def _errors_without_and_with(joints: Sequence[JointModel], mass: float, tuning: MotionTuning) -> tuple[Array, Array]:
+    """Squared errors (joints, windows) without a payload and with one, each by numbers learned on the other half.
 
-
-def _errors_on_other_half(joints: Sequence[tuple[Windows, ServoFit]], loaded: bool, tuning: MotionTuning) -> Array:
-    """Squared errors over the joint's variance, (joints, windows), by numbers that were learned on the other half."""
-    count = joints[0][0].count
-    squares = np.zeros((len(joints), count))
+    mass: of the windows, kg.
+    """
+    count = joints[0].windows.count
+    without, with_it = np.zeros((len(joints), count)), np.zeros((len(joints), count))
     for first in (0, 1):
         train, test = np.arange(first, count, 2), np.arange(1 - first, count, 2)
-        learned = [(windows.select(train), fit) for windows, fit in joints]
-        mass = estimate_mass(learned, tuning)[0] if loaded else 0.0
-        for row, (windows, fit) in enumerate(joints):
-            squares[row, test] = _judge(windows, (train, test), fit, mass, tuning) / fit.rms**2
-    return squares
+        halves = [(joint.windows.select(train), joint.windows.select(test)) for joint in joints]
+        learned = [JointModel(half, joint.values, joint.free) for joint, (half, _) in zip(joints, halves, strict=True)]
+        more = estimate_mass(learned, tuning)[0]
+        for row, (joint, parts) in enumerate(zip(joints, halves, strict=True)):
+            without[row, test] = learned_errors(parts, joint.loaded(-mass), joint.free, tuning)
+            with_it[row, test] = learned_errors(parts, joint.loaded(more), joint.free, tuning)
+    return without, with_it
 
 
-def _judge(
-    windows: Windows,
-    halves: tuple[NDArray[np.intp], NDArray[np.intp]],
-    fit: ServoFit,
-    mass: float,
-    tuning: MotionTuning,
-) -> Array:
-    """Squared error of each window of the second half, with a mass and numbers that were fitted on the first."""
-    train, test = halves
-    values = fit.values.copy()
-    values[place("payload")] = mass
-    learned = fit_servo(windows.select(train), values, fit.free, tuning.refit_evaluations)
-    judged = windows.select(test).with_integral(learned.integral)
-    return np.asarray(np.bincount(judged.window, joint_errors(judged, learned.values)[0] ** 2, len(test)), dtype=float)
+def _gain_of_all(joints: dict[int, JointModel], without: Array, with_it: Array) -> Gain:
+    """What a mass is worth over all joints, of errors over the noise. share: at the joint that gains most."""
+    noise = np.maximum(with_it.mean(axis=1, keepdims=True), 1e-300)
+    samples = sum(len(joint.windows.position) for joint in joints.values())
+    gain = gain_over_windows(samples, (without / noise).sum(axis=0), (with_it / noise).sum(axis=0))
+    share = float(np.max(1 - with_it.sum(axis=1) / np.maximum(without.sum(axis=1), 1e-300)))
+    return replace(gain, share=share)
+
+
+def _can_pay(found: Payload, bare: ArmFit, tuning: MotionTuning) -> bool:
+    """Whether a mass can cost less than servos alone: a joint that it leaves worse needs one number more at least."""
+    odd = _odd_windows(bare.chosen)
+    price = -np.log(1 - tuning.min_gain)
+    least, spent = price, 0.0
+    for number, model in enumerate(named_models(bare)):
+        if number in found.squares and model is not None:
+            own = _mean_square(JointModel(_sound(model.windows, odd, tuning), model.values, model.free), tuning)
+            left = found.squares[number]
+            least += np.log(min(left, own)) + (price if left > own / (1 - tuning.min_gain) else 0.0)
+            spent += np.log(own) + price * int(model.free.sum())
+    return bool(least < spent)
+
+
+def _cost(fit: ArmFit, other: ArmFit, tuning: MotionTuning) -> float:
+    """Cost of a model on the windows that neither of two models calls odd."""
+    price = -float(np.log(1 - tuning.min_gain))
+    cost = price if fit.simulation.payload else 0.0
+    for model, one, two in zip(named_models(fit), fit.chosen, other.chosen, strict=True):
+        if model is not None and two is not None:
+            sound = _sound(model.windows, _odd_windows([one, two]), tuning)
+            square = _mean_square(JointModel(sound, model.values, model.free), tuning)
+            cost += float(np.log(square)) + price * int(model.free.sum())
+    return cost
+
+
+def _mean_square(model: JointModel, tuning: MotionTuning) -> float:
+    """Mean squared error of the windows, by numbers that were learned on the other half."""
+    return max(float(np.mean(errors_on_other_half(model.windows, model.values, model.free, tuning))), 1e-300)
+
+
+def _odd_windows(chosen: Sequence[ChosenServo | None]) -> NDArray[np.intp]:
+    """Windows that some servo does not explain."""
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.intp), *(each.odd for each in chosen if each is not None)]))
+
+
+def _sound(windows: Windows, odd: NDArray[np.intp], tuning: MotionTuning) -> Windows:
+    return thin_windows(windows.select(np.setdiff1d(np.arange(windows.count), odd)), tuning.max_judged_windows)
+
+
+def _carries_tool(windows: Windows) -> bool:
+    return max(float(np.abs(windows.unit_load).max()), float(np.abs(windows.unit_inertia).max())) > MIN_WORK

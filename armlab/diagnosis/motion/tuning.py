@@ -70,6 +70,12 @@ class MotionTuning:
         meaning="parameters that are fitted in each round, of those that a linear model gains most from",
         least=1,
     )
+    limit_levels: tuple[float, ...] = tuned(
+        (0.4, 0.6, 0.75, 0.9),
+        unit="of the limit, or of the torque that a drive without one reaches",
+        meaning="starts of a torque limit: it may cut a little or much",
+    )
+    payload_replays: int = tuned(3, unit="replays", meaning="most replays of the arm for one payload", least=1)
     min_gain: float = tuned(
         0.02,
         unit="of the squared error",

@@ -1,0 +1,89 @@
+"""Choices between servos: starts of a limit, and damping in the joint or in the drive."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armlab.diagnosis.motion.choose import ChosenServo, Gain, first_guesses
+from armlab.diagnosis.motion.estimate import ServoFit
+from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, USUAL, Key, place
+from armlab.diagnosis.motion.windows import Windows
+
+GAIN = Gain(share=0.5, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
+
+
+def numbers(**values: float) -> np.ndarray:
+    out = NEUTRAL.copy()
+    for key, value in values.items():
+        out[KEYS.index(key)] = value
+    return out
+
+
+def chosen_servo(nominal: np.ndarray, *named: Key, **fitted: float) -> ChosenServo:
+    """A servo whose numbers are those of the simulation but for the fitted ones."""
+    values = nominal.copy()
+    for key, value in fitted.items():
+        values[KEYS.index(key)] = value
+    fit = ServoFit(values, np.array(USUAL), np.eye(sum(USUAL)) * 1e-4, 1e-3, 24, np.zeros(1))
+    return ChosenServo(nominal, fit, {place(key): GAIN for key in named}, np.zeros(0, dtype=np.intp))
+
+
+def test_a_change_of_damping_goes_into_the_drive_as_a_whole() -> None:
+    nominal = numbers(kp=8.0, kd=0.3, damping=0.1, friction=0.05)
+    inside = chosen_servo(nominal, "damping", damping=0.25).with_damping_inside()
+    assert inside is not None
+    assert inside.fit.values[[place("kd"), place("damping")]] == pytest.approx([0.45, 0.1])
+    assert inside.with_damping_inside() is None
+
+
+def test_damping_stays_where_it_is_without_a_change_and_where_kd_would_be_negative() -> None:
+    nominal = numbers(kp=8.0, kd=0.1, damping=0.3, friction=0.05)
+    assert chosen_servo(nominal, damping=0.35).with_damping_inside() is None
+    assert chosen_servo(nominal, "damping", damping=0.1).with_damping_inside() is None
+
+
+def test_named_numbers_alone_differ_from_the_simulation() -> None:
+    values, free = chosen_servo(numbers(kp=8.0, friction=0.05), "friction", kp=9.0, friction=0.08).named
+    assert values[[place("kp"), place("friction")]] == pytest.approx([8.0, 0.08])
+    assert [KEYS[each] for each in np.flatnonzero(free)] == ["friction"]
+
+
+def test_a_fit_of_a_torque_limit_starts_below_that_of_the_simulation(still: Windows) -> None:
+    known = numbers(kp=20.0, limit=3.0)
+    assert [each[place("limit")] for each in first_guesses(still, known, place("limit"))] == pytest.approx(
+        [1.2, 1.8, 2.25, 2.7]
+    )
+    weak = replace(still, measured=still.measured + 0.95)
+    reached = [each[place("limit")] for each in first_guesses(weak, known, place("limit"))]
+    assert reached == pytest.approx([0.4, 0.6, 0.75, 0.9])
+
+
+@pytest.fixture
+def still() -> Windows:
+    """One window of a joint that stands 1 rad from its command."""
+    steps, none = 10, np.zeros((1, 10))
+    integers = np.zeros(1, dtype=np.int64)
+    return Windows(
+        step_s=1e-3,
+        history=0,
+        command=np.zeros((1, steps)),
+        inertia=none + 0.1,
+        load=none,
+        slope=none,
+        unit_inertia=none,
+        unit_load=none,
+        unit_slope=none,
+        measured=none - 1.0,
+        supply=None,
+        first_velocity=np.zeros(1),
+        run=integers,
+        start=integers,
+        path_command=none,
+        path_measured=none,
+        integral=np.zeros(1),
+        begin=np.array([0, 1]),
+        row=integers,
+        fraction=np.zeros(1),
+        position=np.zeros(1),
+    )
