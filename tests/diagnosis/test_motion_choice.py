@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armlab.diagnosis.motion.choose import ChosenServo, Gain, first_guesses
+from armlab.diagnosis.motion.choose import ChosenServo, Gain, chance_of_gain, first_guesses
 from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows
@@ -57,6 +57,12 @@ def test_a_fit_of_a_torque_limit_starts_below_that_of_the_simulation(still: Wind
     weak = replace(still, measured=still.measured + 0.95)
     reached = [each[place("limit")] for each in first_guesses(weak, known, place("limit"))]
     assert reached == pytest.approx([0.4, 0.6, 0.75, 0.9])
+
+
+def test_windows_at_rest_do_not_make_a_gain_less_sure() -> None:
+    gains = np.arange(1.0, 17.0)
+    assert chance_of_gain(np.append(gains, 0.0)) == pytest.approx(2.0**-16)
+    assert chance_of_gain(np.zeros(4)) == 1.0
 
 
 @pytest.fixture

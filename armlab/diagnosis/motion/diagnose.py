@@ -150,22 +150,15 @@ def diagnose_motion(
     progress("weighing the tool")
     loaded = weigh_tool(learned, bare, progress, tuning)
     progress("replaying held-out runs")
-
-    def judged_windows(fit: ArmFit) -> tuple[list[MotionRun], list[Windows]]:
-        """The held-out runs with the commands that the drives take, and the windows of each joint."""
-        taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
-        return taken, coupled_windows(taken, fit.simulation, fit.values, tuning)
-
-    fit, payload = loaded or (bare, None)
-    taken, judged = judged_windows(fit)
-    if payload is not None:
-        without, with_it = _errors_without_and_with(payload, fit, judged)
-        if without <= with_it:
-            fit, payload = bare, None
-            taken, judged = judged_windows(fit)
-    fit = replace(fit, chosen=_place_damping(fit, judged, tuning))
     bare_simulation = replace(given, rate_hz=simulation.rate_hz)
-    concluded = _conclude(recording, bare_simulation, (fit, payload), judged, taken, tuning)
+    models: list[tuple[ArmFit, Payload | None]] = [(bare, None), *([] if loaded is None else [loaded])]
+    diagnoses = []
+    for fit, payload in models:
+        taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
+        judged = coupled_windows(taken, fit.simulation, fit.values, tuning)
+        placed = replace(fit, chosen=_place_damping(fit, judged, tuning))
+        diagnoses.append(_conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning))
+    concluded = min(diagnoses, key=lambda each: _held_out_cost(each, tuning))
     if concluded.servos is None:
         return concluded
     return replace(
@@ -219,6 +212,15 @@ def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning)
                 each = inside
         out.append(each)
     return out
+
+
+def _held_out_cost(diagnosis: MotionDiagnosis, tuning: MotionTuning) -> float:
+    """Of a model, as `weigh_tool` counts it, by the replay of the whole arm over the held-out runs."""
+    if diagnosis.servos is None:
+        return float("inf")
+    errors = np.array([each.replay_after for each in diagnosis.errors])
+    price = -np.log(1 - tuning.min_gain) * len(diagnosis.findings)
+    return float(2 * np.sum(np.log(np.maximum(errors, 1e-300))) + price)
 
 
 def _conclude(
