@@ -176,14 +176,21 @@ def _with_damping_inside(
 ) -> tuple[ServoFit, Array]:
     """The same, or the fit of an unknown drive whose damping acts within its torque limit, where that is better.
 
+    What the joint has beyond the simulation's damping goes into kd, again and again while that lowers the error.
     judged: squared error of each window. base: the simulation's numbers, with the damping of the joint.
     """
-    inside = fit.values.copy()
-    inside[place("kd")] = max(fit.values[place("damping")] - base[place("damping")], 0.0)
-    inside[place("damping")] -= inside[place("kd")]
-    other = fit_servo(windows, inside, fit.free, tuning.refit_evaluations)
-    errors = errors_on_other_half(windows, other.values, fit.free, tuning)
-    return (other, errors) if errors.sum() < judged.sum() else (fit, judged)
+    kd, damping = place("kd"), place("damping")
+    for _ in range(tuning.damping_rounds):
+        inside = fit.values.copy()
+        both = float(inside[kd] + inside[damping])
+        inside[kd] = max(both - float(base[damping]), 0.0)
+        inside[damping] = both - inside[kd]
+        other = fit_servo(windows, inside, fit.free, tuning.refit_evaluations)
+        errors = errors_on_other_half(windows, other.values, fit.free, tuning)
+        if errors.sum() >= judged.sum():
+            break
+        fit, judged = other, errors
+    return fit, judged
 
 
 def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
@@ -238,6 +245,8 @@ def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, A
         return gain_over_windows(len(windows.position), np.full(windows.count, np.inf), judged)
     fixed, held = fit.free.copy(), fit.values.copy()
     fixed[number], held[number] = False, base[number]
+    if number == place("damping"):  # of joint and drive together
+        held[place("kd")] = base[place("kd")]
     return gain_over_windows(len(windows.position), errors_on_other_half(windows, held, fixed, tuning), judged)
 
 

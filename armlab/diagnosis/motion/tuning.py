@@ -75,6 +75,9 @@ class MotionTuning:
         unit="of the limit, or of the torque that a drive without one reaches",
         meaning="starts of a torque limit: it may cut a little or much",
     )
+    damping_rounds: int = tuned(
+        6, unit="fits", meaning="most by which the damping of an unknown drive goes into its torque limit", least=1
+    )
     payload_replays: int = tuned(3, unit="replays", meaning="most replays of the arm for one payload", least=1)
     min_gain: float = tuned(
         0.02,
