@@ -82,7 +82,7 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
     start, nominal = _choose_damping(windows, nominal, free, tuning)
     base = fill_unknown(nominal)
     windows = windows.with_integral(start.integral)
-    odd = find_odd_windows(windows, start.values, tuning)
+    odd = _odd_with_any_limit(windows, start, tuning)
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
     few = thin_windows(sound, tuning.max_judged_windows)
     fit = fit_servo(few, start.values, free, tuning.max_evaluations)
@@ -137,6 +137,22 @@ def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEF
         return np.zeros(0, dtype=np.intp)
     odd = np.flatnonzero(sizes > tuning.odd_factor * np.median(sizes[moving]))
     return np.sort(odd[np.argsort(-sizes[odd])][: int(tuning.max_odd_share * windows.count)])
+
+
+def _odd_with_any_limit(windows: Windows, fit: ServoFit, tuning: MotionTuning) -> NDArray[np.intp]:
+    """Windows that are odd with a torque limit, too: a drive that pushes fully in a few windows is no contact."""
+    odd = find_odd_windows(windows, fit.values, tuning)
+    if len(odd) == 0:
+        return odd
+    spread = np.linspace(0, windows.count - 1, min(tuning.max_start_windows, windows.count)).astype(int)
+    few = windows.select(np.union1d(spread, odd))
+    starts = first_guesses(few, fit.values, place("limit"), tuning)
+    best = starts[int(np.argmin(np.sum(joint_errors(few, np.stack(starts)) ** 2, axis=1)))]
+    free = fit.free.copy()
+    free[place("limit")] = True
+    limited = fit_servo(few, best, free, tuning.refit_evaluations)
+    still = find_odd_windows(windows.with_integral(limited.integral), limited.values, tuning)
+    return np.intersect1d(odd, still)
 
 
 def _most_promising(
