@@ -6,7 +6,7 @@ in enough windows not to be chance. So a gain that was raised is one change, not
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,8 +103,9 @@ def compare_motion(
     changes: list[ServoChange] = []
     for joint, pair in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {joint + 1} of {len(old.joints)}")
+        same_kd = replace(tuning, damping_rounds=0)  # one kd for both recordings: that of the simulation
         fits = [
-            choose_servo(each, simulation.nominal.values[joint], looks, tuning)
+            choose_servo(each, simulation.nominal.values[joint], looks, same_kd)
             for each, simulation in zip(pair, simulations, strict=True)
         ]
         sound = [

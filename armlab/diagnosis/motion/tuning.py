@@ -76,7 +76,7 @@ class MotionTuning:
         meaning="starts of a torque limit: it may cut a little or much",
     )
     damping_rounds: int = tuned(
-        6, unit="fits", meaning="most by which the damping of an unknown drive goes into its torque limit", least=1
+        6, unit="fits", meaning="most by which the damping of an unknown drive goes into its torque limit", least=0
     )
     payload_replays: int = tuned(3, unit="replays", meaning="most replays of the arm for one payload", least=1)
     min_gain: float = tuned(
