@@ -240,7 +240,8 @@ def _other_half_errors(pair: Pair, model: _Model) -> Array:
             rows = np.arange(1 - first, each.count, 2)
             judged = each.select(rows)
             value = from_coordinates(learned.old + number * learned.change)
-            squares[number][rows] = np.bincount(judged.window, joint_errors(judged, value)[0] ** 2, len(rows))
+            with np.errstate(over="ignore"):  # a replay that runs away is as bad as can be
+                squares[number][rows] = np.bincount(judged.window, joint_errors(judged, value)[0] ** 2, len(rows))
     return np.concatenate(squares)
 
 
