@@ -105,8 +105,9 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
     sums = np.zeros((int(max(block.max() for block in rows.blocks)) + 1, len(gram)))
     for design, error, block in zip(rows.designs, rows.errors, rows.blocks, strict=True):
         np.add.at(sums, block, design * error[:, None])
-    meat = sums.T @ sums * count / max(count - 1, 1) + precision
-    spread = np.asarray(inverse @ meat @ inverse, dtype=np.float64)
+    # stretch by stretch, not by their squares: those of a direction that the prior alone holds would be rounding
+    shares = sums @ inverse * np.sqrt(count / max(count - 1, 1))
+    spread = np.asarray(shares.T @ shares + inverse @ precision @ inverse, dtype=np.float64)
     ratio = np.sqrt(np.maximum(np.diag(model), 0) / np.maximum(np.diag(spread), 1e-300))
     scale = np.maximum(ratio, 1.0)
     return BlockCovariance(np.asarray(spread * np.outer(scale, scale)), degrees)
