@@ -99,7 +99,8 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
     count = len(np.unique(np.concatenate(rows.blocks)))
     degrees = float(max(count - 1, 1))
     variance = sum(float(error @ error) for error in rows.errors) / max(sum(map(len, rows.errors)) - len(gram), 1)
-    model = np.asarray(inverse * max(variance, 1.0), dtype=np.float64)
+    held = inverse @ precision @ inverse  # by the prior, whatever the errors are
+    model = np.asarray(held + (inverse - held) * max(variance, 1.0), dtype=np.float64)
     if not robust:
         return BlockCovariance(model, degrees)
     sums = np.zeros((int(max(block.max() for block in rows.blocks)) + 1, len(gram)))
@@ -107,7 +108,7 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
         np.add.at(sums, block, design * error[:, None])
     # stretch by stretch, not by their squares: those of a direction that the prior alone holds would be rounding
     shares = sums @ inverse * np.sqrt(count / max(count - 1, 1))
-    spread = np.asarray(shares.T @ shares + inverse @ precision @ inverse, dtype=np.float64)
+    spread = np.asarray(shares.T @ shares + held, dtype=np.float64)
     ratio = np.sqrt(np.maximum(np.diag(model), 0) / np.maximum(np.diag(spread), 1e-300))
     scale = np.maximum(ratio, 1.0)
     return BlockCovariance(np.asarray(spread * np.outer(scale, scale)), degrees)

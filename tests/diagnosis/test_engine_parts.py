@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armlab.diagnosis.blocks import held_out_gain, variance_inflation
+from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.links import link_prior
@@ -157,3 +157,23 @@ def test_correlated_errors_widen_what_happens_once_as_they_do_on_the_average() -
     found = [variance_inflation(shape, each) for each in slow]
     assert np.mean(found) == pytest.approx(scatter, rel=0.15)
     assert np.mean([variance_inflation(shape, each) for each in white]) < 1.3
+
+
+def test_a_direction_that_the_prior_alone_holds_hides_no_other() -> None:
+    rng = np.random.default_rng(0)
+    forward = (rng.standard_normal(3000) > 0).astype(float)
+    speed = 100 * rng.standard_normal(3000)
+    blocks = np.arange(3000) // 100
+    noise = rng.standard_normal(3000) + 30 * rng.standard_normal(30)[blocks]
+    both, apart = np.column_stack([forward, 1 - forward]), (2 * forward - 1)[:, None]
+    weights = rng.uniform(0.5, 1.5, (3000, 1))
+    designs = [weights * np.column_stack([speed, np.ones(3000), part]) for part in (both, apart)]
+    chances = []
+    for design in designs:
+        errors = noise - design @ np.linalg.lstsq(design, noise, rcond=None)[0]
+        precision = 3e-12 * float(speed @ speed) * np.eye(design.shape[1])
+        covariance = block_covariance(WhitenedRows((design,), (errors,), (blocks,)), precision, robust=True)
+        values = np.array([3.0, -3.0]) if design.shape[1] == 4 else np.array([3.0])
+        chances.append(covariance.p_value(values, list(range(2, design.shape[1])), 1e5))
+    assert np.log(chances[0]) == pytest.approx(np.log(chances[1]), rel=0.25)
+    assert chances[0] < 1e-3
