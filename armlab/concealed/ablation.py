@@ -10,6 +10,7 @@ from typing import Any
 from joblib import Parallel, delayed
 
 from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.prove import FINISHED_MARK, make_development_proof
 from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.score.scoring import compute_score
@@ -90,19 +91,18 @@ def render_page(settings: AblationSettings, found: dict[str, dict[str, Any]]) ->
     """One table a tier, with one row for each guard that was off."""
     tiers = sorted({tier for sets in found.values() for each in sets.values() for tier in each})
     about = f"{settings.cases} cases and {settings.nulls} with nothing hidden, of development seed {settings.seed}."
-    parts = ["# What each guard is worth", f"{about} Share, and how often it was counted."]
+    first = "guard off, or number changed" if settings.changes else "guard off"
+    headings = (first, *(MEASURE_TEXTS[id].title for id in SHOWN_MEASURES))
+    parts = [f"{about} Share, and how often it was counted."]
     for tier in tiers:
         rows = [_table_row(guard, found[guard], tier) for guard in found]
-        titles = " | ".join(MEASURE_TEXTS[id].title for id in SHOWN_MEASURES)
-        column = "guard off, or number changed" if settings.changes else "guard off"
-        head = f"| {column} | {titles} |\n|---|{'---|' * len(SHOWN_MEASURES)}"
-        parts += [f"## {tier} tier", "\n".join([head, *rows])]
-    return "\n\n".join(parts) + "\n"
+        parts += [f"## {tier} tier", markdown_table(headings, rows)]
+    return markdown_page("What each guard is worth", *parts)
 
 
-def _table_row(guard: str, sets: dict[str, Any], tier: str) -> str:
+def _table_row(guard: str, sets: dict[str, Any], tier: str) -> tuple[str, ...]:
     name = f"`{guard}`" if "=" in guard else guard.replace("_", " ")
-    return f"| {name} | {' | '.join(_table_cell(id, sets, tier) for id in SHOWN_MEASURES)} |"
+    return name, *(_table_cell(id, sets, tier) for id in SHOWN_MEASURES)
 
 
 def _table_cell(id: str, sets: dict[str, Any], tier: str) -> str:

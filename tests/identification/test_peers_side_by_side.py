@@ -49,7 +49,7 @@ def test_the_page_holds_a_row_for_each_package_and_why_one_has_no_figure(tmp_pat
     ]
     text = write_peers(rows, tmp_path).read_text()
     assert "| emps | pulses.csv | armlab, chosen | 4.70 | 0.1 |" in text
-    assert "| emps | | other | no module | |" in text
+    assert "| emps |  | other | no module |  |" in text
 
 
 @needs_copies("emps")

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report import palette
 from armlab.concealed.loop.case import MOTION_KINDS
 from armlab.concealed.loop.counts import (
@@ -30,6 +33,11 @@ from armlab.concealed.loop.run import LoopSettings
 
 END_TITLES = {"right": "decided rightly", "wrong": "decided wrongly", "open": "still open"}
 MOTION_TITLES = {"designed": "designed motion", "random": "random motion", "condition": "smallest condition number"}
+HOW_TO_READ = """\
+A case has a poor first recording with one hidden effect and a second motion within the same limits. Both are
+diagnosed together. *Told*: the first verdict lists the hidden effect among rivals. *Mistaken*: it names
+another effect alone, which the recording does not separate from the hidden one. Shares have 95 % Wilson
+intervals."""
 MIN_LABELLED_SHARE = 0.04  # smaller shares carry no number
 END_COLORS = {"right": palette.GOOD, "wrong": palette.BAD, "open": palette.OPEN}
 
@@ -97,93 +105,82 @@ class Seals:
 def render_page(settings: LoopSettings, found: Sequence[dict[str, Any]], seal: Seals) -> str:
     """The page of a closed loop in Markdown."""
     table = make_table(found)
-    lines = [
-        "# The closed loop: does the designed motion decide?",
-        "",
-        f"Seed {settings.seed}, {len(table) // len(MOTION_KINDS)} ambiguous cases of {len(found)}.",
-        f"SHA-256 of the answers, printed before the first diagnosis: {seal.answers};",
-        f"of the manifest of all recordings, at the end: {seal.manifest}.",
-        "A case has a poor first recording with one hidden effect and a second motion within the same limits. Both are",
-        "diagnosed together. *Told*: the first verdict lists the hidden effect among rivals. *Mistaken*: it names",
-        "another effect alone, which the recording does not separate from the hidden one. Shares have 95 % Wilson",
-        "intervals.",
-        "",
-    ]
+    parts = [f"{_about(settings, found, table, seal)}\n{HOW_TO_READ}"]
     for title, start in (("all", None), ("told", "told"), ("mistaken", "mistaken")):
         counted = count_shares(table, start)
-        lines += [f"## {title}: {counted[MOTION_KINDS[0], ENDS[0]].cases} cases", "", *_share_table(counted), ""]
-    lines += ["## The designed motion against the others, case by case", "", *_comparison_table(table), ""]
-    lines += ["## Pair by pair", "", *_pair_table(table), ""]
-    lines += ["## Was it foreseen?", "", *_forecast_table(table), ""]
+        parts += [f"## {title}: {counted[MOTION_KINDS[0], ENDS[0]].cases} cases", _share_table(counted)]
+    parts += ["## The designed motion against the others, case by case", _comparison_table(table)]
+    parts += ["## Pair by pair", _pair_table(table), "## Was it foreseen?", *_forecast_parts(table)]
     failed = sum(len(each.get("failed", {})) for each in found)
-    lines += [f"Second motions or verdicts that failed, counted as open: {failed}.", ""]
-    lines += ["## Draws that were left out because nothing was in doubt", "", *_passed_over_list(found), ""]
-    return "\n".join(lines)
+    parts += [f"Second motions or verdicts that failed, counted as open: {failed}."]
+    parts += ["## Draws that were left out because nothing was in doubt", _passed_over_list(found)]
+    return markdown_page("The closed loop: does the designed motion decide?", *parts)
 
 
-def _share_table(counted: Shares) -> list[str]:
-    head = ["| second motion | " + " | ".join(END_TITLES[end] for end in ENDS) + " |", "|---|---|---|---|"]
-    cells = {kind: " | ".join(str(counted[kind, end]) for end in ENDS) for kind in MOTION_KINDS}
-    return head + [f"| {MOTION_TITLES[kind]} | {cells[kind]} |" for kind in MOTION_KINDS]
-
-
-def _comparison_table(table: pd.DataFrame) -> Iterator[str]:
-    """Exact McNemar tests; the two comparisons are not corrected for each other."""
-    yield "| other motion | end | only the designed one | only the other one | p (exact McNemar) |"
-    yield "|---|---|---|---|---|"
-    for other in MOTION_KINDS[1:]:
-        for end in ("right", "wrong"):
-            told = compare_motions(table, other, end)
-            yield f"| {MOTION_TITLES[other]} | {END_TITLES[end]} | {told.ours} | {told.theirs} | {told.p_value:.2g} |"
-
-
-def _pair_table(table: pd.DataFrame) -> Iterator[str]:
-    yield (
-        "| hidden | beside | cases | "
-        + " | ".join(f"{MOTION_TITLES[kind]}: right, wrong, open" for kind in MOTION_KINDS)
-        + " |"
+def _about(settings: LoopSettings, found: Sequence[dict[str, Any]], table: pd.DataFrame, seal: Seals) -> str:
+    return (
+        f"Seed {settings.seed}, {len(table) // len(MOTION_KINDS)} ambiguous cases of {len(found)}.\n"
+        f"SHA-256 of the answers, printed before the first diagnosis: {seal.answers};\n"
+        f"of the manifest of all recordings, at the end: {seal.manifest}."
     )
-    yield "|---|---|---|" + "---|" * len(MOTION_KINDS)
+
+
+def _share_table(counted: Shares) -> str:
+    rows = [(MOTION_TITLES[kind], *(counted[kind, end] for end in ENDS)) for kind in MOTION_KINDS]
+    return markdown_table(("second motion", *(END_TITLES[end] for end in ENDS)), rows)
+
+
+def _comparison_table(table: pd.DataFrame) -> str:
+    """Exact McNemar tests; the two comparisons are not corrected for each other."""
+    rows = []
+    for other, end in product(MOTION_KINDS[1:], ("right", "wrong")):
+        told = compare_motions(table, other, end)
+        rows.append((MOTION_TITLES[other], END_TITLES[end], told.ours, told.theirs, f"{told.p_value:.2g}"))
+    headings = ("other motion", "end", "only the designed one", "only the other one", "p (exact McNemar)")
+    return markdown_table(headings, rows)
+
+
+def _pair_table(table: pd.DataFrame) -> str:
+    rows = []
     for (hidden, beside), part in table.groupby(["hidden", "beside"]):
         ends = {kind: Counter(part[part["motion"] == kind]["end"]) for kind in MOTION_KINDS}
-        cells = " | ".join(", ".join(str(ends[kind][end]) for end in ENDS) for kind in MOTION_KINDS)
-        yield f"| {hidden} | {beside} | {len(part) // len(MOTION_KINDS)} | {cells} |"
+        cells = (", ".join(str(ends[kind][end]) for end in ENDS) for kind in MOTION_KINDS)
+        rows.append((hidden, beside, len(part) // len(MOTION_KINDS), *cells))
+    motions = (f"{MOTION_TITLES[kind]}: right, wrong, open" for kind in MOTION_KINDS)
+    return markdown_table(("hidden", "beside", "cases", *motions), rows)
 
 
-def _forecast_table(table: pd.DataFrame) -> Iterator[str]:
+def _forecast_parts(table: pd.DataFrame) -> Iterator[str]:
     """The chance of a right end that `armlab next` expects before the motion is recorded, all kinds of motion."""
     if table["expected right"].isna().all():
         yield "Nothing was expected of any motion."
         return
-    yield "| expected chance of a right end | motions | mean expected | came (95 %) |"
-    yield "|---|---|---|---|"
-    for each in reliability_bins(table):
-        yield (
-            f"| {each.low:.1f} to {each.high:.1f} | {each.observed.cases} | {100 * each.expected:.0f} % | "
-            f"{each.observed} |"
-        )
-    yield ""
+    rows = [
+        (f"{each.low:.1f} to {each.high:.1f}", each.observed.cases, f"{100 * each.expected:.0f} %", each.observed)
+        for each in reliability_bins(table)
+    ]
+    yield markdown_table(("expected chance of a right end", "motions", "mean expected", "came (95 %)"), rows)
     told = (
         f"{END_TITLES[end]} {100 * a:.0f} % expected, {100 * b:.0f} % came"
         for end, (a, b) in mean_chances(table).items()
     )
-    yield "On average: " + "; ".join(told) + "."
     score, constant = brier_scores(table)
-    yield f"Brier score {score:.3f} (a constant forecast of the observed share: {constant:.3f})."
+    yield (
+        f"On average: {'; '.join(told)}.\n"
+        f"Brier score {score:.3f} (a constant forecast of the observed share: {constant:.3f})."
+    )
 
 
-def _passed_over_list(found: Sequence[dict[str, Any]]) -> list[str]:
+def _passed_over_list(found: Sequence[dict[str, Any]]) -> str:
     counts = Counter(each["start"] for case in found for each in case["passed"])
-    return [f"- {what}: {number}" for what, number in counts.most_common()] or ["- none"]
+    return "\n".join(f"- {what}: {number}" for what, number in counts.most_common()) or "- none"
 
 
 def write_page(settings: LoopSettings, found: Sequence[dict[str, Any]], seal: Seals, folder: Path) -> list[Path]:
-    """Writes loop.md, loop.csv and loop.png, and returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Writes loop.md, loop.csv and loop.png (where there is a case) or none of them, and returns their paths."""
     table = make_table(found)
-    paths = [folder / name for name in ("loop.md", "loop.csv", "loop.png")]
-    paths[0].write_text(render_page(settings, found, seal), encoding="utf-8")
-    table.to_csv(paths[1], index=False, lineterminator="\n", float_format="%.4g")
+    csv = table.to_csv(index=False, lineterminator="\n", float_format="%.4g")
+    texts: dict[str, str | bytes] = {"loop.md": render_page(settings, found, seal), "loop.csv": csv}
     if len(table):
-        paths[2].write_bytes(draw_picture(count_shares(table), reliability_bins(table)))
-    return [path for path in paths if path.is_file()]
+        texts["loop.png"] = draw_picture(count_shares(table), reliability_bins(table))
+    return list(write_texts(texts, folder))

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.cases import JudgedCase
 from armlab.concealed.score.figures import BLACK, BLUE, GREY, ORANGE, SKY, make_figure
 from armlab.concealed.score.held_out import SCORE_CUTOFF_HZ, HeldOut, filter_held_out_run, rms
@@ -128,12 +129,10 @@ def tally_outcomes(table: ScoreRows) -> str:
     counts = list_outcomes(table).groupby(["group", "tier"]).size()
     tiers = sorted(set(table.cases["tier"]))
     rows = [
-        f"| {about.title} | {'success' if about.success else 'failure'} | "
-        + " | ".join(str(counts.get((group, tier), 0)) for tier in tiers)
-        + " |"
+        (about.title, "success" if about.success else "failure", *(counts.get((group, tier), 0) for tier in tiers))
         for group, about in OUTCOME_GROUPS.items()
     ]
-    return "\n".join([f"| outcome | | {' | '.join(tiers)} |", "|---|---|" + "---:|" * len(tiers), *rows])
+    return markdown_table(("outcome", "", *tiers), rows, numbers=range(2, 2 + len(tiers)))
 
 
 def _draw_item(case: JudgedCase, item: dict[str, Any], folder: Path) -> str:
@@ -155,7 +154,7 @@ def _picture_title(case: JudgedCase, joint: int) -> str:
 
 def _render_gallery(cases: dict[str, JudgedCase], table: ScoreRows, shown: pd.DataFrame) -> str:
     everything = list_outcomes(table)
-    parts = ["# Before and after", SELECTION_RULE, tally_outcomes(table)]
+    parts = [SELECTION_RULE, tally_outcomes(table)]
     for success, title in ((True, "Successes"), (False, "Failures")):
         parts.append(f"## {title}")
         for group, about in OUTCOME_GROUPS.items():
@@ -163,7 +162,7 @@ def _render_gallery(cases: dict[str, JudgedCase], table: ScoreRows, shown: pd.Da
                 own, of = shown[shown["group"] == group], everything[everything["group"] == group]
                 parts.append(f"### {about.title}: {_count_shown(own, of)}")
                 parts += [_render_entry(cases[item["case"]], item) for item in to_records(own)]
-    return "\n\n".join(parts) + "\n"
+    return markdown_page("Before and after", *parts)
 
 
 def _count_shown(own: pd.DataFrame, of: pd.DataFrame) -> str:

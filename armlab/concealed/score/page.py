@@ -1,9 +1,11 @@
 """The page of a score in Markdown: wanted and found measures first, then figures, tables and misses."""
 
+from itertools import chain
 from typing import Any
 
 import pandas as pd
 
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.gallery import CASES_PER_GROUP, GALLERY_PAGE, tally_outcomes
 from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure, arm_table, effect_table
 from armlab.concealed.score.rows import ScoreRows
@@ -49,7 +51,7 @@ def render_page(table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, 
     tiers = {tier: [Measure(**each) for each in found] for tier, found in result["tiers"].items()}
     kind = "Development set, not judged." if result["development"] else "Judged set."
     seal = f"{kind} {result['cases']} cases, seed {result['seed']}, manifest SHA-256 `{result['manifest']}`."
-    parts = ["# Score on concealed effects", seal, "## Wanted and found", _wanted_table(tiers), HOW_TO_READ]
+    parts = [seal, "## Wanted and found", _wanted_table(tiers), HOW_TO_READ]
     parts += [
         "## What became of each",
         tally_outcomes(table),
@@ -57,16 +59,16 @@ def render_page(table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, 
     ]
     parts += ["## Figures", *(f"{text}\n\n![{name}]({name}.svg)" for name, text in CAPTIONS.items() if name in drawn)]
     parts += ["## Misses, one by one", _misses_section(missed), "## All measures", _all_measures_table(tiers)]
-    parts += ["## The cases", markdown_table(_count_kinds(table)), "## By arm", markdown_table(arm_table(table))]
+    parts += ["## The cases", _frame_table(_count_kinds(table)), "## By arm", _frame_table(arm_table(table))]
     for tier in tiers:
         names = effect_table(table, tier)
         if len(names):
             parts += [
                 f"## By effect, {tier} tier",
                 f"Above {MIN_NAMED_MULTIPLE:g} limits; wrong claims at any size.",
-                markdown_table(names),
+                _frame_table(names),
             ]
-    return "\n\n".join(parts) + "\n"
+    return markdown_page("Score on concealed effects", *parts)
 
 
 def format_measure(each: Measure) -> str:
@@ -90,46 +92,42 @@ def judge_measure(each: Measure) -> str:
     return f"{text}, {'surely' if each.is_certain else 'perhaps'}"
 
 
-def markdown_table(table: pd.DataFrame) -> str:
-    """A table in Markdown."""
-    head = [f"| {' | '.join(map(_format_cell, table.columns))} |", "|" + "---|" * table.shape[1]]
-    return "\n".join([*head, *(f"| {' | '.join(map(_format_cell, row))} |" for row in table.itertuples(index=False))])
+def _frame_table(table: pd.DataFrame) -> str:
+    rows = (tuple(map(_format_cell, row)) for row in table.itertuples(index=False))
+    return markdown_table(tuple(map(_format_cell, table.columns)), rows)
 
 
 def _format_cell(value: Any) -> str:
     if value is None or value is pd.NA or (isinstance(value, float) and pd.isna(value)):
         return ""
-    return (f"{value:.3g}" if isinstance(value, float) else str(value).replace("_", " ")).replace("|", "\\|")
+    return f"{value:.3g}" if isinstance(value, float) else str(value).replace("_", " ")
 
 
 def _wanted_table(tiers: dict[str, list[Measure]]) -> str:
     """The measures that have to reach something, and their stricter companions, the tiers side by side."""
-    head = [
-        f"| measure | wanted |{''.join(f' {tier} | of | |' for tier in tiers)}",
-        "|---|---|" + "---|---:|---|" * len(tiers),
-    ]
     rows = []
     for id, text in MEASURE_TEXTS.items():
         if text.wanted:
             rows.append(_wanted_row(id, "", tiers))
             if id in STRICTER_MEASURES:
                 rows.append(_wanted_row(STRICTER_MEASURES[id], "&nbsp;&nbsp;", tiers))
-    return "\n".join([*head, *rows])
+    headings = ["measure", "wanted", *chain.from_iterable((tier, "of", "") for tier in tiers)]
+    return markdown_table(headings, rows, numbers=range(3, len(headings), 3))
 
 
-def _wanted_row(id: str, indent: str, tiers: dict[str, list[Measure]]) -> str:
+def _wanted_row(id: str, indent: str, tiers: dict[str, list[Measure]]) -> list[object]:
     found = [_find_measure(measures, id) for measures in tiers.values()]
-    cells = "".join(f" {format_measure(each)} | {each.number} | {judge_measure(each)} |" for each in found)
-    return f"| {indent}{MEASURE_TEXTS[id].title} | {MEASURE_TEXTS[id].wanted} |{cells}"
+    cells = chain.from_iterable((format_measure(each), each.number, judge_measure(each)) for each in found)
+    return [f"{indent}{MEASURE_TEXTS[id].title}", MEASURE_TEXTS[id].wanted, *cells]
 
 
 def _all_measures_table(tiers: dict[str, list[Measure]]) -> str:
-    head = [f"| measure |{''.join(f' {tier} | of |' for tier in tiers)}", "|---|" + "---|---:|" * len(tiers)]
     rows = []
     for id, text in MEASURE_TEXTS.items():
         found = [_find_measure(measures, id) for measures in tiers.values()]
-        rows.append(f"| {text.title} |" + "".join(f" {format_measure(each)} | {each.number} |" for each in found))
-    return "\n".join([*head, *rows])
+        rows.append([text.title, *chain.from_iterable((format_measure(each), each.number) for each in found)])
+    headings = ["measure", *chain.from_iterable((tier, "of") for tier in tiers)]
+    return markdown_table(headings, rows, numbers=range(2, len(headings), 2))
 
 
 def _find_measure(measures: list[Measure], id: str) -> Measure:
@@ -151,4 +149,4 @@ def _misses_section(missed: pd.DataFrame) -> str:
         "case without right findings of the background. Noise, gap closed and all sizes are in "
         "[misses.csv](misses.csv)."
     )
-    return f"{text}\n\n{markdown_table(missed.head(MAX_SHOWN_MISSES)[SHOWN_MISS_COLUMNS])}"
+    return f"{text}\n\n{_frame_table(missed.head(MAX_SHOWN_MISSES)[SHOWN_MISS_COLUMNS])}"

@@ -13,6 +13,7 @@ import pandas as pd
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report import palette
 from armlab.common.report.palette import svg_text
 from armlab.common.settings import suggest_name
@@ -49,7 +50,7 @@ def answer_in_words(part: JudgedPart) -> str:
 
 def sizes_in_words(part: JudgedPart) -> str:
     """True or reference's value -> found with interval, and whether they fit; the law where none is comparable."""
-    law = "–" if part.finding is None else f"`{part.finding.equation}`".replace("|", "\\|")
+    law = "–" if part.finding is None else f"`{part.finding.equation}`"
     return "; ".join(_size_in_words(each) for each in part.numbers) or law
 
 
@@ -144,8 +145,6 @@ def _numbers_text(part: JudgedPart) -> str:
 
 PICTURE_NAME = "concealed.svg"
 INTRODUCTION = f"""\
-# Real recordings with something concealed
-
 A complete model of each arm is identified from its identification runs (components and filters by cross-validation,
 links that bodies can have). Either a part of that reference is withheld, or a known disturbance is added to the torque
 of every run. The diagnosis gets the recording and the model, and has to say what is concealed. All errors are those of
@@ -159,14 +158,14 @@ over (0) to what is left of the untouched recording with the findings of the con
 findings alone. *Others*: findings that are neither sought nor in the control. Where the control names the same effect
 at the same place, its number is taken off (not from *recovered*), and it counts only beyond its interval. **no**: the
 interval does not hold the truth, or does not overlap that of the reference; friction is so judged only where the very
-laws are found that were withheld, for others share the same torque in other ways.
-"""
+laws are found that were withheld, for others share the same torque in other ways."""
 
 
 def studies_markdown(studies: Sequence[ConcealedStudy]) -> str:
     """The whole page."""
-    parts = (_all_count_lines(studies), *(_study_lines(each) for each in studies))
-    return INTRODUCTION + "".join(f"\n{line}" for part in parts for line in part) + "\n"
+    sections = (part for each in studies for part in _study_parts(each))
+    counts = "\n".join(_all_count_lines(studies))
+    return markdown_page("Real recordings with something concealed", INTRODUCTION, counts, *sections)
 
 
 def count_lines(verdicts: Sequence[CaseVerdict], title: str) -> Iterator[str]:
@@ -196,53 +195,66 @@ def _all_count_lines(studies: Sequence[ConcealedStudy]) -> Iterator[str]:
         own = [each for each in every if each.case.injected is not None and low <= each.strength < high]
         upper = "" if np.isinf(high) else f" to {high:g}"
         yield from count_lines(own, f"Injected, strength {low:g}{upper}{' and more' if np.isinf(high) else ''}")
-    yield ""
 
 
-def _study_lines(study: ConcealedStudy) -> Iterator[str]:
+def _study_parts(study: ConcealedStudy) -> Iterator[str]:
     control = study.control
-    yield f"## {study.name}\n"
-    yield f"Reference: {study.reference.description}. "
+    yield f"## {study.name}"
     yield (
+        f"Reference: {study.reference.description}. "
         f"Error {format_percent(control, control.given)}, {format_percent(control, control.named)} with what "
-        "the control names.\n"
+        "the control names."
     )
-    findings = "; ".join(finding_in_words(each) for each in control.findings) or "nothing"
-    yield f"Control, nothing concealed: {findings}.\n"
+    yield f"Control, nothing concealed: {'; '.join(map(finding_in_words, control.findings)) or 'nothing'}."
     withheld = [each for each in study.verdicts if each.case.injected is None]
     injected = [each for each in study.verdicts if each.case.injected is not None]
-    yield "| withheld | strength | error handed over / reference / found | recovered | gap | further laws | others |"
-    yield "|---|---:|---|---:|---:|---|---|"
-    for each in withheld:
-        yield _withheld_row(each, study)
-    yield ""
-    yield "| withheld | sought | answer | reference → found |"
-    yield "|---|---|---|---|"
-    for each in withheld:
-        for one in each.parts:
-            yield f"| {each.case.name} | {one.sought.label} | {answer_in_words(one)} | {sizes_in_words(one)} |"
-    yield ""
-    yield "| injected | strength | answer | truth → found | recovered | gap | others |"
-    yield "|---|---:|---|---|---:|---:|---|"
-    for each in injected:
-        yield _injected_row(each)
-    yield ""
+    yield markdown_table(WITHHELD_HEADINGS, [_withheld_row(each, study) for each in withheld], numbers=(1, 3, 4))
+    sought = [
+        (each.case.name, one.sought.label, answer_in_words(one), sizes_in_words(one))
+        for each in withheld
+        for one in each.parts
+    ]
+    yield markdown_table(("withheld", "sought", "answer", "reference → found"), sought)
+    yield markdown_table(INJECTED_HEADINGS, map(_injected_row, injected), numbers=(1, 4, 5))
 
 
-def _withheld_row(verdict: CaseVerdict, study: ConcealedStudy) -> str:
+WITHHELD_HEADINGS = (
+    "withheld",
+    "strength",
+    "error handed over / reference / found",
+    "recovered",
+    "gap",
+    "further laws",
+    "others",
+)
+INJECTED_HEADINGS = ("injected", "strength", "answer", "truth → found", "recovered", "gap", "others")
+
+
+def _withheld_row(verdict: CaseVerdict, study: ConcealedStudy) -> tuple[str, ...]:
     outcome = verdict.outcome
     errors = (outcome.given, study.control.given, outcome.named)
-    errors_text = " / ".join(format_percent(outcome, each) for each in errors)
-    shares = f"{format_share(outcome.recovered)} | {format_share(verdict.gap)}"
-    further = f"{list_findings(verdict.laws)} | {list_findings(verdict.others)}"
-    return f"| {verdict.case.name} | {verdict.strength:.1f} | {errors_text} | {shares} | {further} |"
+    return (
+        verdict.case.name,
+        f"{verdict.strength:.1f}",
+        " / ".join(format_percent(outcome, each) for each in errors),
+        format_share(outcome.recovered),
+        format_share(verdict.gap),
+        list_findings(verdict.laws),
+        list_findings(verdict.others),
+    )
 
 
-def _injected_row(verdict: CaseVerdict) -> str:
+def _injected_row(verdict: CaseVerdict) -> tuple[str, ...]:
     (one,) = verdict.parts
-    shares = f"{format_share(verdict.outcome.recovered)} | {format_share(verdict.gap)}"
-    answer = f"{answer_in_words(one)} | {sizes_in_words(one)}"
-    return f"| {verdict.case.name} | {verdict.strength:.1f} | {answer} | {shares} | {list_findings(verdict.others)} |"
+    return (
+        verdict.case.name,
+        f"{verdict.strength:.1f}",
+        answer_in_words(one),
+        sizes_in_words(one),
+        format_share(verdict.outcome.recovered),
+        format_share(verdict.gap),
+        list_findings(verdict.others),
+    )
 
 
 # Okabe and Ito 2008, with a shape each: told apart by everyone, in grey too

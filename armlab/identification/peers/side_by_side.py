@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
+from armlab.common.markdown import markdown_page, markdown_table
 from armlab.identification.export import build_simulator_model, mjcf_document, urdf_document
 from armlab.identification.identifier import Identifier
 from armlab.identification.peers.exchange import PeerRun, write_runs
@@ -149,8 +151,7 @@ def _run_script(command: list[str]) -> None:
         raise InputError((done.stderr.strip().splitlines() or ["failed without a word"])[-1])
 
 
-PAGE_HEAD = """# The same recordings through other packages
-
+HOW_TO_READ = """\
 Percent of ||tau - tau_hat|| / ||tau|| over all joints: fitted on the run that identifies, the same smoothed motion,
 the same low-pass on torque and prediction. Seconds: processor time of one fit without start-up and imports; that of
 armlab includes smoothing, differentiation and intervals, the others get the motion ready. mujoco.sysid stops after
@@ -158,26 +159,18 @@ armlab includes smoothing, differentiation and intervals, the others get the mot
 
 `armlab, friction`, figaroh and mujoco.sysid have viscous and Coulomb friction, rotor inertia and offset at every
 joint (`armlab, friction` and figaroh without a prior, joints weighted by their errors; mujoco.sysid: bodies that can
-exist); `armlab, chosen` is the structure that cross-validation chose.
-
-| recording | run | package | percent | seconds |
-|---|---|---|---|---|
-"""
+exist); `armlab, chosen` is the structure that cross-validation chose."""
 
 
 def write_peers(rows: Sequence[PeerResult], folder: Path) -> Path:
     """Path of the page; InputError where it cannot be written."""
     path = folder / "peers.md"
-    try:
-        path.write_text(PAGE_HEAD + "".join(_table_lines(rows)), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
+    table = markdown_table(("recording", "run", "package", "percent", "seconds"), map(_table_row, rows))
+    write_whole(path, markdown_page("The same recordings through other packages", HOW_TO_READ, table))
     return path
 
 
-def _table_lines(rows: Sequence[PeerResult]) -> Iterator[str]:
-    for row in rows:
-        if row.percent is None or row.seconds is None:
-            yield f"| {row.recording} | | {row.package} | {row.remark.replace('|', '/')} | |\n"
-        else:
-            yield f"| {row.recording} | {row.run} | {row.package} | {row.percent:.2f} | {row.seconds:.2g} |\n"
+def _table_row(row: PeerResult) -> tuple[str, ...]:
+    if row.percent is None or row.seconds is None:
+        return row.recording, "", row.package, row.remark, ""
+    return row.recording, row.run, row.package, f"{row.percent:.2f}", f"{row.seconds:.2g}"
