@@ -222,7 +222,7 @@ def _assemble(
         recording=recording,
         simulation=simulation,
         status=status,
-        summary=summarise(status, claims, fits) if hidden is None else describe_unnamed(hidden, found),
+        summary=summarise(status, claims, fits, simulation) if hidden is None else describe_unnamed(hidden, found),
         observed=observed,
         nominal=design.target,
         refit=refit,

@@ -14,6 +14,8 @@ EXTERNAL_CONTACT_FACTS = Effect(
     "external_contact",
     "a push during a stretch of time",
     (Parameter("start", "s"), Parameter("end", "s"), Parameter("peak", TORQUE)),
+    sentence="Something pushes {place} during a stretch of time",
+    figures="{peak} at most, from {start} to {end}",
     law=(
         r"\Delta\tau_j = \text{peak} \; \sin\left( \pi \, \frac{t - \text{start}}{\text{end} - \text{start}} "
         r"\right), \quad \text{start} < t < \text{end}"

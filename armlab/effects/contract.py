@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from string import Formatter
 from types import MappingProxyType
 from typing import ClassVar, Literal
 
@@ -84,6 +85,10 @@ class Effect:
     id: its name in verdicts and models. meaning: a line for a list. parameters: those that a finding may give.
     law: its equation in LaTeX, in its commonest form; words are parameters, j is the joint.
     title: its name in a sentence; the id with spaces where it is left out.
+    sentence: how a verdict says that it was found, without a full stop; `{model}` is what the recording is compared
+    with (`the simulation`), `{place}` the joint, the link or `the whole robot`. Left out where `{model} lacks TITLE at
+    {place}` says it. figures: what stands behind that sentence, each parameter's name in braces for its value with
+    unit and interval, `{frame}` for the name of the joint.
     where: `joint` for an effect at one joint, `coupling` where torque and motion are at two joints, `link` for
     parameters of a link, `robot` for an effect of the whole arm (its joint is null).
     usual: every arm has it. common: many arms have some of it, so that a model may hold it where the evidence is too
@@ -109,6 +114,8 @@ class Effect:
     parameters: tuple[Parameter, ...] = ()
     law: str = field(default="", kw_only=True)
     title: str = ""
+    sentence: str = field(default="", kw_only=True)
+    figures: str = field(default="", kw_only=True)
     where: Literal["joint", "coupling", "link", "robot"] = "joint"
     usual: bool = False
     common: bool = False
@@ -126,6 +133,15 @@ class Effect:
     axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
     experiment: str = ""
     origin: Cause | None = None
+
+    def __post_init__(self) -> None:
+        """Raises ValueError if a sentence has a field that nothing fills."""
+        parameters = {parameter.name for parameter in self.parameters}
+        for text, known in ((self.sentence, {"model", "place"}), (self.figures, {"frame", *parameters})):
+            unknown = {field for _, field, _, _ in Formatter().parse(text) if field is not None} - known
+            if unknown:
+                wrong = ", ".join(sorted(unknown))
+                raise ValueError(f"{self.id}: {text!r} has the fields {wrong}, known are {', '.join(sorted(known))}")
 
     @property
     def cause(self) -> Cause:
@@ -161,6 +177,7 @@ HALF_CIRCLE = 3.1416  # rad: a phase whose interval is wider has not even a sign
 UNKNOWN = Effect(
     "unknown",
     "structure that no effect of this library explains",
+    sentence="Something that no known effect explains acts at {place}",
     origin="unknown",
     experiment="move the joint alone over the variables it depends on, one at a time",
 )

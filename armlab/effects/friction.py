@@ -111,6 +111,7 @@ LOAD_DEPENDENT_FACTS = Effect(
     "friction that grows with the transmitted torque",
     (Parameter("coefficient", "1", positive=True, plausible=LOAD_SHARES_SEEN),),
     law=r"\Delta\tau_j = \text{coefficient} \; |\tau_{\text{rigid},j}| \, \operatorname{sgn} \dot{q}_j",
+    title="load-dependent friction",
     dissipates=True,
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),

@@ -17,6 +17,7 @@ FRICTION_CURVE_FACTS = Effect(
     "friction_curve",
     "friction that follows a curve against velocity, where no formula fits",
     (Parameter("velocities", f"{ANGLE}/s"), Parameter("torques", TORQUE)),
+    sentence="The friction of {place} follows a curve over velocity that {model} does not have",
     law=r"\Delta\tau_j = F(|\dot{q}_j|) \, \operatorname{sgn} \dot{q}_j, \quad F \text{ linear between knots}",
     dissipates=True,
     sticks=True,

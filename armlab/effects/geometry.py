@@ -21,6 +21,8 @@ BASE_TILT_FACTS = Effect(
     "base_tilt",
     "gravity in another direction",
     (Parameter("gravity", "m/s2"),),
+    sentence="Gravity points in another direction than in {model}",
+    figures="{gravity}",
     law=(
         r"\Delta\tau = \tau_{\text{rigid}}(q, \dot q, \ddot q; \text{gravity}) - \tau_{\text{rigid}}(q, \dot "
         r"q, \ddot q; g_0)"
@@ -34,6 +36,8 @@ ENCODER_OFFSET_FACTS = Effect(
     "encoder_offset",
     "a joint's zero at another place",
     (Parameter("offset", ANGLE),),
+    sentence="The zero position of {place} differs from that in {model}",
+    figures="{offset}",
     law=r"\Delta\tau = \tau_{\text{rigid}}(q - \text{offset} \; e_j) - \tau_{\text{rigid}}(q)",
     prior_scale=0.05,
     origin="geometry",
@@ -43,6 +47,8 @@ GEOMETRY_ERROR_FACTS = Effect(
     "geometry_error",
     "a link of another length",
     (Parameter("offset", "m", plausible=LENGTH_ERRORS_SEEN),),
+    sentence="A length or a twist at {place} differs from that in {model}",
+    figures="{offset}",
     law=r"\Delta\tau = \tau_{\text{rigid}}(a_j + \text{offset}) - \tau_{\text{rigid}}(a_j)",
     prior_scale=0.02,
     origin="geometry",

@@ -54,6 +54,7 @@ GRAVITY_COMPENSATOR_FACTS = Effect(
         Parameter("amplitude", TORQUE),
         Parameter("phase", "rad", max_width=HALF_CIRCLE),
     ),
+    sentence="A gravity compensator that {model} does not have acts on {place}",
     law=r"\Delta\tau_j = \text{amplitude} \; \sin(q_j + \text{phase})",
     contains=("torque_offset",),
     axis="position",

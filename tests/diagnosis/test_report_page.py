@@ -27,10 +27,11 @@ from armlab.common.report.charts import (
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report.content import finding_details
 from armlab.diagnosis.report.gallery import draw_gallery
-from armlab.diagnosis.report.measured import body_sentences, format_measured, joint_table
+from armlab.diagnosis.report.measured import body_sentences, joint_table
 from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
 from armlab.diagnosis.report.torque_pictures import evidence_variable
-from armlab.diagnosis.report.words import format_gap, verdict_lines
+from armlab.diagnosis.report.verdict import verdict_lines
+from armlab.diagnosis.report.words import format_gap, format_measured
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts
@@ -152,7 +153,7 @@ def test_every_picture_says_in_words_what_it_shows(browser: Any, address: str) -
 def test_the_verdict_stands_in_two_sentences_with_the_joint_and_the_gain(browser: Any, address: str) -> None:
     page, _ = opened(browser, address, 1200)
     verdict = page.locator(".verdict").inner_text()
-    assert "misses" in verdict
+    assert " lacks " in verdict
     assert "on data that took no part falls from" in verdict
     page.close()
 
@@ -230,7 +231,8 @@ def test_a_payload_is_told_by_mass_and_centre_in_the_frame_of_its_joint(found: D
     )
     claim = replace(found.claims[0], effect="payload", joint=1, joints=(1,), parameters=numbers)
     (sentence,) = body_sentences(replace(found, claims=(claim,)))
-    assert sentence.startswith("Payload: 2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of j0")
+    load = "2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of j0"
+    assert sentence.startswith(f"The arm carries a load that the simulation does not have: {load}")
 
 
 def test_words_of_the_field_lead_to_their_meaning_once(texts: dict[str, str]) -> None:
@@ -341,5 +343,5 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     assert "surrogate" in texts["figures/finding1_unknown.svg"]
     assert "time from the start of the run, s" in texts["figures/finding1_unknown.svg"]
     assert palette.PURPLE in texts["figures/arm.svg"]
-    assert "something that no known effect explains at joint 2" in texts["report.html"]
+    assert "Something that no known effect explains acts at joint 2." in texts["report.html"]
     assert "40 % of the held-out error variance depends on time" in texts["report.html"]

@@ -52,8 +52,8 @@ from armlab.diagnosis.formats import (
     kind_of_effect,
 )
 from armlab.diagnosis.report.content import origin_of
+from armlab.diagnosis.report.verdict import LINE_WIDTH
 from armlab.diagnosis.report.words import (
-    LINE_WIDTH,
     PARAMETER_DIGITS,
     effect_in_words,
     format_number,

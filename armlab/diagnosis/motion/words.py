@@ -23,7 +23,7 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     if len(listed.split()) > 24:
         words = [effect_named(effect).words for effect, _ in findings_by_effect(diagnosis)]
         listed = f"{', '.join(words[:-1])} and {words[-1]}"
-    first = f"The simulation's servos are wrong in {listed}."
+    first = f"The simulation differs from the arm in {listed}."
     return first + _replay_sentence(diagnosis) + _silent_sentence(diagnosis) + _odd_sentence(diagnosis)
 
 

@@ -11,13 +11,13 @@ from armlab.diagnosis.real_arms.checks import numbers_in_words as claim_numbers
 from armlab.diagnosis.real_arms.direct_reading import MIDDLE
 from armlab.diagnosis.real_arms.figure import MODEL_STYLES, PICTURE_NAME
 from armlab.diagnosis.real_arms.study import AloneStudy, ArmStudy, Line, ModelName
+from armlab.diagnosis.report.verdict import verdict_sentences
 from armlab.diagnosis.report.words import (
     effect_in_words,
     finding_in_words,
     format_number,
     joint_unit,
     place_in_words,
-    verdict_sentences,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR

@@ -15,7 +15,7 @@ from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report import content, measured
 from armlab.diagnosis.report.gallery import Gallery, draw_gallery
 from armlab.diagnosis.report.residuals import select_residuals
-from armlab.diagnosis.report.words import verdict_lines, verdict_sentences
+from armlab.diagnosis.report.verdict import verdict_lines, verdict_sentences
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
 from armlab.diagnosis.tuning import parse_change

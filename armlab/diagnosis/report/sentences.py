@@ -1,0 +1,139 @@
+"""Findings in plain sentences: what the model lacks, and what else differs between the arm and the model.
+
+An effect that a model can simply lack stands in a list: `The simulation lacks viscous friction at joints 1 and 2`.
+Every other effect says in a sentence of its own what was found (`Effect.sentence`), with its numbers.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from itertools import starmap
+
+import numpy as np
+
+from armlab.diagnosis.report.words import (
+    effect_in_words,
+    format_fixed,
+    format_measured,
+    format_unit,
+    join_words,
+    place_in_words,
+)
+from armlab.diagnosis.result import Claim
+from armlab.diagnosis.simulation import Simulation
+from armlab.effects.contract import UNKNOWN, Effect
+from armlab.effects.library import effect_named
+from armlab.effects.parameters import ParameterValue
+
+MILLI = 1e3  # mm in a m
+
+
+def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most: int) -> str:
+    """All findings; of those with a name the first `most`, the others are counted. Empty without findings."""
+    known = [claim for claim in claims if claim.effect != UNKNOWN.id]
+    unknown = [claim for claim in claims if claim.effect == UNKNOWN.id]
+    own = [claim for claim in known[:most] if _facts(claim).sentence]
+    sentences = [
+        *_lacking_sentence([claim for claim in known[:most] if not _facts(claim).sentence], simulation),
+        *(finding_sentence(claim, simulation) + _rivals_that_fit(claim) for claim in own),
+        *_count_sentence(len(known) - most),
+    ]
+    if unknown:
+        sentences.append(UNKNOWN.sentence.format(place=_places(unknown)))
+    return " ".join(f"{each}." for each in sentences)
+
+
+def finding_sentence(claim: Claim, simulation: Simulation) -> str:
+    """One finding with its numbers, without rivals and without a full stop."""
+    facts, place, model = _facts(claim), _places([claim]), model_in_words(simulation)
+    if not facts.sentence:
+        return _capitalise(f"{model} lacks {facts.words} at {place}")
+    sentence = facts.sentence.format(model=model, place=place)
+    frame = "" if claim.joint is None else simulation.arm.joints[claim.joint - 1].name
+    return _capitalise(sentence) + _figures(facts, claim.parameters, frame)
+
+
+def model_in_words(simulation: Simulation) -> str:
+    """What the recording is compared with, in a sentence."""
+    return "the rigid-body model" if simulation.kind == "refit" else "the simulation"
+
+
+def _facts(claim: Claim) -> Effect:
+    return effect_named(claim.effect)
+
+
+def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> Iterator[str]:
+    """What the model lacks, one effect at several joints together where its rivals are the same."""
+    groups: dict[tuple[str, str], list[Claim]] = {}
+    for claim in claims:
+        groups.setdefault((claim.effect, _rivals(claim)), []).append(claim)
+    if groups:
+        lacking = [
+            f"{effect_in_words(effect)} at {_places(own)}{f' (or {rivals})' if rivals else ''}"
+            for (effect, rivals), own in groups.items()
+        ]
+        yield _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
+
+
+def _places(claims: Sequence[Claim]) -> str:
+    """`joints 1 and 3`, `joint 2 from joint 1`, `the whole robot`."""
+    places = [place_in_words(claim.effect, claim.joint, claim.joints) for claim in claims]
+    if len(places) > 1 and all(re.fullmatch(r"(joint|link) \d+", each) for each in places):
+        what = places[0].split()[0]
+        return f"{what}s {join_words([each.split()[1] for each in places])}"
+    return join_words(places)
+
+
+def _rivals(claim: Claim) -> str:
+    names = dict.fromkeys(effect_in_words(each.effect) for each in claim.rivals if each.effect != claim.effect)
+    return join_words(list(names), "or") if names else ""
+
+
+def _rivals_that_fit(claim: Claim) -> str:
+    rivals = _rivals(claim)
+    return f"; {rivals} fits as well" if rivals else ""
+
+
+def _count_sentence(number: int) -> Iterator[str]:
+    if number > 0:
+        yield f"There {'is 1 more finding' if number == 1 else f'are {number} more findings'}"
+
+
+def _figures(facts: Effect, parameters: Sequence[ParameterValue], frame: str) -> str:
+    """`: 2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of wrist_3`; all numbers by name where a law has others."""
+    if not facts.figures or not parameters:
+        return ""
+    values = {each.name: _format_value(each) for each in parameters}
+    try:
+        return f": {facts.figures.format(frame=frame, **values)}"
+    except KeyError:  # as of a body of which this arm feels only some numbers
+        named = [f"{name.replace('_', ' ')} {value}" for name, value in values.items()]
+        return f": {', '.join(named)}"
+
+
+def _format_value(parameter: ParameterValue) -> str:
+    """A scalar with its interval; a vector without, lengths in mm as fine as they are known."""
+    if np.ndim(parameter.value) == 0:
+        return format_measured(parameter)
+    values = np.asarray(parameter.value, dtype=float)
+    if parameter.unit == "m":
+        return f"({', '.join(starmap(_millimetres, zip(values, _half_widths(parameter), strict=True)))}) mm"
+    return f"({', '.join(format_fixed(value) for value in values.tolist())}) {format_unit(parameter.unit)}"
+
+
+def _half_widths(parameter: ParameterValue) -> list[float]:
+    count = np.size(parameter.value)
+    if parameter.interval is None:
+        return [math.nan] * count
+    pairs = np.asarray(parameter.interval, dtype=float).reshape(-1, 2)
+    return [float(high - low) / 2 for low, high in pairs]
+
+
+def _millimetres(value: float, half: float) -> str:
+    """A length, m, in whole mm; in tenths where its interval is that narrow."""
+    decimals = 1 if MILLI * half < 1.0 else 0
+    return f"{round(MILLI * value, decimals) + 0.0:.{decimals}f}".replace("-", "−")  # + 0.0: no minus before a zero
+
+
+def _capitalise(sentence: str) -> str:
+    return sentence[0].upper() + sentence[1:]

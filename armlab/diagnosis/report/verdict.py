@@ -1,0 +1,119 @@
+"""The verdict for a reader in a hurry: what is missing and what that gains, and the lines for the terminal."""
+
+from collections.abc import Iterator
+from textwrap import wrap
+
+import numpy as np
+
+from armlab.diagnosis.report.residuals import is_white, select_residuals
+from armlab.diagnosis.report.sentences import findings_in_sentences, model_in_words
+from armlab.diagnosis.report.words import (
+    effect_in_words,
+    finding_in_words,
+    format_gap,
+    format_number,
+    format_probability,
+    joint_unit,
+    place_in_words,
+)
+from armlab.diagnosis.result import Claim, Diagnosis, JointFit
+from armlab.recordings.reading.answer import SetupFinding
+from problem.arm import Arm
+
+MAX_NAMED_FINDINGS = 3  # findings that the verdict names; the others are counted
+
+
+def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
+    """What is missing, and how much better the model is with it."""
+    setup = diagnosis.setup.sentence if diagnosis.setup else ""
+    if setup:
+        return setup, diagnosis.summary.removeprefix(setup).strip()
+    if diagnosis.status == "inconclusive":
+        return "These recordings allow no verdict.", diagnosis.summary
+    worst = max(diagnosis.fit, key=lambda each: each.after, default=None)
+    simulation = diagnosis.simulation
+    if diagnosis.status == "none":
+        size = "" if worst is None else _largest_error_text(worst, simulation.arm)
+        left = f"On data that took no part the largest error is {size}." if size else ""
+        return f"Nothing is missing: {model_in_words(simulation)} explains the recordings down to their noise.", left
+    return findings_in_sentences(diagnosis.claims, simulation, MAX_NAMED_FINDINGS), gain_sentence(diagnosis)
+
+
+def _largest_error_text(worst: JointFit, arm: Arm) -> str:
+    size = joint_unit(arm, worst.joint - 1)
+    return f"{format_number(worst.after)} {size} (joint {worst.joint}, noise {format_number(worst.noise_floor)} {size})"
+
+
+def gain_sentence(diagnosis: Diagnosis) -> str:
+    """How far the held-out error falls at the joint that gains most, and its share of the gap to the noise."""
+    data = select_residuals(diagnosis)
+    refit = np.array([each.before for each in diagnosis.fit])
+    start = refit if data is None or data.given is None else data.held_out_rms(data.given)
+    after = np.array([each.after for each in diagnosis.fit])
+    joint = int(np.argmax(start / np.maximum(after, 1e-300)))
+    best = diagnosis.fit[joint]
+    size = joint_unit(diagnosis.simulation.arm, joint)
+    before = f"{format_number(best.before)} {size} with the rigid body refitted"
+    if start is not refit:
+        before = f"{format_number(float(start[joint]))} {size} ({before})"
+    closed = "" if best.gap_closed is None else f", {100 * min(best.gap_closed, 1.0):.0f} % of the way to the noise"
+    if data is not None and not is_white(data.final[:, joint], joint, data.observed):
+        closed = "; what is left there still holds structure"
+    this = "With it" if len(diagnosis.claims) == 1 else "With these"
+    return (
+        f"{this} the error on data that took no part falls from {before} to {format_number(best.after)} {size} "
+        f"at joint {best.joint}{closed}."
+    )
+
+
+LINE_WIDTH = 110  # letters in a line of the terminal
+
+
+def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
+    """The verdict, each finding with its equation, errors before and after, and what to do next."""
+    first, second = verdict_sentences(diagnosis)
+    yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
+    for sign in diagnosis.signs:
+        yield from (f"  {line}" for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2))
+    setup = diagnosis.setup.findings if diagnosis.setup else ()
+    for number, mistake in enumerate(setup, 1):
+        yield from _setup_lines(number, mistake, joint_unit(diagnosis.simulation.arm, mistake.worst_joint - 1))
+    for number, claim in enumerate(diagnosis.claims, len(setup) + 1):
+        yield from _claim_lines(number, claim, joint_unit(diagnosis.simulation.arm, claim.evidence.joint))
+    for each in diagnosis.unexplained:
+        yield f"  unexplained: {100 * each.share:.0f} % of joint {each.joint}, by {', '.join(each.depends_on)}"
+    if diagnosis.fit:
+        yield "  joint   refitted      found      noise   gap closed   (rms on data that took no part)"
+    for fit in diagnosis.fit:
+        closed = format_gap(fit.gap_closed)
+        errors = "".join(f"{format_number(value):>11}" for value in (fit.before, fit.after, fit.noise_floor))
+        yield f"  {fit.joint:>5}{errors}{closed:>13}   {joint_unit(diagnosis.simulation.arm, fit.joint - 1)}"
+
+
+def _setup_lines(number: int, finding: SetupFinding, unit: str) -> Iterator[str]:
+    lines = wrap(f"setup: {finding.text}", LINE_WIDTH - 5)
+    yield f"{number:>3}. {lines[0]}"
+    yield from (f"     {line}" for line in lines[1:])
+    error = f"{format_number(finding.rms_before)} to {format_number(finding.rms_after)} {unit}"
+    yield f"     held-out error of joint {finding.worst_joint}: {error}"
+    for rival in finding.rivals:
+        yield from (f"     {line}" for line in wrap(f"fits as well: {rival.text}", LINE_WIDTH - 5))
+    if finding.next_experiment:
+        yield from (f"     {line}" for line in wrap(f"to tell: {finding.next_experiment}", LINE_WIDTH - 5))
+
+
+def _claim_lines(number: int, claim: Claim, unit: str) -> Iterator[str]:
+    evidence = claim.evidence
+    lines = wrap(f"{finding_in_words(claim)}: {claim.equation}", LINE_WIDTH - 5)
+    yield f"{number:>3}. {lines[0]}"
+    yield from (f"     {line}" for line in lines[1:])
+    error = f"{format_number(evidence.rms_before)} to {format_number(evidence.rms_after)} {unit}"
+    yield f"     held-out error of joint {evidence.joint + 1}: {error}; p {format_probability(evidence.corrected)}"
+    rivals = ", ".join(
+        f"{effect_in_words(each.effect)} ({place_in_words(each.effect, each.joint, each.joints)})"
+        for each in claim.rivals
+    )
+    if rivals:
+        yield from (f"     {line}" for line in wrap(f"fits as well: {rivals}", LINE_WIDTH - 5))
+    if claim.next_experiment:
+        yield from (f"     {line}" for line in wrap(f"to tell: {claim.next_experiment}", LINE_WIDTH - 5))

@@ -1,0 +1,138 @@
+"""Every effect of the library says in a plain sentence that it was found."""
+
+from typing import Any
+
+import pytest
+
+from armlab.diagnosis.report.sentences import finding_sentence, findings_in_sentences
+from armlab.diagnosis.result import Claim, Rival
+from armlab.diagnosis.simulation import Simulation
+from armlab.effects.contract import ANGLE, Effect, Parameter
+from armlab.effects.library import EFFECT_IDS, effect_named
+from armlab.effects.parameters import ParameterValue
+from problem.presets import load_arm
+
+ARM = load_arm("irb120-arm")
+SIMULATION = Simulation("nominal", ARM, None)
+REFIT = Simulation("refit", ARM, None)
+VECTORS = {"centre": (-1e-9, 0.02, 0.06), "inertia": (0.0,) * 6, "gravity": (0.17, 0.0, -9.81)}
+SENTENCES = {
+    "coulomb_friction": "The simulation lacks Coulomb friction at joint 2",
+    "viscous_friction": "The simulation lacks viscous friction at joint 2",
+    "nonlinear_viscous_friction": "The simulation lacks nonlinear viscous friction at joint 2",
+    "stribeck_friction": "The simulation lacks Stribeck friction at joint 2",
+    "asymmetric_friction": "The simulation lacks asymmetric friction at joint 2",
+    "load_dependent_friction": "The simulation lacks load-dependent friction at joint 2",
+    "presliding_hysteresis": "The simulation lacks presliding hysteresis at joint 2",
+    "friction_drift": "The simulation lacks friction drift at joint 2",
+    "rotor_inertia": "The simulation lacks rotor inertia at joint 2",
+    "torque_gain_error": "The torque of joint 2 is read too large or too small: factor 0.500 (0.4 to 0.6)",
+    "torque_offset": (
+        "The torque of joint 2 has a constant part that the simulation does not have: 0.500 N m (0.4 to 0.6)"
+    ),
+    "torque_ripple": "The simulation lacks torque ripple at joint 2",
+    "joint_elasticity": "The simulation lacks joint elasticity at joint 2",
+    "backlash": "The simulation lacks backlash at joint 2",
+    "joint_coupling": "The simulation lacks joint coupling at joint 2 from joint 1",
+    "gravity_compensator": "A gravity compensator that the simulation does not have acts on joint 2",
+    "cable_stiffness": "The simulation lacks cable stiffness at joint 2",
+    "payload": (
+        "The arm carries a load that the simulation does not have: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint2"
+    ),
+    "inertial_parameter_error": ("The mass, centre of mass or inertia of link 2 differs from that in the simulation"),
+    "base_tilt": "Gravity points in another direction than in the simulation: (0.170, 0.00, −9.81) m/s²",
+    "encoder_offset": ("The zero position of joint 2 differs from that in the simulation: 0.500 rad (0.4 to 0.6)"),
+    "geometry_error": "A length or a twist at joint 2 differs from that in the simulation: 0.500 m (0.4 to 0.6)",
+    "time_delay": "Torque and motion are recorded at different times: 0.500 s (0.4 to 0.6)",
+    "channel_skew": ("A channel of joint 2 is recorded at another time than the other channels: 0.500 s (0.4 to 0.6)"),
+    "external_contact": (
+        "Something pushes joint 2 during a stretch of time: 0.500 N m (0.4 to 0.6) at most, "
+        "from 0.500 s (0.4 to 0.6) to 0.500 s (0.4 to 0.6)"
+    ),
+    "torque_saturation": (
+        "The torque of joint 2 stays below a limit that the simulation does not have: 0.500 N m (0.4 to 0.6)"
+    ),
+    "friction_curve": "The friction of joint 2 follows a curve over velocity that the simulation does not have",
+    "controller_gain_error": "The controller gain of joint 2 differs from that in the simulation",
+    "command_delay": "A command to joint 2 takes effect later than in the simulation: 0.500 s (0.4 to 0.6)",
+    "controller_dead_band": (
+        "The servo of joint 2 ignores small errors, and in the simulation it does not: 0.500 rad (0.4 to 0.6)"
+    ),
+    "command_offset": (
+        "The command to joint 2 is off by a constant that the simulation does not have: 0.500 rad (0.4 to 0.6)"
+    ),
+    "unknown": "Something that no known effect explains acts at joint 2",
+}
+
+
+def claim(effect: str, joint: int | None = 2, rivals: tuple[str, ...] = ()) -> Claim:
+    """A finding: every scalar 0.5, from 0.4 to 0.6; a robot's has no joint."""
+    facts = effect_named(effect)
+    values = [(each.name, VECTORS.get(each.name, 0.5), each.unit_for()) for each in facts.parameters]
+    parameters = [
+        ParameterValue(name, value, None if name in VECTORS else (0.4, 0.6), unit) for name, value, unit in values
+    ]
+    place = None if facts.where == "robot" else joint
+    joints = (joint or 0, 1) if facts.where == "coupling" else ()
+    evidence: Any = None
+    return Claim(
+        effect,
+        place,
+        joints,
+        tuple(parameters),
+        "",
+        evidence,
+        evidence,
+        rivals=tuple(Rival(each, place) for each in rivals),
+    )
+
+
+@pytest.mark.parametrize("effect", EFFECT_IDS)
+def test_every_effect_has_a_plain_sentence(effect: str) -> None:
+    assert finding_sentence(claim(effect), SIMULATION) == SENTENCES[effect]
+
+
+def test_what_the_model_lacks_stands_in_one_sentence_with_its_joints_and_rivals() -> None:
+    found = [
+        claim("viscous_friction", 1),
+        claim("viscous_friction", 3),
+        claim("coulomb_friction", 2, ("asymmetric_friction", "stribeck_friction")),
+    ]
+    assert findings_in_sentences(found, REFIT, 3) == (
+        "The rigid-body model of irb120-arm lacks viscous friction at joints 1 and 3 and Coulomb friction at joint 2 "
+        "(or asymmetric friction or Stribeck friction)."
+    )
+
+
+def test_couplings_of_several_joints_keep_their_pairs() -> None:
+    found = [claim("joint_coupling", 2), claim("joint_coupling", 3)]
+    assert "joint coupling at joint 2 from joint 1 and joint 3 from joint 1." in findings_in_sentences(
+        found, SIMULATION, 3
+    )
+
+
+def test_other_findings_are_counted_and_what_is_unknown_is_told() -> None:
+    found = [
+        claim("torque_offset", 1, ("encoder_offset",)),
+        claim("backlash", 3),
+        claim("unknown", 1),
+        claim("unknown", 3),
+    ]
+    assert findings_in_sentences(found, SIMULATION, 1) == (
+        "The torque of joint 1 has a constant part that the simulation does not have: 0.500 N m (0.4 to 0.6); "
+        "encoder offset fits as well. There is 1 more finding. "
+        "Something that no known effect explains acts at joints 1 and 3."
+    )
+
+
+def test_a_load_of_which_the_arm_feels_only_some_numbers_tells_these() -> None:
+    numbers = (ParameterValue("hx", 0.1, (0.09, 0.11), "kg.m"),)
+    felt = Claim("payload", 2, (2,), numbers, "", claim("payload").evidence, claim("payload").prediction)
+    assert finding_sentence(felt, SIMULATION).endswith("does not have: hx 0.100 kg m (0.09 to 0.11)")
+
+
+def test_a_sentence_with_a_field_that_nothing_fills_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"seal: '\{joint\} leaks' has the fields joint, known are model, place"):
+        Effect("seal", "a seal that leaks", sentence="{joint} leaks")
+    with pytest.raises(ValueError, match="has the fields level, known are frame, offset"):
+        Effect("seal", "a seal that leaks", (Parameter("offset", ANGLE),), sentence="It leaks", figures="{level}")
