@@ -94,8 +94,8 @@ def test_every_effect_has_a_plain_sentence(effect: str) -> None:
 
 def test_what_the_model_lacks_stands_in_one_sentence_with_its_joints_and_rivals() -> None:
     found = [
-        claim("viscous_friction", 1),
         claim("viscous_friction", 3),
+        claim("viscous_friction", 1),
         claim("coulomb_friction", 2, ("asymmetric_friction", "stribeck_friction")),
     ]
     assert findings_in_sentences(found, REFIT, 3) == (

@@ -32,15 +32,20 @@ def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most:
     """All findings; of those with a name the first `most`, the others are counted. Empty without findings."""
     known = [claim for claim in claims if claim.effect != UNKNOWN.id]
     unknown = [claim for claim in claims if claim.effect == UNKNOWN.id]
-    own = [claim for claim in known[:most] if _facts(claim).sentence]
-    sentences = [
-        *_lacking_sentence([claim for claim in known[:most] if not _facts(claim).sentence], simulation),
-        *(finding_sentence(claim, simulation) + _rivals_that_fit(claim) for claim in own),
-        *_count_sentence(len(known) - most),
-    ]
+    sentences = [*_named_sentences(known[:most], simulation), *_count_sentence(len(known) - most)]
     if unknown:
         sentences.append(UNKNOWN.sentence.format(place=_places(unknown)))
     return " ".join(f"{each}." for each in sentences)
+
+
+def _named_sentences(claims: Sequence[Claim], simulation: Simulation) -> Iterator[str]:
+    """In the order of the findings; all that the model lacks stands where the first of it does."""
+    lacking = [claim for claim in claims if not _facts(claim).sentence]
+    for claim in claims:
+        if _facts(claim).sentence:
+            yield finding_sentence(claim, simulation) + _rivals_that_fit(claim)
+        elif claim is lacking[0]:
+            yield _lacking_sentence(lacking, simulation)
 
 
 def finding_sentence(claim: Claim, simulation: Simulation) -> str:
@@ -62,17 +67,16 @@ def _facts(claim: Claim) -> Effect:
     return effect_named(claim.effect)
 
 
-def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> Iterator[str]:
+def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
     """What the model lacks, one effect at several joints together where its rivals are the same."""
     groups: dict[tuple[str, str], list[Claim]] = {}
-    for claim in claims:
+    for claim in sorted(claims, key=lambda each: each.joint or 0):
         groups.setdefault((claim.effect, _rivals(claim)), []).append(claim)
-    if groups:
-        lacking = [
-            f"{effect_in_words(effect)} at {_places(own)}{f' (or {rivals})' if rivals else ''}"
-            for (effect, rivals), own in groups.items()
-        ]
-        yield _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
+    lacking = [
+        f"{effect_in_words(effect)} at {_places(own)}{f' (or {rivals})' if rivals else ''}"
+        for (effect, rivals), own in groups.items()
+    ]
+    return _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
 
 
 def _places(claims: Sequence[Claim]) -> str:
