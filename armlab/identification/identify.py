@@ -4,12 +4,14 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
-from armlab.common.report.page import png_address, render_page
+from armlab.common.report.numbers import format_number, format_unit
+from armlab.common.report.page import Table, png_address, render_page
 from armlab.common.report.palette import figure_style
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
@@ -22,7 +24,7 @@ from armlab.identification.selection import (
     describe_choice,
     select_structure,
 )
-from armlab.identification.validation import RunError, error_table, run_error
+from armlab.identification.validation import JointError, RunError, error_table, run_error, total_error_line
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
@@ -41,10 +43,36 @@ def identification_page(recording: Recording, identifier: Identifier, errors: tu
         f"Identification of {recording.name}",
         summary=f"Cut-off {model.cutoff_hz:.4g} Hz; condition number {identifier.condition_number_:.4g} (columns at "
         "unit length); each 95 % interval is for correlated errors.",
-        errors=error_table(errors),
-        parameters=str(model),
+        errors=_joint_errors(errors),
+        totals=[total_error_line(each) for each in errors],
+        parameters=_parameters(model),
         pictures=pictures,
     )
+
+
+def _joint_errors(errors: tuple[RunError, ...]) -> Table:
+    rows = [
+        [each.run, each.role, str(joint.joint), f"{joint.rms:.4g}", f"{joint.percent:.2f} %", _percent_of_rated(joint)]
+        for each in errors
+        for joint in each.joints
+    ]
+    return Table(["run", "role", "joint", "rms, N m", "of torque", "of rated torque"], rows, (0, 1), stacked=True)
+
+
+def _percent_of_rated(error: JointError) -> str:
+    return "–" if error.percent_rated is None else f"{error.percent_rated:.2f} %"
+
+
+def _parameters(model: Model) -> Table:
+    """Each parameter with its 95 % interval and its unit; a dash where nothing determines it."""
+    rows = []
+    for part, each in model.named_parameters():
+        interval = "–"
+        if each.interval is not None:
+            interval = " to ".join(format_number(float(end), 4) for end in np.asarray(each.interval))
+        value = format_number(float(np.asarray(each.value)), 4)
+        rows.append([f"{part.replace('_', ' ')}: {each.name}", value, interval, format_unit(each.unit)])
+    return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
 
 
 NO_VALIDATION_WARNING = (

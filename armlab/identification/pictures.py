@@ -22,7 +22,7 @@ def residual_figure(model: TorqueModel, signals: Signals) -> Figure:
         left.set_ylabel(f"{model.arm.joints[joint].name}\n{unit}", fontsize=8)
     axes[0, 0].set_title(f"torque on {signals.run.name}", fontsize=9)
     axes[0, 1].set_title("recorded - model", fontsize=9)
-    axes[0, 0].legend(fontsize=7, loc="upper right")
+    axes[0, 0].legend(fontsize=7, loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.2)
     for axis in axes[-1]:
         axis.set_xlabel("time, s", fontsize=8)
     for axis in axes.flat:

@@ -135,10 +135,14 @@ class TorqueModel:
 
     def __str__(self) -> str:
         """A table of all parameters."""
+        return "\n".join(f"{what}: {_parameter_line(each)}" for what, each in self.named_parameters())
+
+    def named_parameters(self) -> list[tuple[str, ParameterValue]]:
+        """All parameters, each with what it is a parameter of."""
         rows = [("base parameters", each) for each in self.base_parameters]
         for index, part in enumerate(self.structure.components):
             rows += [(part.label, each) for each in self.component_parameters(index)]
-        return "\n".join(f"{what}: {_parameter_line(each)}" for what, each in rows)
+        return rows
 
 
 def joint_fields(model: TorqueModel) -> dict[str, Array]:

@@ -64,5 +64,10 @@ def error_table(errors: tuple[RunError, ...]) -> str:
             rated = "-" if joint.percent_rated is None else f"{joint.percent_rated:.2f}"
             name = f"{each.run:<21} {each.role:<9}"
             lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {joint.percent:12.2f} {rated:>11}")
-        lines.append(f"{each.run}: {each.relative_percent:.2f} % in all, {each.recorded_percent:.2f} % unfiltered")
+        lines.append(total_error_line(each))
     return "\n".join(lines)
+
+
+def total_error_line(error: RunError) -> str:
+    """The error of a run over all joints, in a line."""
+    return f"{error.run}: {error.relative_percent:.2f} % in all, {error.recorded_percent:.2f} % unfiltered"

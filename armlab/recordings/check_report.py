@@ -12,6 +12,7 @@ from matplotlib.ticker import NullFormatter
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
 from armlab.common.report import palette
+from armlab.common.report.numbers import count_of
 from armlab.common.report.page import png_address, render_page
 from armlab.common.report.palette import figure_style, series_style
 from armlab.recordings.check import CheckResult
@@ -63,7 +64,7 @@ def _draw_joints(run: MotionRun, arm: Arm, titles: tuple[str, str], draw: Callab
     for axis, title in zip(axes[0], titles, strict=True):
         axis.set_title(title, fontsize=9)
         if len(axis.get_legend_handles_labels()[0]) > 1:
-            axis.legend(fontsize=7, loc="upper right")
+            axis.legend(fontsize=7, loc="lower right", bbox_to_anchor=(1, 1), ncols=2, borderaxespad=0.2)
     for axis in axes[-1]:
         axis.set_xlabel("time, s", fontsize=8)
     _shrink_labels(axes)
@@ -174,8 +175,8 @@ def _summarize_recording(recording: Recording | MotionRecording) -> str:
     arm = recording.arm
     nominal = "with" if arm.links is not None else "without"
     return (
-        f"Robot {arm.name}, {len(arm)} joint(s), {nominal} nominal inertial parameters. "
-        f"{len(recording.runs)} run(s), {seconds:.3g} s: {', '.join(roles)}."
+        f"Robot {arm.name}, {count_of(len(arm), 'joint')}, {nominal} nominal inertial parameters. "
+        f"{count_of(len(recording.runs), 'run')}, {seconds:.3g} s: {', '.join(roles)}."
     )
 
 

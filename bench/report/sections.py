@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
+from armlab.common.report.numbers import count_of
 from armlab.common.report.page import Table
 from bench.report.analysis import Cell
 from bench.result_sets.result_set import ResultSet
@@ -132,8 +133,8 @@ def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
     """What was compared."""
     trials = results.trials
     return (
-        f"{len(cells)} problems, {trials['algorithm'].nunique()} algorithms, {trials['repetition'].nunique()} "
-        f"repetitions, {len(trials)} runs."
+        f"{count_of(len(cells), 'problem')}, {trials['algorithm'].nunique()} algorithms, "
+        f"{trials['repetition'].nunique()} repetitions, {len(trials)} runs."
     )
 
 

@@ -33,6 +33,7 @@ from armlab.common.report.charts import (
     svg_picture,
     svg_text,
 )
+from armlab.common.report.numbers import format_number, format_unit
 from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
@@ -56,9 +57,7 @@ from armlab.diagnosis.report.verdict import LINE_WIDTH
 from armlab.diagnosis.report.words import (
     PARAMETER_DIGITS,
     effect_in_words,
-    format_number,
     format_probability,
-    format_unit,
     join_words,
     parameter_rows,
     place_in_words,
@@ -128,14 +127,15 @@ def detectable_sentence(comparison: Comparison) -> str:
     parts = []
     for effect in SEEN_EFFECTS:
         rows = [each for each in comparison.changes if each.effect == effect and not each.changed]
-        first = rows[0].parameter if rows else ""
+        names = [each.parameter for each in rows]
+        first = next((each.name for each in effect_named(effect).parameters if each.name in names), "")
         sizes = sorted((each.detectable, each) for each in rows if each.parameter == first)
         if not sizes:
             continue
         middle = sizes[len(sizes) // 2][1]
         share = detectable_share(middle)
-        size = f"{100 * share:.2g} %" if share is not None else f"{format_number(middle.detectable, 2)} {middle.unit}"
-        parts.append(f"{effect_in_words(effect)} {size.replace('N.m', 'N m')}")
+        size = f"{format_number(middle.detectable, 2)} {format_unit(middle.unit)}"
+        parts.append(f"{effect_in_words(effect)} {size if share is None else f'{100 * share:.2g} %'}")
     if not parts:
         return ""
     return f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
@@ -268,7 +268,7 @@ def _detectable_entry(each: Change) -> DetectableEntry:
 
 
 TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p", "smallest seen")
-PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 178.0
+PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 208.0
 MAX_DRAWN_CHANGES = 24
 VALUE_LOOK = Look("value", LAW_LOOK.color, 4.0)
 INTERVAL_LOOK = Look("95 % interval", palette.MIDDLE, 2.0)
@@ -326,14 +326,15 @@ def _named_table(comparison: Comparison) -> Table:
 
 def _card(named: NamedChange, names: Sequence[str]) -> ChangeCard:
     rows = [[one.name, one.value, one.interval, one.unit] for each in named.parameters for one in parameter_rows(each)]
-    gains = ", ".join(f"{name} {100 * gain:.3g} %" for name, gain in zip(names, named.gains, strict=True))
+    factors = [f"{format_number(1 + gain)} times in {name}" for name, gain in zip(names, named.gains, strict=True)]
     rivals = [_rival_phrase(each) for each in named.rivals]
     texts = (
         f"{named.equation}. Log evidence {named.evidence:.0f}, p-value {format_probability(named.p_value)}.",
-        f"Held-out errors fall by this share of what is left: {gains}.",
+        f"Without this change the squared held-out error is larger: {join_words(factors)}.",
         f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well.",
     )
-    return ChangeCard(change_phrase(named), texts, Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3)))
+    numbers = Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
+    return ChangeCard(change_phrase(named), texts, numbers)
 
 
 def _trend_part(comparison: Comparison) -> TrendPart:
@@ -414,9 +415,9 @@ def draw_changes(changes: Sequence[Change]) -> Markup:
         out += svg_text(text.replace("-", "−"), x, height - 12, 10.5, "middle", fill=palette.PALE)
     for number, each in enumerate(chosen):
         y = 58 + ROW_HEIGHT * number
-        where = "" if each.joint is None else f", {each.joint}"
+        where = "" if each.joint is None else f"{each.joint}: "
         out += svg_text(
-            shorten_text(f"{_change_name(each)}{where}", NAMES_WIDTH - 12, 10.5), NAMES_WIDTH - 8, y + 4, 10.5, "end"
+            shorten_text(f"{where}{_change_name(each)}", NAMES_WIDTH - 12, 10.5), NAMES_WIDTH - 8, y + 4, 10.5, "end"
         )
         x = _score_position(_score(each), largest)
         out += svg_element(

@@ -31,6 +31,7 @@ from armlab.diagnosis.confusability.card import (
     confusability_card,
     read_planned_motions,
 )
+from armlab.diagnosis.report.words import effect_in_words, place_in_words
 from armlab.effects.library import library
 from problem.arm import Arm
 from problem.robot_file import load_arm
@@ -38,21 +39,27 @@ from problem.robot_file import load_arm
 CONFUSABILITY_SCHEMA = "confusability/1"
 MIN_HIDDEN_SHARE = 0.95  # share of an effect's power that a refit takes in: it hardly shows
 MAX_SHOWN_RIVALS = 3  # rivals in a table
+EXPLANATIONS = (
+    f"Two names are one class where the cosine of an effect's columns to the other's span is {MIN_CONFUSED_COSINE:g} "
+    "or more after what is free has been taken out: nothing in the nominal view, the base parameters in the refit "
+    "view.",
+    "Absorbed: the share of an effect's power that base parameters take in (of its most visible direction).",
+    "Shows from, told from: rms torques in units of the noise, at which the effect, or its difference to the other, is "
+    f"{CERTAIN_STANDARD_ERRORS:g} standard errors.",
+)
 CSV_HEADINGS = ("effect", "joint", "joints", "form", "absorbed_share", "shows_from", "rival", "cosine", "tells_from")
 
 
 def explain_card(card: Card) -> str:
     """What the numbers mean."""
+    return " ".join((_about_card(card), *EXPLANATIONS))
+
+
+def _about_card(card: Card) -> str:
     noise = ", ".join(f"{value:.3g}" for value in card.noise)
     return (
         f"{card.trajectory} on {card.arm.name}: {len(card.entries)} effects and places. Noise of the filtered torque "
-        f"{noise} N m (N) by joint. Two names are one class where the cosine of an effect's columns to the other's "
-        f"span is {MIN_CONFUSED_COSINE:g} or more after what is free has been taken out: nothing in the nominal "
-        "view, the base "
-        f"parameters in the refit view. Absorbed: the share of an effect's power that base parameters take in (of "
-        "its most visible direction). Sizes are rms torques in units of the noise at which a difference is "
-        f"{CERTAIN_STANDARD_ERRORS:g} "
-        "standard errors."
+        f"{noise} N m (N) by joint."
     )
 
 
@@ -152,7 +159,7 @@ def _finite_or_none(value: float) -> float | None:
     return float(f"{value:.6g}") if math.isfinite(value) else None
 
 
-CELL_SIZE, LABEL_SIZE, NAMES_WIDTH, TOP_MARGIN = 12.0, 10.0, 208.0, 44.0
+CELL_SIZE, LABEL_SIZE, NAMES_WIDTH, TOP_MARGIN = 12.0, 10.0, 288.0, 44.0
 DARKEST_COLOR = (8, 48, 107)
 MARK_COLOR = palette.DARK_VERMILION
 
@@ -165,9 +172,9 @@ def draw_heat_map(card: Card, view: str, joint: int) -> Markup:
     out = svg_text(f"Joint {joint}, {view}: can the column's effect imitate the row's?", 6, 14, 12, font_weight="600")
     for place, index in enumerate(chosen):
         middle = CELL_SIZE * (place + 0.5)
-        label = shorten_text(f"{place + 1}  {card.entries[index].label}", NAMES_WIDTH - 8, LABEL_SIZE)
+        label = shorten_text(f"{place + 1}  {_words(card.entries[index])}", NAMES_WIDTH - 8, LABEL_SIZE)
         out += svg_text(label, NAMES_WIDTH - 5, TOP_MARGIN + middle + 3.5, LABEL_SIZE, "end")
-        out += svg_text(str(place + 1), NAMES_WIDTH + middle, TOP_MARGIN - 5, 7.5, "middle", fill=palette.PALE)
+        out += svg_text(str(place + 1), NAMES_WIDTH + middle, TOP_MARGIN - 5, 8.5, "middle", fill=palette.PALE)
     cosines = card.cosines[view][np.ix_(chosen, chosen)]
     out += "".join(
         _draw_cell(row, column, float(cosines[row, column])) for row in range(count) for column in range(count)
@@ -242,8 +249,9 @@ def card_page(card: Card) -> str:
         __package__,
         "card.html",
         f"Confusability of {card.trajectory}",
-        explanation=explain_card(card),
-        hidden=[each.label for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE],
+        verdict=_verdict(card),
+        explanations=(_about_card(card), *EXPLANATIONS),
+        hidden=[_words(each) for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE],
         views=views,
     )
 
@@ -251,11 +259,26 @@ def card_page(card: Card) -> str:
 def _classes_table(card: Card, view: str) -> Table:
     rows = []
     for each in card.entries:
-        for place, rival in enumerate(each.rivals[view][:MAX_SHOWN_RIVALS]):
-            own = (each.label, f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
-            beside = (card.entries[rival.index].label, f"{rival.cosine:.3f}", _size_text(rival.separation))
-            rows.append([*(own if place == 0 else ("", "", "")), *beside])
-    return Table(PAGE_HEADINGS, rows, (0, 3))
+        for rival in each.rivals[view][:MAX_SHOWN_RIVALS]:
+            own = (_words(each), f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
+            beside = (_words(card.entries[rival.index]), f"{rival.cosine:.3f}", _size_text(rival.separation))
+            rows.append([*own, *beside])
+    return Table(PAGE_HEADINGS, rows, (0, 3), stacked=True)
+
+
+def _verdict(card: Card) -> str:
+    """How many of the effects this motion cannot separate, in the nominal view and after a refit."""
+    mixed = [sum(bool(each.rivals[view]) for each in card.entries) for view in VIEWS]
+    return (
+        f"Of {len(card.entries)} effects and places this motion cannot separate {mixed[0]} from another one; after a "
+        f"refit, {mixed[1]}."
+    )
+
+
+def _words(entry: Entry) -> str:
+    """Effect, place and form as a person says them."""
+    name = f"{effect_in_words(entry.effect)}, {place_in_words(entry.effect, entry.joint, entry.joints)}"
+    return f"{name} ({entry.form})" if entry.form else name
 
 
 def write_card(

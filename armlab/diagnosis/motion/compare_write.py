@@ -7,6 +7,7 @@ from pathlib import Path
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.common.report.numbers import format_unit
 from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
@@ -36,9 +37,9 @@ def comparison_summary(comparison: MotionComparison) -> str:
 
 def change_phrase(change: ServoChange) -> str:
     """A change with its numbers."""
-    unit = "" if change.parameter.unit == "1" else f" {change.parameter.unit.replace('.', ' ')}"
+    unit = format_unit(change.parameter.unit)
     words = f"{effect_named(change.parameter.effect).words} at joint {change.joint} ({change.parameter.name} from "
-    words += f"{change.old:.4g} to {change.new:.4g}{unit}"
+    words += f"{change.old:.4g} to {change.new:.4g} {unit}".rstrip()
     if change.ratio is not None:
         return f"{words}, a factor of {change.ratio[0]:.4g}, {change.ratio[1]:.4g} to {change.ratio[2]:.4g})"
     low, high = change.difference_interval
@@ -115,10 +116,10 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
             str(each.joint),
             each.parameter.key,
             f"{each.old:.4g}",
-            f"{each.new:.4g}" if each.changed else "–",
+            f"{each.new:.4g}" if each.changed else "unchanged",
             f"{each.difference_interval[0]:.3g} to {each.difference_interval[1]:.3g}",
             f"{each.detectable:.3g}",
-            each.parameter.unit,
+            format_unit(each.parameter.unit),
         )
         for each in comparison.changes
     ]
@@ -130,7 +131,7 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
         status="inconclusive" if comparison.reason else "mismatch" if comparison.changed else "none",
         summary=comparison_summary(comparison),
         numbers=Table(headings, rows, (1, 6), stacked=True),
-        notes=comparison.notes or ("nothing else was recorded",),
+        notes=comparison.notes,
         command=command,
     )
 

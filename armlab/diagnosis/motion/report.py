@@ -4,6 +4,7 @@ import numpy as np
 from markupsafe import Markup
 
 from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
+from armlab.common.report.numbers import format_unit
 from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.export import lines_without_field
@@ -52,10 +53,9 @@ def _joint_table(diagnosis: MotionDiagnosis) -> Table:
 
 def _finding_cell(finding: ServoFinding) -> str:
     low, high = finding.interval
-    unit = "" if finding.parameter.unit == "1" else f" {finding.parameter.unit.replace('.', ' ')}"
+    value = f"{finding.value:.4g} {format_unit(finding.parameter.unit)}".rstrip()
     known = f", not {finding.nominal:.4g}" if finding.nominal == finding.nominal else ""
-    words = f"{effect_named(finding.effect).words}: {finding.name}"
-    return f"{words} {finding.value:.4g}{unit} ({low:.4g} to {high:.4g}){known}"
+    return f"{effect_named(finding.effect).words}: {finding.name} {value} ({low:.4g} to {high:.4g}){known}"
 
 
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
@@ -63,7 +63,7 @@ def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
     steps = {
         each.parameter.experiment or effect_named(each.effect).experiment for each in diagnosis.findings if each.rivals
     }
-    return sorted(step for step in steps if step)
+    return sorted(f"{step[0].upper()}{step[1:]}." for step in steps if step)
 
 
 def _error_table(diagnosis: MotionDiagnosis) -> Table:
@@ -120,7 +120,7 @@ def _number_table(diagnosis: MotionDiagnosis) -> Table:
                 continue
             given = "unknown" if np.isnan(nominal) else "none" if nominal >= INFINITE_LIMIT else f"{nominal:.4g}"
             interval = f"{low[place]:.4g} to {high[place]:.4g}"
-            rows.append((str(row + 1), parameter.key, given, f"{value:.4g}", interval, parameter.unit))
+            rows.append((str(row + 1), parameter.key, given, f"{value:.4g}", interval, format_unit(parameter.unit)))
     headings = ("joint", "number", "simulation", "found", "95 % interval", "unit")
     return Table(headings, rows, (1, 5), stacked=True)
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from itertools import groupby
 
+from armlab.common.report.numbers import format_unit
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.servo import PARAMETERS
 from armlab.effects.library import effect_named
@@ -40,13 +41,15 @@ def findings_by_effect(diagnosis: MotionDiagnosis) -> list[tuple[str, list[int]]
 def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     if not diagnosis.errors:
         return ""
-    after = ", ".join(f"{1e3 * each.replay_after:.3g}" for each in diagnosis.errors)
-    if any(each.replay_before is None for each in diagnosis.errors):
-        return f" Replay error of held-out runs: {after} mrad (joint by joint)."
-    before = ", ".join(f"{1e3 * (each.replay_before or 0.0):.3g}" for each in diagnosis.errors)
+    places = [(f"joint {each.joint}", each.replay_before, each.replay_after, "mrad") for each in diagnosis.errors]
     tool_before, tool_after = diagnosis.tool
-    tool = f"; at the tool {1e3 * (tool_before or 0.0):.3g} to {1e3 * tool_after:.3g} mm"
-    return f" Replay error of held-out runs, joint by joint: {before} to {after} mrad{tool}."
+    if tool_before is not None:
+        places.append(("at the tool", tool_before, tool_after, "mm"))
+    words = [
+        f"{place} {'' if before is None else f'from {1e3 * before:.3g} to '}{1e3 * after:.3g} {unit}"
+        for place, before, after, unit in places
+    ]
+    return f" Replay error of held-out runs: {', '.join(words)}."
 
 
 def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
@@ -78,9 +81,9 @@ def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
 def finding_phrase(finding: ServoFinding) -> str:
     """A finding in one line."""
     low, high = finding.interval
-    unit = finding.parameter.unit.replace(".", " ")
+    unit = format_unit(finding.parameter.unit)
     words = f"joint {finding.joint}: {effect_named(finding.effect).words}, {finding.name} {finding.value:.4g} "
-    words += f"({low:.4g} to {high:.4g}){'' if unit == '1' else f' {unit}'}"
+    words += f"({low:.4g} to {high:.4g}){f' {unit}' if unit else ''}"
     known = f"; the simulation has {finding.nominal:.4g}" if finding.nominal == finding.nominal else ""
     rivals = " or ".join(effect_named(each).words for each in finding.rivals)
     return f"{words}{known}{f'; it could also be {rivals}' if rivals else ''}"

@@ -7,17 +7,11 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from armlab.common.errors import InputError
+from armlab.common.report.numbers import format_number, format_unit
 from armlab.diagnosis.real_arms.direct_reading import DirectLevel, direct_levels
 from armlab.diagnosis.real_arms.judged_run import joint_rms
 from armlab.diagnosis.real_arms.study import ArmStudy
-from armlab.diagnosis.report.words import (
-    effect_in_words,
-    format_number,
-    format_probability,
-    format_unit,
-    joint_unit,
-    parameter_rows,
-)
+from armlab.diagnosis.report.words import effect_in_words, format_probability, joint_unit, parameter_rows
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.contract import Candidate
 from armlab.effects.coupling import JOINT_COUPLING

@@ -6,19 +6,14 @@ from io import StringIO
 import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.report.numbers import format_number
 from armlab.diagnosis.real_arms.checks import MIN_FRICTION_SHARE, Check, mass_agreement, mass_claims, named_mass
 from armlab.diagnosis.real_arms.checks import numbers_in_words as claim_numbers
 from armlab.diagnosis.real_arms.direct_reading import MIDDLE
 from armlab.diagnosis.real_arms.figure import MODEL_STYLES, PICTURE_NAME
 from armlab.diagnosis.real_arms.study import AloneStudy, ArmStudy, Line, ModelName
 from armlab.diagnosis.report.verdict import verdict_sentences
-from armlab.diagnosis.report.words import (
-    effect_in_words,
-    finding_in_words,
-    format_number,
-    joint_unit,
-    place_in_words,
-)
+from armlab.diagnosis.report.words import effect_in_words, finding_in_words, joint_unit, place_in_words
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR
 from armlab.identification.real.looks import LOOKS_FILE

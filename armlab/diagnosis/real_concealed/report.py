@@ -15,13 +15,14 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report import palette
+from armlab.common.report.numbers import format_number, format_unit
 from armlab.common.report.palette import svg_text
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.real_concealed.examine import Outcome, ReportedFinding, open_outcomes
 from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
 from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
-from armlab.diagnosis.report.words import effect_in_words, format_number, format_unit, place_in_words
+from armlab.diagnosis.report.words import effect_in_words, place_in_words
 from armlab.effects.contract import UNKNOWN
 from armlab.identification.real.looks import LOOKS_FILE, Looks
 

@@ -6,6 +6,7 @@ from importlib.metadata import version
 
 from markupsafe import Markup
 
+from armlab.common.report.numbers import count_of, format_number
 from armlab.common.report.page import Table
 from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
@@ -13,7 +14,6 @@ from armlab.diagnosis.report.words import (
     effect_in_words,
     finding_in_words,
     format_gap,
-    format_number,
     format_probability,
     format_share,
     join_words,
@@ -274,7 +274,7 @@ def origin_of(diagnosis: Diagnosis, command: str) -> Origin:
     name = recording.simulation.name if recording.simulation else f"links of {recording.robot}"
     rows = [
         ["recording", recording.name],
-        ["robot", f"{simulation.arm.name}, {len(simulation.arm)} joint(s)"],
+        ["robot", f"{simulation.arm.name}, {count_of(len(simulation.arm), 'joint')}"],
         ["compared with", compared[simulation.kind] + (f" ({name})" if simulation.kind == "nominal" else "")],
         *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
         *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),

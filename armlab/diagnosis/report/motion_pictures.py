@@ -19,7 +19,8 @@ from armlab.common.report.charts import (
     draw_chart,
     fit_axis,
 )
-from armlab.diagnosis.report.words import format_number, join_words, shorten_name
+from armlab.common.report.numbers import format_number
+from armlab.diagnosis.report.words import join_words, shorten_name
 from armlab.diagnosis.resimulate import WINDOW_SECONDS, NoInertiaError, Resimulation, resimulate
 from armlab.diagnosis.result import Diagnosis
 from armlab.recordings.recording import Run

@@ -11,14 +11,8 @@ from itertools import starmap
 
 import numpy as np
 
-from armlab.diagnosis.report.words import (
-    effect_in_words,
-    format_fixed,
-    format_measured,
-    format_unit,
-    join_words,
-    place_in_words,
-)
+from armlab.common.report.numbers import format_unit
+from armlab.diagnosis.report.words import effect_in_words, format_fixed, format_measured, join_words, place_in_words
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import UNKNOWN, Effect

@@ -33,8 +33,9 @@ from armlab.common.report.charts import (
     svg_text,
     text_width,
 )
+from armlab.common.report.numbers import format_number
 from armlab.diagnosis.report.residuals import ShownResiduals, bin_means, clearest_stretch, residual_without, space_rows
-from armlab.diagnosis.report.words import effect_in_words, format_number, joint_unit, shorten_name
+from armlab.diagnosis.report.words import effect_in_words, joint_unit, shorten_name
 from armlab.diagnosis.result import Claim, Diagnosis
 
 STRETCH_SECONDS = 4.0

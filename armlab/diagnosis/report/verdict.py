@@ -5,13 +5,13 @@ from textwrap import wrap
 
 import numpy as np
 
+from armlab.common.report.numbers import format_number
 from armlab.diagnosis.report.residuals import is_white, select_residuals
 from armlab.diagnosis.report.sentences import findings_in_sentences, model_in_words
 from armlab.diagnosis.report.words import (
     effect_in_words,
     finding_in_words,
     format_gap,
-    format_number,
     format_probability,
     joint_unit,
     place_in_words,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from armlab.common.report.numbers import format_number, format_unit
 from armlab.diagnosis.result import Claim, Rival
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
@@ -43,24 +44,6 @@ def finding_in_words(claim: Claim | Rival) -> str:
 def shorten_name(name: str) -> str:
     """The name of a file, cut to MAX_NAME_LENGTH letters."""
     return name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}…"
-
-
-def format_number(value: float, digits: int = 3) -> str:
-    """A number with `digits` significant digits, and with an exponent only where it is very large or small."""
-    if not math.isfinite(value):
-        return "none" if math.isnan(value) else ("∞" if value > 0 else "−∞")
-    size = abs(value)
-    text = f"{value:.{digits}g}"
-    if 10**digits <= size < 1e6:
-        text = f"{value:.0f}"
-    elif size >= 1e6 or 0 < size < 1e-4:
-        text = f"{value:.{digits - 1}e}"
-    return text.replace("-", "−")
-
-
-def format_unit(text: str) -> str:
-    """A unit as people write it: N m s/rad, kg m²."""
-    return "" if text == "1" else text.replace("m2", "m²").replace("s2", "s²").replace(".", " ")
 
 
 def joint_unit(arm: Arm, joint: int) -> str:

@@ -2,9 +2,11 @@
 
 import base64
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import pandas as pd
 from markdown_it import MarkdownIt
+from markdown_it.token import Token
 from markupsafe import Markup
 
 from armlab.common.markdown import markdown_page, markdown_table
@@ -26,12 +28,34 @@ def markdown_to_html(title: str, text: str, images: Mapping[str, bytes]) -> str:
     """
     parser = MarkdownIt("commonmark").enable("table")
     tokens = parser.parse(text)
+    _stack_tables(tokens)
     for token in tokens:
         for child in token.children or ():
             if child.type == "image":
                 child.attrs["src"] = _data_uri(images[str(child.attrs["src"])])
-    body = parser.renderer.render(tokens, parser.options, {})
+    body = str(parser.renderer.render(tokens, parser.options, {}))
+    body = body.replace("<table", '<div class="wide" tabindex="0"><table').replace("</table>", "</table></div>")
     return render_page("bench.studies.paper", "replication.html", title, body=Markup(body))
+
+
+def _stack_tables(tokens: Sequence[Token]) -> None:
+    """Marks tables as the stylesheet has them: on a phone each row is a card whose cells bear their headings."""
+    headings: list[str] = []
+    column = 0
+    for token, content in pairwise(tokens):
+        match token.type:
+            case "table_open":
+                token.attrSet("class", "stacked")
+                headings = []
+            case "tr_open":
+                column = 0
+            case "th_open":
+                token.attrSet("class", "text")
+                headings.append(content.content)
+            case "td_open":
+                token.attrSet("class", "text")
+                token.attrSet("data-label", headings[column])
+                column += 1
 
 
 def _data_uri(image: bytes) -> str:

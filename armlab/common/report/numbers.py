@@ -1,0 +1,26 @@
+"""Numbers and units as people write them."""
+
+import math
+
+
+def format_number(value: float, digits: int = 3) -> str:
+    """A number with `digits` significant digits, and with an exponent only where it is very large or small."""
+    if not math.isfinite(value):
+        return "none" if math.isnan(value) else ("∞" if value > 0 else "−∞")
+    size = abs(value)
+    text = f"{value:.{digits}g}"
+    if 10**digits <= size < 1e6:
+        text = f"{value:.0f}"
+    elif size >= 1e6 or 0 < size < 1e-4:
+        text = f"{value:.{digits - 1}e}"
+    return text.replace("-", "−")
+
+
+def format_unit(text: str) -> str:
+    """A unit as people write it: N m s/rad, kg m²."""
+    return "" if text == "1" else text.replace("m2", "m²").replace("s2", "s²").replace(".", " ")
+
+
+def count_of(number: int, what: str) -> str:
+    """`1 joint`, `2 joints`."""
+    return f"{number} {what}{'' if number == 1 else 's'}"
