@@ -47,7 +47,10 @@ def test_identify_tells_parameters_condition_number_and_errors_and_writes_model_
     assert "run-1.csv             validate" in text
     model = Model.load(out / "model.yaml")
     assert model.provenance["runs"] == ("run-0.csv",)
-    assert "data:image/png" in (out / "report.html").read_text()
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "data:image/png" in page
+    assert "viscous friction, joint 1: coefficient" in page
+    assert '<td data-label="95 % interval">' in page
 
 
 def test_predict_meets_the_recorded_torque_and_writes_what_it_predicts(recording: Path, tmp_path: Path) -> None:
