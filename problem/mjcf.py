@@ -21,7 +21,9 @@ def import_mujoco() -> Any:
     try:
         import mujoco
     except ImportError:
-        raise InputError("MuJoCo is missing, which MJCF files and replay need: pip install 'armlab[motion]'") from None
+        raise InputError(
+            "MuJoCo is missing, which MJCF files, replay and distances need: pip install 'armlab[motion]'"
+        ) from None
     return mujoco
 
 

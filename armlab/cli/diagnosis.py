@@ -3,11 +3,13 @@
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import click
 
 from armlab.cli.options import FiniteNumber, OutputPath
 from armlab.cli.output import prints_lines, prints_result, tell_progress
+from armlab.cli.safety_options import safety_options
 from armlab.common.documents import ResultLines
 
 _FILE = click.Path(path_type=Path)
@@ -34,6 +36,7 @@ _FILE = click.Path(path_type=Path)
 @click.option("--rate", "rate_hz", type=FiniteNumber(min=1, max=100_000), default=250.0, show_default=True, help="Hz.")
 @click.option("--out", type=OutputPath(), default=Path("next"), show_default=True)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@safety_options
 @prints_result
 def next_experiment(
     verdict: Path,
@@ -48,17 +51,19 @@ def next_experiment(
     rate_hz: float,
     out: Path,
     seed: int,
+    safety: Any,
 ) -> ResultLines:
     """Design the motion that decides between rival effects.
 
     VERDICT: a verdict whose findings have rivals. Writes the motion as CSV, ROS 2 message and RAPID module, with a
-    card and a picture.
+    card and a picture. The motion stays near the range of the recording, starts near its first pose, and keeps off
+    itself, the floor and the boxes that are given; the card says what was checked and what was not.
     """
     from armlab.cli.next_experiment import write_next_experiment
     from armlab.diagnosis.next.motion import Budget
 
     budget = Budget(duration, harmonics, algorithm, evaluations, seed)
-    return write_next_experiment(verdict, robot, recording, rivals, budget, links, rate_hz, out)
+    return write_next_experiment(verdict, robot, recording, rivals, budget, links, safety, rate_hz, out)
 
 
 @click.command()

@@ -9,6 +9,7 @@ import click
 
 from armlab.cli.options import FiniteNumber, OutputPath
 from armlab.cli.output import prints_lines, prints_result, trial_bar
+from armlab.cli.safety_options import safety_options
 from armlab.common.documents import Document, ResultLines, written_files
 
 _DEFAULT_STORE = Path(".armlab/runs.sqlite")
@@ -457,15 +458,38 @@ def does_it_help(workers: int | None, results: Path) -> ResultLines:
     help="Sampling rate, Hz.",
 )
 @click.option("--out", type=OutputPath(), required=True)
+@click.option("--recording", type=_PATH, help="The motion stays near its range and starts near its first pose.")
 @_RESULTS_OPTION
+@safety_options
 @prints_result
-def export(problem: Path, record: str, form: str, rate_hz: float, out: Path, results: Path) -> ResultLines:
+def export(
+    problem: Path,
+    record: str,
+    form: str,
+    rate_hz: float,
+    out: Path,
+    recording: Path | None,
+    results: Path,
+    safety: Any,
+) -> ResultLines:
     """Write a best known trajectory for a robot controller.
 
-    Refuses a trajectory that breaks a limit of PROBLEM at the controller's rate.
+    Refuses a trajectory that breaks a limit of PROBLEM at the controller's rate, that comes too close to itself, the
+    floor or a box, or that leaves the range or the pose that are given. Says what was checked and what was not.
     """
     from bench.studies.best_known.export import export_record as write
     from bench.studies.best_known.records import RECORDS_FILE
 
-    write(problem, record, form, out, results / RECORDS_FILE, rate_hz)
-    return written_files([out])
+    place = None if recording is None else _read_place(recording)
+    exported = write(problem, record, form, out, results / RECORDS_FILE, rate_hz, safety, place)
+    yield from exported.safety.lines()
+    document = yield from written_files([out])
+    return {**document, "safety": exported.safety.content()}
+
+
+def _read_place(recording: Path) -> Any:
+    """Where a recording was."""
+    from armlab.diagnosis.next.motion import recorded_place
+    from armlab.recordings.load import load_recording
+
+    return recorded_place(load_recording(recording))

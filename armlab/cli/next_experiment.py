@@ -15,6 +15,7 @@ from armlab.diagnosis.next.experiment import Experiment, design_experiment
 from armlab.diagnosis.next.motion import Budget
 from armlab.diagnosis.next.prepare import LinkKnowledge
 from bench.trajectory_files import TRAJECTORY_FORMATS, sample_trajectory
+from problem.safe_motion import SafetySettings
 
 MOTION_FILES = {"csv": "next.csv", "ros2": "next.ros2.yaml", "rapid": "next.mod"}
 
@@ -26,6 +27,7 @@ def write_next_experiment(
     rivals: str | None,
     budget: Budget,
     links: str | None,
+    safety: SafetySettings,
     rate_hz: float,
     out: Path,
 ) -> ResultLines:
@@ -34,7 +36,7 @@ def write_next_experiment(
     Raises InputError for a file or an option that cannot be used.
     """
     known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
-    experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links)
+    experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links, safety)
     yield from card_lines(experiment)
     card = card_content(experiment)
     files: dict[str, str | bytes] = {"next.json": json.dumps(card, indent=1, allow_nan=False) + "\n"}

@@ -44,7 +44,7 @@ def write(tmp_path: Path, name: str = "gentle", share: float = 0.3, **settings: 
 
 def exported(tmp_path: Path, form: str, rate_hz: float = 50.0) -> tuple[SampledTrajectory, str]:
     out = tmp_path / "out"
-    trajectory = export_record(write(tmp_path), "gentle", form, out, tmp_path / RECORDS_FILE, rate_hz)
+    trajectory = export_record(write(tmp_path), "gentle", form, out, tmp_path / RECORDS_FILE, rate_hz).trajectory
     return trajectory, out.read_text()
 
 
@@ -142,7 +142,7 @@ def test_rapid_is_a_module_of_timed_moves_through_all_targets_in_degrees(tmp_pat
 def test_the_best_known_trajectory_from_rest_to_rest_is_exported_at_250_hz(tmp_path: Path, form: str) -> None:
     out = tmp_path / f"best.{form}"
     problem, records = ROOT / "configs" / "export.yaml", ROOT / "results" / RECORDS_FILE
-    trajectory = export_record(problem, "joint-fourier-rest-250hz", form, out, records)
+    trajectory = export_record(problem, "joint-fourier-rest-250hz", form, out, records).trajectory
     motion = trajectory.motion
     assert trajectory.rate_hz == 250.0
     assert out.exists()

@@ -38,6 +38,8 @@ def card_lines(experiment: Experiment) -> Iterator[str]:
     for number, chances in enumerate(experiment.chances):
         if chances is not None:
             yield _chances_line(chances, experiment, number)
+    if experiment.safety is not None:
+        yield from experiment.safety.lines()
     budget = experiment.budget
     yield f"designed in {experiment.seconds:.1f} s with {budget.evaluations} evaluations of {budget.algorithm}"
 
@@ -68,6 +70,7 @@ def card_content(experiment: Experiment) -> dict[str, Any]:
         "seed": budget.seed,
         "seconds": round(experiment.seconds, 2),
         "limits": [_limits_content(each) for each in experiment.excitation.constraints.limits],
+        "safety": None if experiment.safety is None else experiment.safety.content(),
         "questions": [_question_content(experiment, number) for number in range(len(experiment.chances))],
     }
 

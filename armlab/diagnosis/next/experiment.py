@@ -17,7 +17,9 @@ from armlab.diagnosis.next.motion import (
     limits_in_force,
     random_generator,
     random_point,
+    recorded_place,
     search_motion,
+    secure_motion,
 )
 from armlab.diagnosis.next.prepare import LinkKnowledge, PreparedQuestions, find_nearby_names, prepare_questions
 from armlab.diagnosis.next.problem import TellApartProblem, tell_apart_problem
@@ -29,6 +31,8 @@ from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.excitation import ExcitationProblem
 from problem.robot_file import load_arm
+from problem.safe_motion import SafetyRules, SafetySettings, safety_rules
+from problem.safety_proof import SafetyReport
 
 RANDOM_MOTIONS = 20  # random motions that a design is compared with
 WHOLE_LIBRARY = "library"  # in place of names: all names that explain the data nearly as well
@@ -54,7 +58,10 @@ class RivalPair:
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """point: (dimension,) of the designed motion, None where no motion helps. chances: one a question."""
+    """point: (dimension,) of the designed motion, None where no motion helps. chances: one a question.
+
+    safety: what was checked of the motion beside its limits, None where there is no motion.
+    """
 
     prepared: PreparedQuestions
     excitation: ExcitationProblem
@@ -63,24 +70,34 @@ class Experiment:
     point: Array | None
     pairs: tuple[RivalPair, ...]
     chances: tuple[Chances | None, ...]
+    safety: SafetyReport | None
     seconds: float
 
 
 def design_experiment(
-    verdict: Path, robot: str, recording: Path | None, rivals: str | None, budget: Budget, links: LinkKnowledge | None
+    verdict: Path,
+    robot: str,
+    recording: Path | None,
+    rivals: str | None,
+    budget: Budget,
+    links: LinkKnowledge | None,
+    safety: SafetySettings,
 ) -> Experiment:
     """Designs the next experiment; InputError, in one line, for anything that cannot be used."""
     began = time.perf_counter()
     arm = load_arm(robot)
     recorded = None if recording is None else load_recording(recording)
-    prepared, excitation = prepare_experiment(verdict, arm, recorded, rivals, budget, links)
-    problem = point = None
+    _check_same_joints(arm, recorded)
+    place = None if recorded is None else recorded_place(recorded)
+    rules = safety_rules(arm, robot, limits_in_force(arm, recorded), safety, place)
+    prepared, excitation = prepare_experiment(verdict, arm, recorded, rivals, budget, links, rules)
+    problem = point = report = None
     if any(question.pairs for question in prepared.questions):
         problem = tell_apart_problem(prepared, excitation)
-        point = search_motion(problem, budget)
+        point, report = secure_motion(problem, search_motion(problem, budget), rules)
     pairs = _compare_pairs(prepared, excitation, problem, point, budget)
     chances = tuple(_question_chances(prepared, question, problem, point, budget) for question in prepared.questions)
-    return Experiment(prepared, excitation, budget, problem, point, pairs, chances, time.perf_counter() - began)
+    return Experiment(prepared, excitation, budget, problem, point, pairs, chances, report, time.perf_counter() - began)
 
 
 def prepare_experiment(
@@ -90,22 +107,26 @@ def prepare_experiment(
     rivals: str | None,
     budget: Budget,
     links: LinkKnowledge | None,
+    safety: SafetyRules | None = None,
 ) -> tuple[PreparedQuestions, ExcitationProblem]:
     """The questions of a verdict, and the motions that this arm may make."""
     loaded_verdict = read_verdict(verdict)
-    if recording is not None and len(recording.arm) != len(arm):
-        raise InputError(f"{recording.name} has {len(recording.arm)} joints, {arm.name} {len(arm)}")
+    _check_same_joints(arm, recording)
     if len(loaded_verdict.noise) not in (0, len(arm)) or (not len(loaded_verdict.noise) and recording is None):
         raise InputError(
             f"{loaded_verdict.path} tells the noise of {len(loaded_verdict.noise)} joints, {arm.name} has {len(arm)}"
         )
-    limits = limits_in_force(arm, recording)
-    excitation = build_excitation_problem(arm, limits, budget)
+    excitation = build_excitation_problem(arm, limits_in_force(arm, recording), budget, safety)
     known_links = links or infer_link_knowledge(loaded_verdict, arm)
     groups = choose_rival_groups(loaded_verdict, arm, excitation, recording, rivals, known_links, budget)
     return prepare_questions(
         loaded_verdict, groups, arm, excitation.trajectory, budget.duration, recording, known_links, budget.seed
     ), excitation
+
+
+def _check_same_joints(arm: Arm, recording: Recording | None) -> None:
+    if recording is not None and len(recording.arm) != len(arm):
+        raise InputError(f"{recording.name} has {len(recording.arm)} joints, {arm.name} {len(arm)}")
 
 
 def infer_link_knowledge(verdict: VerdictWithModel, arm: Arm) -> LinkKnowledge:

@@ -1,5 +1,5 @@
-"""The motions of a design: limits in force, Fourier series within these limits, and the search with any registered
-algorithm.
+"""The motions of a design: limits in force, Fourier series within these limits that start anywhere or near a pose, and
+the search with any registered algorithm.
 """
 
 import zlib
@@ -22,6 +22,8 @@ from problem.excitation import ExcitationProblem, FeasibilityRules
 from problem.fitness import Criterion
 from problem.limits import Constraints, peaks
 from problem.motion import Motion
+from problem.safe_motion import RecordedPlace, SafeConstraints, SafetyRules
+from problem.safety_proof import SafetyReport, UnsafeMotionError, check_motion
 from problem.trajectories import Excitation, JointFourier, sample_instants
 
 USED_LIMIT_SHARE = 0.995  # of each limit is used: peaks may lie between the instants at which they are looked for
@@ -69,6 +71,10 @@ class WithinLimits:
         room = (1 - CENTRE_RANGE_SHARE) * (high - low) / 2
         return np.asarray(np.clip(every, low + room, high - room))
 
+    def _anchors(self, points: Array, position: Array) -> Array:
+        """What the swing is measured from, q0: (points, 1, joints). position: at the instants of the peaks."""
+        return points.reshape(len(points), len(self.limits), -1)[:, None, :, -1]
+
     @property
     def _range(self) -> tuple[Array, Array]:
         """Lowest and highest position that are used, (joints,) each."""
@@ -79,7 +85,7 @@ class WithinLimits:
     def _scale(self, points: Array, rest: Array) -> Array:
         """Share of the swing that the limits allow, (points, 1, joints)."""
         motion = self.series.motions(points, self._instants).motion
-        swing = motion.position - points.reshape(len(points), len(self.limits), -1)[:, None, :, -1]
+        swing = motion.position - self._anchors(points, motion.position)
         shares = [np.ones(rest.shape)]
         with np.errstate(divide="ignore", invalid="ignore"):
             for each, room in self._used_and_allowed(swing, motion, rest):
@@ -101,6 +107,32 @@ class WithinLimits:
     @cached_property
     def _instants(self) -> Array:
         return sample_instants(self.series.duration, PEAK_INSTANTS)
+
+
+@dataclass(frozen=True, eq=False)
+class FromPose(WithinLimits):
+    """The same where the last number of a joint is the position in which the motion starts and ends, not q0."""
+
+    def motions(self, points: Array, times: Array) -> Excitation:
+        """Motions (points, samples, joints) of points (points, dimension) at `times` (samples,), s."""
+        start = points.reshape(len(points), len(self.limits), -1)[:, None, :, -1]
+        scale = self._scale(points, start)
+        first = self.series.motions(points, self._instants[:1]).motion.position
+        motion = self.series.motions(points, times).motion
+        moved = Motion(start + scale * (motion.position - first), scale * motion.velocity, scale * motion.acceleration)
+        return Excitation(moved, np.zeros(len(points)))
+
+    def _anchors(self, points: Array, position: Array) -> Array:
+        """The start, from which the swing is measured: (points, 1, joints)."""
+        return position[:, :1]
+
+    @classmethod
+    def near(cls, free: WithinLimits, start: Array, reach: Array) -> "FromPose":
+        """The motions of `free` that start within `reach` of `start`, (joints,) each."""
+        low, high = free._range
+        lowest, highest = np.clip(start - reach, low, high), np.clip(start + reach, low, high)
+        series = replace(free.series, centre=(lowest + highest) / 2, reach=(highest - lowest) / 2)
+        return cls(series, free.limits)
 
 
 def fourier_within_limits(limits: tuple[Limits, ...], duration: float, harmonics: int) -> WithinLimits:
@@ -152,15 +184,28 @@ def limits_in_force(arm: Arm, recording: Recording | None) -> tuple[Limits, ...]
     return tuple(out)
 
 
-def build_excitation_problem(arm: Arm, limits: tuple[Limits, ...], budget: Budget) -> ExcitationProblem:
-    """The problem of the smallest condition number for the same motions and limits."""
+def build_excitation_problem(
+    arm: Arm, limits: tuple[Limits, ...], budget: Budget, safety: SafetyRules | None = None
+) -> ExcitationProblem:
+    """The problem of the smallest condition number for the same motions and limits, which `safety` may narrow."""
+    limits = limits if safety is None else safety.limits
     if any(np.isfinite(limit.torque) for limit in limits) and arm.links is None:
         limits = tuple(replace(limit, torque=np.inf) for limit in limits)
     trajectory = fourier_within_limits(limits, budget.duration, budget.harmonics)
+    if safety is not None and safety.start is not None:
+        trajectory = FromPose.near(trajectory, safety.start, safety.start_reach)
     samples = round(budget.duration * LIMIT_CHECK_HZ) + 1
-    constraints, rules = Constraints(arm, limits), FeasibilityRules()
+    constraints = Constraints(arm, limits) if safety is None else SafeConstraints(arm, limits, rules=safety)
     return ExcitationProblem(
-        "condition", arm, base_parameters(arm), trajectory, budget.duration, samples, constraints, Criterion(), rules
+        name="condition",
+        arm=arm,
+        base=base_parameters(arm),
+        trajectory=trajectory,
+        duration=budget.duration,
+        samples=samples,
+        constraints=constraints,
+        criterion=Criterion(),
+        penalty=FeasibilityRules(),
     )
 
 
@@ -173,6 +218,7 @@ def search_motion(problem: Problem, budget: Budget) -> Array:
     box = Box(problem.lower, problem.upper)
     rng = random_generator(problem.name, budget)
     population = uniform_points(POPULATION_SIZE, box, rng)
+    population[::2] = [shrink_motion(problem, point) for point in population[::2]]
 
     def objective(points: Array) -> Array:
         return problem.evaluate(points).fitness
@@ -185,18 +231,72 @@ def search_motion(problem: Problem, budget: Budget) -> Array:
 
 
 def random_point(problem: Problem, budget: Budget, tries: int = 200) -> Array:
-    """A random point (dimension,) whose motion keeps the limits."""
+    """A random point (dimension,) whose motion keeps the limits, smaller where safety rules ask for it."""
     rng = random_generator("random motion", budget)
     for _ in range(tries):
-        point = uniform_points(1, Box(problem.lower, problem.upper), rng)
-        if problem.evaluate(point).violation[0] == 0:
-            return np.asarray(point[0])
+        point = shrink_motion(problem, uniform_points(1, Box(problem.lower, problem.upper), rng)[0])
+        if problem.evaluate(point[None]).violation[0] == 0:
+            return point
     raise InputError(f"{tries} random motions all break a limit")
+
+
+SHRINK_SHARES = (1.0, 0.85, 0.7, 0.55, 0.4, 0.3, 0.2, 0.1, 0.05, 0.0)  # of the way from standing still to a motion
+
+
+def shrink_motion(problem: Problem, point: Array) -> Array:
+    """The point (dimension,), moved towards standing still in a safe pose until its motion keeps the safety rules.
+
+    A problem without safety rules leaves it as it is.
+    """
+    if not isinstance(problem, ExcitationProblem) or not isinstance(problem.constraints, SafeConstraints):
+        return point
+    still = _still_point(problem, problem.constraints.rules)
+    shrunk = (still + share * (point - still) for share in SHRINK_SHARES)
+    kept = (
+        each
+        for each in shrunk
+        if problem.constraints.violation(problem.trajectory.motions(each[None], problem.times))[0] == 0
+    )
+    return next(kept, point)
+
+
+def secure_motion(problem: ExcitationProblem, point: Array, rules: SafetyRules) -> tuple[Array, SafetyReport]:
+    """A point whose motion is shown to keep its rules at every instant, and what was checked of it.
+
+    The motion of `point` (dimension,), smaller where it needs to be: a search sees fewer poses than a proof. Raises
+    InputError where none is found.
+    """
+    still, told = _still_point(problem, rules), ""
+    for share in SECURE_SHARES:
+        chosen = still + share * (point - still)
+        try:
+            return chosen, check_motion(rules, problem.trajectory, chosen, problem.duration)
+        except UnsafeMotionError as error:
+            told = told or str(error)
+    raise InputError(f"{problem.name}: no motion is found that keeps the safety rules: {told}")
+
+
+SECURE_SHARES = (1.0, 0.99, 0.97, 0.94, 0.9, 0.8, 0.65, 0.5)  # of a motion that a search has found
+
+
+def _still_point(problem: ExcitationProblem, rules: SafetyRules) -> Array:
+    """The point (dimension,) of standing still in the safe pose."""
+    out = np.zeros((len(problem.arm), len(problem.lower) // len(problem.arm)))
+    out[:, -1] = rules.still
+    return out.ravel()
 
 
 def random_generator(purpose: str, budget: Budget) -> np.random.Generator:
     """The stream of random numbers for one purpose."""
     return np.random.default_rng([budget.seed, zlib.crc32(purpose.encode())])
+
+
+def recorded_place(recording: Recording) -> RecordedPlace:
+    """The range of a recording and the pose in which its first run starts."""
+    positions = [run.position for run in recording.runs]
+    lowest = np.min([each.min(axis=0) for each in positions], axis=0)
+    highest = np.max([each.max(axis=0) for each in positions], axis=0)
+    return RecordedPlace(lowest, highest, np.asarray(positions[0][0]))
 
 
 def _limits_shown(recording: Recording) -> list[Limits]:
