@@ -20,7 +20,6 @@ from problem.mjcf import import_mujoco
 RADIUS_SHARE = 0.06  # of the length of the stretched arm: about the tubes of six- and seven-joint industrial arms
 MIN_RADIUS = 0.01  # m: of an arm whose joints are all at one place
 MAX_DISTANCE = 10.0  # m: distances are not measured beyond it
-CLOSE = 0.1  # m: parts whose bounding spheres are farther apart are taken for as far apart as these spheres
 STATIC = 0  # number of the part that does not move; links count from 1
 
 Vector = tuple[float, float, float]
@@ -75,10 +74,10 @@ class ArmShape:
         """The shape with some of its pairs (pairs,)."""
         return replace(self, pairs=tuple(pair for pair, kept in zip(self.pairs, chosen, strict=True) if kept))
 
-    def distances(self, positions: Array, close: float = CLOSE) -> Array:
+    def distances(self, positions: Array, close: float = MAX_DISTANCE) -> Array:
         """Distance of each pair at positions (samples, joints), (samples, pairs), m; negative: how deep they overlap.
 
-        A pair that is farther apart than `close` has a lower bound of its distance.
+        A pair whose bounding spheres are farther apart than `close` has their distance, which is a lower bound.
         """
         if not self.pairs:
             return np.empty((len(positions), 0))

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armlab.common.arrays import Array
 from problem.arm import Arm, Joint, body_points
 from problem.collision import ArmShape, Surroundings, arm_shape
 from problem.robot_file import load_arm
@@ -29,7 +28,7 @@ def shape_of(arm: Arm, robot: str = "none", **around: object) -> ArmShape:
 
 def distance(shape: ArmShape, first: str, second: str, pose: list[float]) -> float:
     names = [pair.names for pair in shape.pairs]
-    return float(shape.distances(np.array([pose]), close=9.0)[0, names.index((first, second))])
+    return float(shape.distances(np.array([pose]))[0, names.index((first, second))])
 
 
 def link(name: str) -> str:
@@ -91,17 +90,16 @@ def test_no_distance_changes_by_more_than_the_reach_of_its_joints(robot: str) ->
     shape = arm_shape(arm, robot, around, tuple(joint.limits for joint in arm.joints))
     first = rng.uniform(-1.5, 1.5, (150, len(arm)))
     second = first + rng.uniform(-0.3, 0.3, first.shape)
-    change = np.abs(shape.distances(first, close=9.0) - shape.distances(second, close=9.0))
+    change = np.abs(shape.distances(first) - shape.distances(second))
     assert np.all(change <= np.abs(second - first) @ shape.reach.T + 1e-9)
 
 
 def test_what_is_given_for_parts_far_apart_is_a_lower_bound() -> None:
-    shape, poses = shape_of(lifting_arm(), floor=-0.2), random_poses(3)
-    assert np.all(shape.distances(poses) <= shape.distances(poses, close=9.0) + 1e-9)
-
-
-def random_poses(joints: int) -> Array:
-    return np.random.default_rng(3).uniform(-2, 2, (100, joints))
+    shape, poses = shape_of(lifting_arm(), floor=-0.2), np.random.default_rng(3).uniform(-2, 2, (100, 3))
+    exact, bounds = shape.distances(poses), shape.distances(poses, close=0.05)
+    assert np.all(bounds <= exact + 1e-9)
+    assert np.any(bounds < exact - 0.01)
+    assert np.array_equal(bounds[exact < 0.0], exact[exact < 0.0])
 
 
 MJCF = """<mujoco><worldbody>
