@@ -3,6 +3,7 @@ keep-out boxes and to the arm itself; as rules, and as a constraint of a search.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
@@ -22,6 +23,7 @@ RANGE_MARGIN = 0.1  # of a joint's recorded swing: how far beyond each end a mot
 START_REACH = {"revolute": 0.1, "prismatic": 0.02}  # rad, m: near a pose; also the least margin of a recorded range
 SEARCH_POSES = 150  # of a motion in a search
 SEARCH_MARGIN = 0.01  # m more than the clearance that a search asks for, since it sees fewer poses
+ROUNDING = 1e-6  # m
 TOUCH_POSES = 200  # random poses: parts that are too close in all of them touch by their shape
 
 Range = tuple[float, float]
@@ -91,9 +93,18 @@ class SafetyRules:
         """Sum over the pairs of how much closer than a search allows they come at positions (samples, joints), m."""
         if self.shape is None or not self.shape.pairs:
             return 0.0
-        kept = self.settings.clearance + SEARCH_MARGIN
         chosen = positions[:: max(1, len(positions) // SEARCH_POSES)]
-        return float(np.maximum(kept - self.shape.distances(chosen, close=kept).min(axis=0), 0.0).sum())
+        distances = self.shape.distances(chosen, close=self.settings.clearance + SEARCH_MARGIN)
+        return float(np.maximum(self._asked - distances.min(axis=0), 0.0).sum())
+
+    @cached_property
+    def _asked(self) -> Array:
+        """What a search asks of each pair, (pairs,), m: no more than the safe pose has."""
+        if self.shape is None:
+            return np.empty(0)
+        kept = self.settings.clearance
+        has = self.shape.distances(self.still[None])[0]
+        return np.asarray(np.clip(has - ROUNDING, kept, kept + SEARCH_MARGIN))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -233,7 +244,7 @@ def _refuse_touching_surroundings(shape: ArmShape, touching: NDArray[np.bool_]) 
 
 
 def _clear_pose(shape: ArmShape, poses: Array, kept: float) -> Array:
-    clear = (shape.distances(poses, close=kept) >= kept + SEARCH_MARGIN).all(axis=1)
+    clear = (shape.distances(poses, close=kept) >= kept).all(axis=1)
     if not clear.any():
         raise InputError(
             f"none of {len(poses)} poses in the range keeps {kept:g} m from floor, boxes and the arm itself; "
