@@ -15,6 +15,7 @@ from bench.studies.best_known.records import RECORDS_FILE, Record, write_records
 from bench.trajectory_files import TRAJECTORY_FORMATS, SampledTrajectory, sample_trajectory, to_csv, to_rapid, to_ros2
 from problem.motion import Motion
 from problem.registry import parse_problem
+from problem.safe_motion import SafetySettings
 
 ROOT = Path(__file__).parents[2]
 REST = {"preset": "joint-fourier", "rest": True, "harmonics": 3, "duration": 4.0}
@@ -154,6 +155,22 @@ def test_the_best_known_trajectory_from_rest_to_rest_is_exported_at_250_hz(tmp_p
         assert low <= position.min() <= position.max() <= high
         assert np.abs(velocity).max() <= joint.limits.velocity
     assert np.abs(motion.acceleration).max() <= 40.0
+
+
+def test_an_export_says_what_was_checked_and_refuses_what_leaves_its_room(tmp_path: Path) -> None:
+    path, records, out = write(tmp_path), tmp_path / RECORDS_FILE, tmp_path / "out"
+    report = export_record(path, "gentle", "csv", out, records, safety=SafetySettings(floor=0.0)).safety
+    assert report.least["the floor"] >= 0.02
+    out.unlink()
+    box = ((-0.2, -0.2, 0.6), (0.5, 0.2, 2.0))
+    for settings, told in (
+        (SafetySettings(floor=report.least["the floor"] - 0.01), "the floor"),
+        (SafetySettings(keep_out=(box,)), "box 1; 0.02 m are to be kept"),
+        (SafetySettings(near=(1.0, 0.0, 0.0)), "joint1 starts or ends at"),
+        (SafetySettings(range=((-0.01, 0.01), (-1.0, 1.0), (-1.0, 1.0))), "outside the given range"),
+    ):
+        assert told in refusal(export_record, path, "gentle", "csv", out, records, safety=settings)
+    assert not out.exists()
 
 
 def test_derivatives_fit_the_positions(tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ from armlab.effects import library
 from armlab.effects.contract import COULOMB_LEVEL, Effect
 from armlab.effects.friction import CoulombFriction
 from armlab.effects.term import EveryJoint
+from problem.arm import body_points
+from problem.robot_file import load_arm
 
 QUICK = ["--evaluations", "60", "--duration", "4", "--harmonics", "4", "--rate", "100"]
 ROTOR: dict[str, Any] = {"effect": "rotor_inertia", "joint": 1, "parameters": {"inertia": 0.05}}
@@ -76,6 +78,59 @@ def test_the_card_tells_standard_errors_before_and_after_and_the_probability(des
     assert errors["designed"] > errors["before"]
     assert sum(question["decides"].values()) == pytest.approx(1)
     assert "one such run decides between viscous friction at joint 2 or time delay" in designed[1]
+
+
+def lowest_frame(folder: Path) -> float:
+    """Height of the lowest origin of a link's frame in the written motion, m."""
+    with (folder / "next.csv").open() as file:
+        poses = np.array([[float(row[f"q{joint}"]) for joint in (1, 2, 3)] for row in csv.DictReader(file)])
+    return float(body_points(load_arm("irb120-arm"), poses, np.zeros(3))[..., 2].min())
+
+
+def test_a_motion_that_went_through_the_floor_does_not_any_more(tmp_path: Path, designed: tuple[Path, str]) -> None:
+    floor = 0.22
+    result = run(tmp_path, verdict_file(tmp_path, {**VISCOUS, "rivals": [LATE]}), "--floor", str(floor))
+    radius = 0.0378  # of the capsules that stand for this arm
+    assert lowest_frame(designed[0]) - radius < floor
+    assert lowest_frame(tmp_path / "out") - radius >= floor + 0.02
+    assert "checked: the floor at 0.22 m" in result.output
+    assert "not checked: a floor" in designed[1]
+    safety = json.loads((tmp_path / "out/next.json").read_text())["safety"]
+    assert safety["least_distance_m"]["the floor"] >= 0.02
+    assert any("payload, tool, cables" in each for each in safety["not_checked"])
+
+
+def test_a_motion_starts_and_ends_near_the_pose_and_keeps_the_range_that_are_given(tmp_path: Path) -> None:
+    (tmp_path / "safety.yaml").write_text("near: [0.1, 0.2, 0.0]\nfloor: 0.0\n")
+    options = ["--safety", str(tmp_path / "safety.yaml"), "--range", "-0.5:0.5,-0.3:0.6,-0.4:0.4"]
+    result = run(tmp_path, verdict_file(tmp_path, {**VISCOUS, "rivals": [LATE]}), *options)
+    assert result.exit_code == 0, result.output
+    with (tmp_path / "out/next.csv").open() as file:
+        poses = np.array([[float(row[f"q{joint}"]) for joint in (1, 2, 3)] for row in csv.DictReader(file)])
+    for end in poses[[0, -1]]:
+        assert np.abs(end - [0.1, 0.2, 0.0]).max() <= 0.1
+    assert np.all(poses >= [-0.5, -0.3, -0.4])
+    assert np.all(poses <= [0.5, 0.6, 0.4])
+    assert "checked: positions within the given range" in result.output
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--keep-out", "0.5,0,0,0.3,1,1"], "the lower corner comes first, but x goes from 0.5 to 0.3"),
+        (["--keep-out", "0.5,0,0"], "should be six numbers"),
+        (["--keep-out", "a,b,c,d,e,f"], "should be finite numbers with commas"),
+        (["--near", "0,nan,0"], "should be finite numbers with commas"),
+        (["--near", "0,1.9,0", "--floor", "0.2"], "m inside the floor; 0.02 m are to be kept"),
+        (["--range", "-1:1"], "range should have 3 entries"),
+        (["--range", "-1,1,0"], "one LOW:HIGH a joint"),
+        (["--floor", "0.5"], "is too close to the floor in every pose of its range"),
+        (["--safety", "missing.yaml"], "missing.yaml"),
+    ],
+)
+def test_safety_options_that_leave_no_room_are_told_in_one_line(tmp_path: Path, options: list[str], told: str) -> None:
+    assert told in complaint(run(tmp_path, verdict_file(tmp_path, {**VISCOUS, "rivals": [LATE]}), *options))
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_same_seed_gives_the_same_motion(tmp_path: Path, designed: tuple[Path, str]) -> None:

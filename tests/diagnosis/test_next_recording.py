@@ -10,7 +10,13 @@ from next_questions import verdict_file
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.experiment import choose_rival_groups, prepare_experiment
-from armlab.diagnosis.next.motion import Budget, build_excitation_problem, limits_in_force, random_point
+from armlab.diagnosis.next.motion import (
+    Budget,
+    build_excitation_problem,
+    limits_in_force,
+    random_point,
+    recorded_place,
+)
 from armlab.diagnosis.next.prepare import PreparedQuestions
 from armlab.diagnosis.next.problem import tell_apart_problem
 from armlab.diagnosis.next.question import Name
@@ -20,6 +26,7 @@ from armlab.recordings.recording import Recording
 from problem.arm import Arm, Limits
 from problem.motion import Motion
 from problem.robot_file import load_arm
+from problem.safe_motion import SafetySettings, safety_rules
 
 BUDGET = Budget(4.0, 4, evaluations=100)
 LOAD = {"effect": "load_dependent_friction", "joint": 2}
@@ -114,6 +121,24 @@ def test_limits_that_the_robot_does_not_give_are_what_the_recording_shows() -> N
     assert [each.velocity for each in limits] == [joint.limits.velocity for joint in file]
     assert all(np.isfinite(each.acceleration) for each in limits)
     assert all(each.velocity > seen for each, seen in zip(limits, velocity, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_motion_starts_near_the_first_pose_of_the_recording_and_stays_near_its_range(seed: int) -> None:
+    first, arm = recording(), limited()
+    place = recorded_place(first)
+    rules = safety_rules(arm, "irb120-arm", limits_in_force(arm, first), SafetySettings(), place)
+    problem = build_excitation_problem(arm, limits_in_force(arm, first), BUDGET, rules)
+    points = np.random.default_rng(seed).uniform(problem.lower, problem.upper, (20, len(problem.lower)))
+    motion = problem.trajectory.motions(points, np.linspace(0, 4, 997)).motion
+    ends = motion.position[:, [0, -1]]
+    assert np.abs(ends - first.runs[0].position[0]).max() <= 0.1 + 1e-9
+    assert np.abs(motion.velocity[:, [0, -1]]).max() < 1e-9
+    width = place.highest - place.lowest
+    assert np.all(motion.position >= place.lowest - 0.1 * width - 1e-9)
+    assert np.all(motion.position <= place.highest + 0.1 * width + 1e-9)
+    assert np.abs(motion.velocity).max() <= 2.0
+    assert np.abs(motion.acceleration).max() <= 10.0
 
 
 def near(folder: Path, size: float) -> set[Name]:

@@ -24,6 +24,7 @@ CARD_SCHEMA = "next/1"
 
 def card_lines(experiment: Experiment) -> Iterator[str]:
     """The card as lines for the terminal."""
+    yield "all usual friction is fitted beside; a diagnosis does so only where it pays, and may decide sooner:"
     yield "standard errors between rivals           before   random motion   this motion"
     for pair in experiment.pairs:
         yield f"  {pair.names[0]} | {pair.names[1]}"
