@@ -85,12 +85,12 @@ def design_experiment(
 ) -> Experiment:
     """Designs the next experiment; InputError, in one line, for anything that cannot be used."""
     began = time.perf_counter()
-    arm = load_arm(robot)
+    loaded_verdict, arm = read_verdict(verdict), load_arm(robot)
     recorded = None if recording is None else load_recording(recording)
     _check_same_joints(arm, recorded)
     place = None if recorded is None else recorded_place(recorded)
     rules = safety_rules(arm, robot, limits_in_force(arm, recorded), safety, place)
-    prepared, excitation = prepare_experiment(verdict, arm, recorded, rivals, budget, links, rules)
+    prepared, excitation = _prepare(loaded_verdict, arm, recorded, rivals, budget, links, rules)
     problem = point = report = None
     if any(question.pairs for question in prepared.questions):
         problem = tell_apart_problem(prepared, excitation)
@@ -107,10 +107,20 @@ def prepare_experiment(
     rivals: str | None,
     budget: Budget,
     links: LinkKnowledge | None,
-    safety: SafetyRules | None = None,
 ) -> tuple[PreparedQuestions, ExcitationProblem]:
-    """The questions of a verdict, and the motions that this arm may make."""
-    loaded_verdict = read_verdict(verdict)
+    """The questions of a verdict, and the motions that this arm may make; without safety rules."""
+    return _prepare(read_verdict(verdict), arm, recording, rivals, budget, links, None)
+
+
+def _prepare(
+    loaded_verdict: VerdictWithModel,
+    arm: Arm,
+    recording: Recording | None,
+    rivals: str | None,
+    budget: Budget,
+    links: LinkKnowledge | None,
+    safety: SafetyRules | None,
+) -> tuple[PreparedQuestions, ExcitationProblem]:
     _check_same_joints(arm, recording)
     if len(loaded_verdict.noise) not in (0, len(arm)) or (not len(loaded_verdict.noise) and recording is None):
         raise InputError(
