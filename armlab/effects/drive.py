@@ -20,7 +20,7 @@ ROTOR_INERTIA_FACTS = Effect(
     law=r"\Delta\tau_j = \text{inertia} \; \ddot{q}_j",
     common=True,
     axis="acceleration",
-    experiment="compare with the motor's data sheet: no motion tells rotor inertia from the link's own",
+    experiment="compare with the motor's data sheet; armlab next says whether any motion tells it from the link",
 )
 TORQUE_GAIN_FACTS = Effect(
     "torque_gain_error",

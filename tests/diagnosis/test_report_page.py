@@ -263,7 +263,7 @@ def test_rivals_say_why_they_cannot_be_told_and_what_would_tell_them(found: Diag
     rivals = (Rival("rotor_inertia", 1, (1,), identical=True), Rival("cable_stiffness", 2, (2,), deficit=0.7))
     claim = replace(found.claims[0], rivals=rivals, next_experiment="weigh the link")
     page = report_texts(replace(found, claims=(claim,)))["report.html"]
-    assert "rotor inertia, joint 1: no motion of this arm can tell the two apart" in page
+    assert "rotor inertia, joint 1: no motion of that joint alone can tell the two apart" in page
     assert "cable stiffness, joint 2: on this very motion it fits as well (0.7 units" in page
     assert "To tell: weigh the link." in page
 

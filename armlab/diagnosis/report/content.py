@@ -186,7 +186,7 @@ def parameter_table(claim: Claim) -> Table:
 def _rival_text(claim: Claim, place: int) -> str:
     each = claim.rivals[place]
     why = (
-        "no motion of this arm can tell the two apart"
+        "no motion of that joint alone can tell the two apart; armlab next says whether one of the whole arm can"
         if each.identical
         else f"on this very motion it fits as well ({format_number(each.deficit)} units of log likelihood worse)"
     )
