@@ -1,5 +1,6 @@
 """`armlab landscape`: features with known answers, what correlations may claim, and the pages from small tables."""
 
+import re
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -251,6 +252,15 @@ def test_the_committed_pages_say_what_the_results_say(tmp_path: Path) -> None:
     assert len(written) == 8
     assert options.page.read_text() == (ROOT / "docs" / "which-optimiser.md").read_text()
     assert (options.out / "landscape.md").read_text() == (ROOT / "results" / "landscape" / "landscape.md").read_text()
+
+
+def test_the_committed_pages_have_a_held_out_answer_for_every_algorithm() -> None:
+    rows = [pd.read_csv(ROOT / "results" / f"{name}.csv").groupby("problem") for name in ("suite", "suite_heldout")]
+    algorithms = [set(each["algorithm"].agg(tuple)) for each in rows]
+    assert algorithms[0] == algorithms[1]
+    assert len(algorithms[0]) == 1
+    for page in (ROOT / "docs" / "which-optimiser.md", ROOT / "results" / "landscape" / "landscape.md"):
+        assert not re.search(r"\bnan\b", page.read_text())
 
 
 def test_rows_that_ask_for_derivatives_answer_for_them(

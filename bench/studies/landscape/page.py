@@ -38,7 +38,8 @@ included.
   values by less than {same_value:.0%}, up to what leaves the condition number as it is: the direction of time, the
   mean of a joint about the vertical, mirrored joints (all tried on the arm), another beginning of a periodic series.
   *Meet*: chance that two descents end in one basin (Simpson 1949), which does not depend on how many there were.
-- *Spread*: standard deviation of log10 of the ends. *Value against distance*: of the ends, to the best of them.
+- *Spread*: standard deviation of log10 of the ends. *Value against distance*: of the ends, to the best of
+  them, where four or more ended within the limits.
 - *Conditioning*: largest over least curvature of the Lagrangian at the best point (of the ends, or where the best known
   trajectory leads), along directions that no limit closes and that are not flat."""
 
@@ -91,7 +92,7 @@ def _answer(correlations: pd.DataFrame) -> Iterator[str]:
         f"The largest correlation is that of {display_name(str(strongest['algorithm']))} with "
         f"{FEATURES[str(strongest['feature'])]}: {strongest['correlation']:.2f} ({strongest['low']:.2f} to "
         f"{strongest['high']:.2f}), p {strongest['p']:.2g} alone and {strongest['p_holm']:.2g} after Holm; "
-        f"{strongest['checked_correlation']:.2f} on the held-out suite."
+        f"{_decimals(strongest['checked_correlation'])} on the held-out suite."
     )
     for name, rows in found[found["confirmed"]].groupby("algorithm", sort=False):
         told = ", ".join(
@@ -167,8 +168,8 @@ def _feature_cells(landscapes: pd.DataFrame) -> str:
             f"{row['feasible_ends']:.0%}",
             row["basins"],
             f"{row['meeting_share']:.1%}",
-            f"{row['end_spread']:.3f}",
-            f"{row['valley_correlation']:.2f}",
+            _decimals(row["end_spread"], 3),
+            _decimals(row["valley_correlation"]),
             f"{row['best']:.4g}",
             f"{row['condition']:.2g}",
             f"{row['free']} ({row['flat']}, {row['negative']})",
@@ -184,8 +185,13 @@ def _dimension_cells(landscapes: pd.DataFrame) -> str:
         there = landscapes.dropna(subset=feature)
         columns = (there[[name]].to_numpy(float) for name in ("dimension", feature))
         value = float(spearman_correlations(*columns)[0, 0]) if len(there) > 2 else np.nan
-        cells.append(f"{value:.2f}")
+        cells.append(_decimals(value))
     return markdown_table(list(FEATURES.values()), [cells])
+
+
+def _decimals(value: float, places: int = 2) -> str:
+    """The number, or a dash where there is none."""
+    return "-" if np.isnan(value) else f"{value:.{places}f}"
 
 
 def _method_text(effort: Effort) -> str:
