@@ -370,6 +370,19 @@ def best_known(minutes: float, problem: str | None, results: Path) -> Iterator[s
 
 
 @click.command()
+@_RESULTS_OPTION
+@prints_result
+def published(results: Path) -> ResultLines:
+    """Judge published trajectories beside the best known.
+
+    Recomputes the condition numbers of the trajectories in configs/published.yaml and writes published.md.
+    """
+    from bench.studies.best_known.published import write_published
+
+    return written_files(write_published(results))
+
+
+@click.command()
 @click.argument("algorithms", nargs=-1)
 @click.option("--config", type=_PATH, default=Path("configs/tune.yaml"), show_default=True)
 @click.option("--budget", type=click.IntRange(min=2), help="Configurations an algorithm [default: the file's].")

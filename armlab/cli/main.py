@@ -46,6 +46,7 @@ _GROUPS = {
         "properties": "armlab.cli.harness:properties",
         "tune": "armlab.cli.harness:tune",
         "best-known": "armlab.cli.harness:best_known",
+        "published": "armlab.cli.harness:published",
         "export": "armlab.cli.harness:export",
         "table3": "armlab.cli.harness:table3",
         "figure2": "armlab.cli.harness:figure2",
