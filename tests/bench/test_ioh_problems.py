@@ -1,5 +1,7 @@
 """The problems of a suite in the package `ioh`: the same values to the bit, the same boxes, logged by its logger."""
 
+import json
+import re
 from pathlib import Path
 
 import ioh
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 from refusals import refusal
 
+import bench.ioh_problems
 from bench.ioh_problems import ioh_problem, ioh_problems
 from problem.registry import parse_problem
 from problem.suite import instances
@@ -17,7 +20,7 @@ NAMES = ["suite-1/irb120-arm-tool-h5-t10-shifted", "suite-1/irb120-rest-h5-t10-o
 @pytest.mark.parametrize("name", NAMES)
 def test_values_and_boxes_are_ours_to_the_bit(name: str) -> None:
     theirs, ours = ioh_problem(name), parse_problem({"preset": name}, "test").build()
-    assert (theirs.meta_data.name, theirs.meta_data.n_variables) == (name, len(ours.lower))
+    assert (theirs.meta_data.name, theirs.meta_data.n_variables) == (name.replace("/", "_"), len(ours.lower))
     assert theirs.bounds.lb.tobytes() == ours.lower.tobytes()
     assert theirs.bounds.ub.tobytes() == ours.upper.tobytes()
     points = np.random.default_rng(1).uniform(ours.lower, ours.upper, (20, len(ours.lower)))
@@ -28,7 +31,7 @@ def test_values_and_boxes_are_ours_to_the_bit(name: str) -> None:
 
 def test_all_problems_of_a_suite_have_their_place_as_id() -> None:
     found = ioh_problems("suite-2")
-    assert [problem.meta_data.name for problem in found] == instances("suite-2")
+    assert [problem.meta_data.name for problem in found] == [name.replace("/", "_") for name in instances("suite-2")]
     assert [problem.meta_data.problem_id for problem in found] == list(range(1, 25))
 
 
@@ -43,6 +46,17 @@ def test_iohs_own_logger_writes_what_was_evaluated(tmp_path: Path) -> None:
     head, *rows = data.read_text().splitlines()
     assert head.split()[:2] == ["evaluations", "raw_y"]
     assert float(rows[0].split()[1]) == pytest.approx(first, rel=1e-9)
+    (header,) = tmp_path.rglob("*.json")  # readers begin there
+    assert json.loads(header.read_text())["function_name"] == NAMES[2].replace("/", "_")
+
+
+def test_the_example_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = (Path(bench.ioh_problems.__file__).parent / "README.md").read_text()
+    (example,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    exec(example, {})
+    assert any(tmp_path.rglob("*.json"))
+    assert test_values_and_boxes_are_ours_to_the_bit.__name__ in text
 
 
 def test_an_unknown_name_is_told_in_one_line() -> None:

@@ -3,7 +3,8 @@
 from bench.ioh_problems import ioh_problem, ioh_problems
 
 problem = ioh_problem("suite-2/panda-all-si")
-problem.attach_logger(ioh.logger.Analyzer())
+logger = ioh.logger.Analyzer()              # in a variable: ioh keeps no reference to it
+problem.attach_logger(logger)
 problem(x)                                  # the fitness, to the bit what `evaluate` gives here
 """
 
@@ -28,7 +29,8 @@ class SuiteProblem(ioh.problem.RealSingleObjective):  # type: ignore[misc]
         problem = parse_problem({"preset": name}, f"problem '{name}'").build()
         dimension = len(problem.lower)
         bounds = ioh.iohcpp.RealBounds(dimension, float(problem.lower.min()), float(problem.upper.max()))
-        super().__init__(name=name, n_variables=dimension, instance=1, is_minimization=True, bounds=bounds)
+        shown = name.replace("/", "_")  # loggers make files of that name
+        super().__init__(name=shown, n_variables=dimension, instance=1, is_minimization=True, bounds=bounds)
         self.bounds.lb, self.bounds.ub = (
             problem.lower.tolist(),
             problem.upper.tolist(),
