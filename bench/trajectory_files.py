@@ -13,11 +13,10 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.excitation import ExcitationProblem
 from problem.limits import Constraints, peaks
-from problem.motion import Motion
+from problem.motion import MAX_RATE_AT_REST, Motion
 from problem.trajectories import sample_instants
 
 MAX_SAMPLES = 10_000_000  # of a file for a controller
-MAX_RATE_AT_REST = 1e-9  # rad/s and rad/s2 (m): what rounding leaves
 
 
 @dataclass(frozen=True, eq=False)

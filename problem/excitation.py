@@ -49,7 +49,10 @@ class FeasibilityRules:
 
 @dataclass(frozen=True, eq=False)
 class ExcitationProblem:
-    """Find the trajectory that identifies the base parameters of an arm best."""
+    """Find the trajectory that identifies the base parameters of an arm best.
+
+    unit_columns: columns scaled to unit length. friction_columns: with friction and offset of each joint.
+    """
 
     name: str
     arm: Arm
@@ -61,6 +64,7 @@ class ExcitationProblem:
     criterion: Criterion
     penalty: Penalty | FeasibilityRules
     unit_columns: bool = False
+    friction_columns: bool = False
 
     @property
     def spectral(self) -> bool:
@@ -117,8 +121,12 @@ class ExcitationProblem:
 
     def _judge(self, motion: Motion) -> tuple[Array, Array]:
         """Criterion and condition number of motions (points, samples, joints), (points,) each."""
-        values = singular_values(self.arm, motion, self.base.columns, self.unit_columns)
+        values = self.singular_values(motion)
         return self.criterion.value(values), condition_number(values)
+
+    def singular_values(self, motion: Motion) -> Array:
+        """Singular values (points, columns), descending, that judge motions (points, samples, joints)."""
+        return singular_values(self.arm, motion, self.base.columns, self.unit_columns, self.friction_columns)
 
 
 MAX_SHIFT_WIDTHS = 2.0  # widths of the box by which the origin may move

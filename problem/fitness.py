@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from problem.arm import Arm
+from problem.friction import friction_entries, friction_matrix
 from problem.motion import Motion
-from problem.regressor import gram_matrix, observation_matrix
+from problem.regressor import extended_gram_matrix, gram_matrix, observation_matrix
 
 MAX_GRAM_CONDITION = 1e4
 """Largest condition number taken from the Gram matrix: its square loses 2e-16 * cond^2 of relative accuracy,
@@ -49,13 +50,19 @@ def condition_number(singular_values: Array) -> Array:
     return np.where(np.isnan(ratio), np.inf, ratio)
 
 
-def singular_values(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool) -> Array:
+def singular_values(
+    arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool, friction_columns: bool = False
+) -> Array:
     """Singular values (points, chosen), descending, of chosen columns of the observation matrix.
 
-    motion: (points, samples, joints). unit_columns: scale each column to unit length first.
+    motion: (points, samples, joints). unit_columns: scale each column to unit length first. friction_columns: with
+    those of `problem.friction` behind the chosen ones, three more a joint.
     Taken from the Gram matrix where that is accurate (see MAX_GRAM_CONDITION), else from the matrix itself.
     """
-    gram = gram_matrix(arm, motion, columns)
+    if friction_columns:
+        gram = extended_gram_matrix(arm, motion, columns, friction_entries(motion))
+    else:
+        gram = gram_matrix(arm, motion, columns)
     if unit_columns:
         lengths = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
         lengths = np.where(lengths > 0, lengths, 1.0)
@@ -65,12 +72,16 @@ def singular_values(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_co
         gram = np.where(finite[:, None, None], gram, 0.0)
     values: Array = np.sqrt(np.maximum(np.linalg.eigvalsh(gram)[:, ::-1], 0.0))
     for point in np.flatnonzero(values[:, 0] > MAX_GRAM_CONDITION * values[:, -1]):
-        values[point] = _singular_values_of_matrix(arm, motion.select(point), columns, unit_columns)
+        values[point] = _singular_values_of_matrix(arm, motion.select(point), columns, unit_columns, friction_columns)
     return values
 
 
-def _singular_values_of_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool) -> Array:
+def _singular_values_of_matrix(
+    arm: Arm, motion: Motion, columns: NDArray[np.intp], unit_columns: bool, friction_columns: bool
+) -> Array:
     matrix = observation_matrix(arm, motion)[:, columns]
+    if friction_columns:
+        matrix = np.hstack([matrix, friction_matrix(motion)])
     if unit_columns:
         lengths = np.linalg.norm(matrix, axis=0)
         matrix = matrix / np.where(lengths > 0, lengths, 1.0)

@@ -7,6 +7,9 @@ A joint-space series is linear in its numbers; the map of the feasible search sp
 its own (`problem/feasible.py`). A Cartesian path is linear in its numbers, too, and the joints follow it by
 dQ = J dq, differentiated twice in time; so no formula of the inverse kinematics is differentiated here.
 
+Of the friction columns, velocity has the derivative one. The sign of the velocity has the derivative zero almost
+everywhere: where a sample's velocity changes its sign, the value jumps, and no derivative tells of that.
+
 The observation matrix is linear in the accelerations, quadratic in the velocities, and in the position of
 each joint a trigonometric polynomial of degree two (prismatic: a polynomial of degree two), since a link's
 inertia turns with both its indices. So a fixed sum of shifted matrices is its derivative, without any error
@@ -23,6 +26,7 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from problem.arm import Arm
 from problem.feasible import FeasibleFourier
+from problem.friction import FRICTION_NAMES, VISCOUS, friction_matrix
 from problem.motion import Motion
 from problem.regressor import observation_matrix
 from problem.trajectories import CartesianFourier, JointFourier, Trajectory
@@ -190,7 +194,10 @@ def spectral_gradient_along(
 ) -> tuple[float, Array]:
     """The same for a motion (samples, joints) with its tangents (3, dimension, samples, joints)."""
     value, weights = _matrix_weights(problem, motion, function)
-    slopes = motion_gradient(problem.arm, motion, weights)
+    inertial = 10 * motion.joints
+    slopes = motion_gradient(problem.arm, motion, weights[:, :inertial])
+    if problem.friction_columns:
+        slopes[1] += _viscous_weights(weights[:, inertial:], motion)
     return value, np.tensordot(basis, slopes, axes=([0, 2, 3], [0, 1, 2]))
 
 
@@ -219,10 +226,27 @@ def motion_gradient(arm: Arm, motion: Motion, weights: Array) -> Array:
     return slopes
 
 
+def _viscous_weights(weights: Array, motion: Motion) -> Array:
+    """Derivatives with respect to the velocities (samples, joints) through the friction columns.
+
+    weights: derivatives with respect to the entries of these columns, (samples * joints, 3 * joints).
+    """
+    joints = np.arange(motion.joints)
+    by_joint = weights.reshape(motion.samples, motion.joints, motion.joints, len(FRICTION_NAMES))
+    return np.asarray(by_joint[:, joints, joints, VISCOUS])
+
+
 def _matrix_weights(problem: "ExcitationProblem", motion: Motion, function: SpectralFunction) -> tuple[float, Array]:
-    """The function's value and its derivative with respect to each entry of the whole observation matrix."""
+    """The function's value and its derivative with respect to each entry of the whole matrix.
+
+    That is the observation matrix, and behind it the friction columns where the problem has them.
+    """
     columns = problem.base.columns
     whole = observation_matrix(problem.arm, motion)
+    if problem.friction_columns:
+        friction = len(FRICTION_NAMES) * motion.joints
+        columns = np.append(columns, np.arange(whole.shape[1], whole.shape[1] + friction))
+        whole = np.hstack([whole, friction_matrix(motion)])
     matrix = whole[:, columns]
     lengths = np.linalg.norm(matrix, axis=0) if problem.unit_columns else np.ones(len(columns))
     unit = matrix / lengths

@@ -8,6 +8,7 @@
 
 #define LANES 8
 #define MAX_JOINTS 16
+#define MAX_OWNED 3
 typedef double V __attribute__((vector_size(8 * LANES)));
 typedef int64_t I __attribute__((vector_size(8 * LANES)));
 #define INLINE static inline __attribute__((always_inline))
@@ -182,42 +183,50 @@ void observation_matrices(int joints, const JointData *data, const double *gravi
     }
 }
 
-/* Gram matrix of chosen columns of each trajectory's observation matrix, (trajectories, chosen, chosen).
- * columns: ascending; first[i]: the first chosen column that can be non-zero in the row of joint i. */
+/* Gram matrix of chosen columns of each trajectory's observation matrix, and of further columns behind them, joint by
+ * joint, that are zero in the rows of all other joints; (trajectories, n, n) with n = chosen + owned * joints.
+ * columns: ascending; first[i]: the first chosen column that can be non-zero in the row of joint i.
+ * own: the further columns in the rows of their joints, (trajectories, samples, joints, owned), owned <= MAX_OWNED. */
 FOR_EACH_PROCESSOR
 void gram_matrices(int joints, const JointData *data, const double *gravity, int64_t trajectories, int64_t samples,
                    const double *q, const double *qd, const double *qdd, int chosen, const int *columns,
-                   const int *first, double *scratch, double *out) {
+                   const int *first, int owned, const double *own, double *scratch, double *out) {
     V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
-    V row[MAX_JOINTS * 10];
+    V row[MAX_JOINTS * 10], vown[MAX_JOINTS * MAX_OWNED];
     V *sums = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
-    int width = 10 * joints;
+    int width = 10 * joints, n = chosen + owned * joints;
     for (int64_t p = 0; p < trajectories; p++) {
-        memset(sums, 0, sizeof(V) * chosen * chosen);
+        memset(sums, 0, sizeof(V) * n * n);
         for (int64_t s = 0; s < samples; s += LANES) {
             int64_t at = (p * samples + s) * joints;
             int count = at_most_lanes(samples - s);
             load(joints, count, q + at, vq);
             load(joints, count, qd + at, vqd);
             load(joints, count, qdd + at, vqdd);
+            load(joints * owned, count, own + at * owned, vown);
             rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
             V present;
             for (int l = 0; l < LANES; l++) present[l] = l < count;
             for (int i = 0; i < joints; i++) {
+                const V *mine = vown + i * owned;
+                int behind = chosen + i * owned;
                 for (int k = first[i]; k < chosen; k++) row[k] = rows[i * width + columns[k]];
                 if (count < LANES)
                     for (int k = first[i]; k < chosen; k++) row[k] *= present;
                 for (int k = first[i]; k < chosen; k++) {
-                    V value = row[k], *sum = sums + k * chosen;
+                    V value = row[k], *sum = sums + k * n;
                     for (int c = k; c < chosen; c++) sum[c] += value * row[c];
+                    for (int c = 0; c < owned; c++) sum[behind + c] += value * mine[c];
                 }
+                for (int k = 0; k < owned; k++)
+                    for (int c = k; c < owned; c++) sums[(behind + k) * n + behind + c] += mine[k] * mine[c];
             }
         }
-        double *gram = out + p * chosen * chosen;
-        for (int k = 0; k < chosen; k++)
-            for (int c = k; c < chosen; c++) {
-                V v = sums[k * chosen + c];
-                gram[k * chosen + c] = gram[c * chosen + k] =
+        double *gram = out + p * n * n;
+        for (int k = 0; k < n; k++)
+            for (int c = k; c < n; c++) {
+                V v = sums[k * n + c];
+                gram[k * n + c] = gram[c * n + k] =
                     ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
             }
     }

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 
+MAX_RATE_AT_REST = 1e-9  # rad/s and rad/s2 (m): what rounding leaves
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:

@@ -3,11 +3,13 @@
 Limits are those of the robot file, unless the settings replace them.
 """
 
+import operator
 from collections.abc import Sized
 from typing import Annotated, ClassVar, Literal, TypeVar
 
 import numpy as np
 from annotated_types import Ge, Gt
+from pydantic import Field
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -18,6 +20,7 @@ from problem.contract import Problem
 from problem.excitation import ExcitationProblem, FeasibilityRules, Penalty, ShiftedProblem, shift_randomly
 from problem.feasible import FeasibleFourier
 from problem.fitness import Criterion
+from problem.friction import FRICTION_NAMES
 from problem.functions import FUNCTIONS, TestFunction
 from problem.inverse_kinematics import planar_arm
 from problem.limits import Constraints, Workspace
@@ -132,8 +135,9 @@ class ExcitationSettings(Settings):
 
     arm: a built-in name or a file. joints: how many of its first joints move, all if left out. duration: s.
     samples: instants, both ends included. columns: which columns are kept as base parameters, where there is
-    a choice. unit_columns: scale columns to unit length. tool: a point in the last link's frame, m, that the
-    workspace limits too. frame_seed: search in randomly shifted coordinates. penalty: or
+    a choice. unit_columns: scale columns to unit length. friction_columns: identify Coulomb friction, viscous friction
+    and a torque offset of each joint, too, three columns a joint (`problem.friction`). tool: a point in the last link's
+    frame, m, that the workspace limits too. frame_seed: search in randomly shifted coordinates. penalty: or
     `feasibility_rules` (Deb 2000).
     """
 
@@ -143,6 +147,7 @@ class ExcitationSettings(Settings):
     samples: Annotated[int, Ge(2)] = 100
     columns: Literal["later_columns", "earlier_columns"] | tuple[str, ...] = "later_columns"
     unit_columns: bool = False
+    friction_columns: bool = Field(default=False, exclude_if=operator.not_)  # written settings without it stay the same
     criterion: CriterionSettings = CriterionSettings()
     penalty: PenaltyOrRules = PenaltySettings()
     limits: LimitSettings = LimitSettings()
@@ -173,6 +178,7 @@ class ExcitationSettings(Settings):
             criterion=self.criterion.build(),
             penalty=FeasibilityRules() if self.penalty == "feasibility_rules" else self.penalty.build(),
             unit_columns=self.unit_columns,
+            friction_columns=self.friction_columns,
         )
         return problem if self.frame_seed is None else shift_randomly(problem, self.frame_seed)
 
@@ -191,10 +197,13 @@ class ExcitationSettings(Settings):
             base = base_parameters(arm, self.columns)
         except ValueError as error:
             raise InputError(f"columns: {error}") from None
-        if self.samples * len(arm) < len(base):
+        friction = len(arm) * len(FRICTION_NAMES) if self.friction_columns else 0
+        columns = len(base) + friction
+        if self.samples * len(arm) < columns:
+            what = f"{len(base)} base parameters" + (f" and {friction} of friction" if friction else "")
             raise InputError(
-                f"samples: {self.samples} of {len(arm)} joints cannot show {len(base)} base parameters; "
-                f"take {-(-len(base) // len(arm))} or more"
+                f"samples: {self.samples} of {len(arm)} joints cannot show {what}; "
+                f"take {-(-columns // len(arm))} or more"
             )
         return base
 

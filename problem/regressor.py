@@ -16,7 +16,7 @@ from problem.arm import Arm, Joint
 from problem.kernel import ffi, lib, pointer
 from problem.motion import Motion
 
-MAX_JOINTS = 16  # as in kernel.c
+MAX_JOINTS, MAX_OWNED = 16, 3  # as in kernel.c
 LANES = 8
 
 
@@ -41,9 +41,22 @@ def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
     Each trajectory's result is the same to the bit in any batch. Raises ValueError if joint counts differ or
     a column does not exist.
     """
+    return extended_gram_matrix(arm, motion, columns, np.empty((*motion.position.shape, 0)))
+
+
+def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], own: Array) -> Array:
+    """The same for [W F], where F has columns of each joint's own, zero in the rows of all other joints.
+
+    own: (..., samples, joints, owned), at most MAX_OWNED a joint: F in the rows of its joints. Returns (..., n, n) with
+    n = chosen + joints * owned. Raises ValueError as `gram_matrix` does, and for another shape of `own`.
+    """
     joints = _check_joint_count(arm, motion)
-    out = np.empty((*motion.batch, len(columns), len(columns)))
-    scratch = np.empty(LANES * (len(columns) ** 2 + 1))
+    owned = own.shape[-1]
+    if own.shape[:-1] != motion.position.shape or owned > MAX_OWNED:
+        raise ValueError(f"own columns should have the shape {motion.position.shape} and up to {MAX_OWNED} a joint")
+    size = len(columns) + joints * owned
+    out = np.empty((*motion.batch, size, size))
+    scratch = np.empty(LANES * (size**2 + 1))
     chosen, first = _check_columns(np.asarray(columns, dtype=np.int32).tobytes(), joints)
     trajectories = math.prod(motion.batch)
     lib.gram_matrices(
@@ -55,6 +68,8 @@ def gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp]) -> Array:
         len(chosen),
         pointer(chosen, "int *"),
         pointer(first, "int *"),
+        owned,
+        pointer(np.ascontiguousarray(own, dtype=np.float64)),
         pointer(scratch),
         pointer(out),
     )

@@ -23,6 +23,7 @@ _KEYS_THAT_MAY_DIFFER = (
     "samples",
     "columns",
     "unit_columns",
+    "friction_columns",
     "criterion",
     "penalty",
 )

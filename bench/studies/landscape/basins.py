@@ -21,7 +21,7 @@ from armlab.common.arrays import Array
 from armlab.common.derivatives import Derivatives, Question
 from armlab.common.streams import named_generator
 from problem.excitation import ExcitationProblem
-from problem.fitness import condition_number, singular_values
+from problem.fitness import condition_number
 from problem.motion import Motion
 from problem.trajectories import JointFourier, sample_instants
 
@@ -134,7 +134,7 @@ def find_symmetry(problem: ExcitationProblem, points: Array) -> Symmetry:
 
 
 def _condition(problem: ExcitationProblem, motion: Motion) -> Array:
-    return condition_number(singular_values(problem.arm, motion, problem.base.columns, problem.unit_columns))
+    return condition_number(problem.singular_values(motion))
 
 
 @dataclass(frozen=True, eq=False)
