@@ -169,6 +169,21 @@ def test_a_problem_of_a_suite_has_the_record_of_its_definition() -> None:
     assert gaps[0] == gaps[1] is not None
 
 
+def test_a_problem_with_friction_columns_has_a_record_of_its_own() -> None:
+    known = records_by_problem(ROOT / "results" / RECORDS_FILE)
+    named, written, without = (
+        gap_to_best_known(settings_of(**settings), 100.0, known)
+        for settings in (
+            {"preset": "suite-3/irb120-all-si-friction"},
+            {"preset": "joint-fourier", "arm": "irb120", "friction_columns": True},
+            {"preset": "joint-fourier", "arm": "irb120"},
+        )
+    )
+    assert named is not None
+    assert without is not None
+    assert named == written < without  # more columns, a larger best
+
+
 def test_each_mistake_is_told_in_one_line(tmp_path: Path, plan: Callable[[str], Path]) -> None:
     def told(text: str, name: str | None = None) -> str:
         path = plan(text)

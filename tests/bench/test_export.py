@@ -63,6 +63,13 @@ def test_csv_read_back_is_the_trajectory(tmp_path: Path) -> None:
     np.testing.assert_allclose(table[:, 1:], np.hstack(parts(trajectory)), atol=1e-9)
 
 
+def test_a_trajectory_found_with_friction_columns_serves_a_problem_without_them(tmp_path: Path) -> None:
+    path = write(tmp_path, friction_columns=True)
+    path.write_text(yaml.safe_dump(REST))
+    trajectory = export_record(path, "gentle", "csv", tmp_path / "out", tmp_path / RECORDS_FILE, 50.0).trajectory
+    assert trajectory.motion.samples == 201
+
+
 def test_ros2_read_back_is_the_trajectory_with_every_key_of_the_message(tmp_path: Path) -> None:
     trajectory, text = exported(tmp_path, "ros2")
     message = yaml.safe_load(text)

@@ -14,7 +14,12 @@ from bench.ioh_problems import ioh_problem, ioh_problems
 from problem.registry import parse_problem
 from problem.suite import instances
 
-NAMES = ["suite-1/irb120-arm-tool-h5-t10-shifted", "suite-1/irb120-rest-h5-t10-origin", "suite-2/ur10-first3-unit"]
+NAMES = [
+    "suite-1/irb120-arm-tool-h5-t10-shifted",
+    "suite-1/irb120-rest-h5-t10-origin",
+    "suite-2/ur10-first3-unit",
+    "suite-3/ur10-first3-unit-friction",
+]
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -44,7 +44,7 @@ def test_suite_1_has_24_problems_of_arms_of_3_6_and_7_joints_in_every_form_and_f
     assert frames == {"origin", "shifted"}
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if not name.startswith("suite-2/")])
+@pytest.mark.parametrize("name", [*instances("suite-1"), *instances("held-out-1")])
 def test_the_name_of_a_problem_says_what_it_is(name: str) -> None:
     definition = definition_of(name)
     *_, form, harmonics, seconds, frame = name.split("-")
@@ -69,6 +69,16 @@ def test_suite_2_has_six_arms_each_with_three_and_all_joints_and_both_kinds_of_c
     kinds = [name.removeprefix("suite-2/").split("-") for name in instances("suite-2")]
     assert [len(set(kind)) for kind in zip(*kinds, strict=True)] == [6, 2, 2]
     assert len({tuple(kind) for kind in kinds}) == len(kinds) == 24
+
+
+def test_suite_3_is_suite_2_with_friction_columns() -> None:
+    with_friction = {
+        f"{name.replace('suite-2/', 'suite-3/')}-friction": definition_of(name).model_copy(
+            update={"friction_columns": True}
+        )
+        for name in instances("suite-2")
+    }
+    assert {name: definition_of(name) for name in instances("suite-3")} == with_friction
 
 
 def test_no_problem_that_is_held_out_stands_in_the_suite_too() -> None:

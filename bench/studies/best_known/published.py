@@ -16,7 +16,7 @@ from armlab.common.settings import Settings, read_yaml, validate
 from bench.studies.best_known.records import RECORDS_FILE, build_excitation, known_values, read_search_plan
 from bench.studies.best_known.search import CONFIG_FILE as PLAN_FILE
 from problem.excitation import ExcitationProblem
-from problem.fitness import condition_number, singular_values
+from problem.fitness import condition_number
 from problem.limits import peaks
 from problem.motion import Motion
 from problem.registry import parse_problem
@@ -136,7 +136,7 @@ def _judge(
     if len(trajectory.sines) != len(problem.arm):
         raise InputError(f"{name}: has {len(trajectory.sines)} joints, '{problem.arm.name}' has {len(problem.arm)}")
     motion = trajectory.motion(problem.samples)
-    values = singular_values(problem.arm, motion, problem.base.columns, problem.unit_columns)
+    values = problem.singular_values(motion)
     return Judgement(
         name=name,
         columns=columns,
