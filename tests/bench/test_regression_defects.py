@@ -25,6 +25,10 @@ def committed() -> tuple[Sweep, Baseline, list[Entry]]:
     return sweep, baseline, plan_entries(sweep)
 
 
+def guarded_problems() -> set[str]:
+    return {entry.problem for entry in committed()[2]}
+
+
 def ends_under(defect: str, repetitions: int) -> Ends:
     """Ends of the first algorithm that the defect concerns: one is enough to find it."""
     concerned = [
@@ -43,17 +47,17 @@ def verdict_under(defect: str) -> CheckVerdict:
 
 
 @pytest.mark.parametrize("defect", ["de-without-selection", "spso-frozen-velocity"])
-def test_a_defect_of_an_algorithm_is_named_on_both_problems_and_on_no_other_algorithm(defect: str) -> None:
+def test_a_defect_of_an_algorithm_is_named_on_every_problem_and_on_no_other_algorithm(defect: str) -> None:
     verdict = verdict_under(defect)
     (algorithm,) = DEFECTS[defect].algorithms
-    assert {alarm.cell for alarm in verdict.alarms} == {("paper", algorithm), ("joint-fourier", algorithm)}
+    assert {alarm.cell for alarm in verdict.alarms} == {(problem, algorithm) for problem in guarded_problems()}
     assert all(alarm.worse for alarm in verdict.alarms)
     assert f"{algorithm} on paper is WORSE" in "\n".join(verdict.sentences())
 
 
 @pytest.mark.parametrize("defect", ["no-coriolis-terms", "wrong-axis"])
-def test_a_defect_of_the_observation_matrix_is_found_on_both_problems(defect: str) -> None:
-    assert {alarm.cell.problem for alarm in verdict_under(defect).alarms} == {"paper", "joint-fourier"}
+def test_a_defect_of_the_observation_matrix_is_found_on_both_problems_of_the_irb_120(defect: str) -> None:
+    assert {alarm.cell.problem for alarm in verdict_under(defect).alarms} >= {"paper", "joint-fourier"}
 
 
 def test_the_sign_of_a_column_cannot_be_seen_since_no_singular_value_depends_on_it() -> None:
