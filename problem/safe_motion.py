@@ -4,6 +4,7 @@ keep-out boxes and to the arm itself; as rules, and as a constraint of a search.
 
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.util import find_spec
 from typing import Annotated, Literal
 
 import numpy as np
@@ -200,11 +201,8 @@ def _check_count(arm: Arm, name: str, given: int) -> None:
 
 def _shape(arm: Arm, robot: str, limits: tuple[Limits, ...], settings: SafetySettings) -> ArmShape | None:
     surroundings = Surroundings(settings.floor, settings.keep_out)
-    try:
-        import mujoco  # noqa: F401
-    except ImportError:
-        if settings.floor is None and not settings.keep_out:
-            return None
+    if find_spec("mujoco") is None and settings.floor is None and not settings.keep_out:
+        return None
     return arm_shape(arm, robot, surroundings, limits, settings.radius)
 
 

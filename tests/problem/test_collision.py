@@ -1,6 +1,7 @@
 """Distances of arms from themselves, floors and boxes: cases that a person can check, and bounds on random poses."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,9 +22,9 @@ def lifting_arm() -> Arm:
     return Arm("lifting", (shoulder, *others))
 
 
-def shape_of(arm: Arm, robot: str = "none", **around: object) -> ArmShape:
+def shape_of(arm: Arm, robot: str = "none", **around: Any) -> ArmShape:
     limits = tuple(joint.limits for joint in arm.joints)
-    return arm_shape(arm, robot, Surroundings(**around), limits, RADIUS)  # type: ignore[arg-type]
+    return arm_shape(arm, robot, Surroundings(**around), limits, RADIUS)
 
 
 def distance(shape: ArmShape, first: str, second: str, pose: list[float]) -> float:

@@ -1,7 +1,7 @@
 """Safety rules: ranges and starts, distances as a constraint and as a proof, and bad input in one line."""
 
-import builtins
 import re
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -149,14 +149,7 @@ def path_start(start: Array | None) -> Array:
 
 
 def test_without_mujoco_the_card_says_that_the_arm_itself_is_not_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    real = builtins.__import__
-
-    def missing(name: str, *rest: object, **others: object) -> object:
-        if name == "mujoco":
-            raise ImportError(name)
-        return real(name, *rest, **others)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(builtins, "__import__", missing)
+    monkeypatch.setitem(sys.modules, "mujoco", None)
     told = check_motion(rules(), SERIES, swing(0, 0.1), 4.0).not_checked
     assert "the arm itself: MuJoCo is missing (pip install 'armlab[motion]')" in told
     assert "armlab[motion]" in refusal(rules, floor=0.0)
