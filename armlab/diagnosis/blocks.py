@@ -99,14 +99,14 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
     count = len(np.unique(np.concatenate(rows.blocks)))
     degrees = float(max(count - 1, 1))
     variance = sum(float(error @ error) for error in rows.errors) / max(sum(map(len, rows.errors)) - len(gram), 1)
-    held = inverse @ precision @ inverse  # by the prior, whatever the errors are
+    held = inverse @ precision @ inverse  # the part of the prior, which does not grow with the errors
     model = np.asarray(held + (inverse - held) * max(variance, 1.0), dtype=np.float64)
     if not robust:
         return BlockCovariance(model, degrees)
     sums = np.zeros((int(max(block.max() for block in rows.blocks)) + 1, len(gram)))
     for design, error, block in zip(rows.designs, rows.errors, rows.blocks, strict=True):
         np.add.at(sums, block, design * error[:, None])
-    # stretch by stretch, not by their squares: those of a direction that the prior alone holds would be rounding
+    # squares are taken last: where the prior alone holds a direction, rounding of earlier ones would hide the others
     shares = sums @ inverse * np.sqrt(count / max(count - 1, 1))
     spread = np.asarray(shares.T @ shares + held, dtype=np.float64)
     ratio = np.sqrt(np.maximum(np.diag(model), 0) / np.maximum(np.diag(spread), 1e-300))

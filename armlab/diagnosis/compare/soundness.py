@@ -133,7 +133,7 @@ def held_out_gains(table: ChangeTable, tested: int, errors: tuple[list[Array], l
 
 
 def predicts_better(table: ChangeTable, tested: int, errors: tuple[list[Array], list[Array]]) -> bool:
-    """Whether a change lowers the held-out error of all that moves alike, and by a least share in all.
+    """Whether a change lowers the held-out error of every recording, and the mean of them by a least share.
 
     Recordings of one motion err alike, and half of a change brings one nearer to that error and takes the other one
     away from it: they are judged together.
