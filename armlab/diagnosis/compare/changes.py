@@ -4,9 +4,9 @@ As a change is tested beside its common part, a recording compared with itself h
 changes and the table of parameters come from this one test.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,6 +83,11 @@ class ChangeTable:
     def columns_with(self, chosen: Sequence[int]) -> NDArray[np.intp]:
         """The common columns and those of chosen groups."""
         return np.concatenate([self.common, *(self.groups[each].columns for each in chosen)]).astype(np.intp)
+
+    @cached_property
+    def held_out_errors(self) -> Callable[[frozenset[int]], list[Array]]:
+        """Of chosen groups: errors (rows,) of each joint, each stretch predicted by the others; fitted once a set."""
+        return cache(lambda chosen: self.mixed.held_out_errors(self.columns_with(sorted(chosen))))
 
     @cached_property
     def degrees(self) -> int:

@@ -224,7 +224,7 @@ class MixedModel:
                 others[np.ix_(places[joint], np.append(places[joint], at))] -= own
             scale = 1 / np.sqrt(np.diag(others[:, :at]))
             scaled = others[:, :at] * np.outer(scale, scale) + INDEPENDENT_POWER * np.eye(at)
-            values = scale * np.linalg.solve(scaled, scale * others[:, at])
+            values = scale * cho_solve(cho_factor(scaled, overwrite_a=True), scale * others[:, at])
             for joint, (rows, _) in stretch.items():
                 out[joint][rows] = self.joints[joint].rows.target[rows] - designs[joint][rows] @ values[places[joint]]
         return out

@@ -125,5 +125,5 @@ def between_runs(table: ChangeTable, chosen: Sequence[int], number: int) -> Arra
 
 def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:
     """Errors (rows,) of each joint without and with a change, each stretch predicted by the others."""
-    without = table.columns_with([each for each in chosen if each != number])
-    return table.mixed.held_out_errors(without), table.mixed.held_out_errors(table.columns_with(chosen))
+    everything = frozenset(chosen)
+    return table.held_out_errors(everything - {number}), table.held_out_errors(everything)
