@@ -1,8 +1,11 @@
 """Damages the input of commands by seeded chance, runs them, and judges what they do: `hostile_commands.py`.
 
-The command writes the list of outcomes, `tests/hostile_outcomes.csv`, one row a case. A case is right where the command
-uses its input (exit 0, no NaN in any file) or refuses it (exit 2, one line, nothing written). `recording check` writes
-its page in both cases. Anything else is broken: a traceback, a hang, another exit status, a file half written.
+The command writes the list of outcomes, `tests/hostile_outcomes.csv`, one row a case. With `--seconds` it tries seeds
+that are not in the list, all kinds in turn, prints what is broken, and leaves the list as it is.
+
+A case is right where the command uses its input (exit 0, no NaN in any file) or refuses it (exit 2, one line, nothing
+written). `recording check` writes its page in both cases. Anything else is broken: a traceback, a hang, another exit
+status, a file half written.
 """
 
 import argparse
@@ -14,10 +17,13 @@ import re
 import signal
 import string
 import sys
+import time
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass, fields
+from functools import cache
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -49,6 +55,7 @@ EXPERIMENT = {
     "repetitions": 1,
     "seed": 1,
 }
+PAIR = ["spso", "random-search"]
 ROBOT = {
     "name": "two",
     "dh_convention": "standard",
@@ -63,6 +70,14 @@ RECORDING = {
     "units": {"time": "s", "position": "rad", "torque": "N.m"},
     "gains": [1.0, 1.0, 1.0],
     "transmission": {"offset": [0.0, 0.0, 0.0]},
+    "runs": [{"file": "run.csv", "role": "identify"}],
+}
+SERVO_RECORDING = {
+    "schema": "recording/1",
+    "robot": "../robot.yaml",
+    "columns": {"time": "t", "reference_position": ["c1", "c2"], "position": ["q1", "q2"]},
+    "units": {"time": "s", "reference_position": "rad", "position": "rad"},
+    "controller": {"type": "pd", "kp": [60.0, 60.0], "kd": [0.3, 0.3], "torque_limit": [30.0, 30.0], "delay": 0.0},
     "runs": [{"file": "run.csv", "role": "identify"}],
 }
 FINDING = {
@@ -106,6 +121,30 @@ def run_csv() -> str:
     columns = [time, *(np.sin((1 + n / 3) * time + n) for n in range(3)), *(np.cos(2 * time * n) for n in range(1, 4))]
     rows = "".join(",".join(f"{cell:.6f}" for cell in row) + "\n" for row in np.column_stack(columns))
     return "t,q1,q2,q3,u1,u2,u3\n" + rows
+
+
+def servo_csv() -> str:
+    """A run of 4 s of two servos that follow their commands late; no arm moves just so."""
+    time = np.arange(200) / 50
+    columns = [time, *(np.sin((1 + n) * (time - late)) for late in (0.0, 0.04) for n in range(2))]
+    rows = "".join(",".join(f"{cell:.6f}" for cell in row) + "\n" for row in np.column_stack(columns))
+    return "t,c1,c2,q1,q2\n" + rows
+
+
+@cache
+def shared_results() -> dict[str, str]:
+    """The files of a small experiment as `share` writes them."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "experiment.yaml").write_text(yaml.safe_dump(EXPERIMENT | {"repetitions": 3, "algorithms": PAIR}))
+        store = ["--store", f"{name}/s.sqlite"]
+        run = ["run", f"{name}/experiment.yaml", "--workers", "1", *store, "--results", f"{name}/results"]
+        share = ["share", f"{name}/experiment.yaml", *store, "--out", f"{name}/shared"]
+        for words in (run, share):
+            done = CliRunner().invoke(armlab, words)
+            if done.exit_code != 0:
+                raise RuntimeError(done.output)
+        return {path.name: path.read_text() for path in sorted((folder / "shared").iterdir())}
 
 
 def mutate(content: Any, rng: random.Random) -> Any:
@@ -165,6 +204,22 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
     (folder / "motion.csv").write_text(re.sub(r"(?m)(,[^,\n]*){3}$", "", table))
     verdict = mutate(VERDICT, rng) if damaged == "verdict" else VERDICT
     (folder / "verdict.json").write_text(json.dumps(verdict))
+    (folder / "servo").mkdir()
+    servo = mutate(SERVO_RECORDING, rng) if damaged == "servo" else SERVO_RECORDING
+    (folder / "servo" / "recording.yaml").write_text(yaml.safe_dump(servo))
+    log = damage_table(servo_csv(), rng) if damaged == "log" else servo_csv()
+    (folder / "servo" / "run.csv").write_text(log)
+
+
+def _write_results(folder: Path, rng: random.Random, damaged: str) -> None:
+    """Results that `share` wrote, one file of them damaged."""
+    (folder / "shared").mkdir()
+    for name, text in shared_results().items():
+        if damaged == name.removesuffix(".csv") and name.endswith(".csv"):
+            text = damage_table(text, rng)
+        elif damaged == "settings" and name == "settings.yaml":
+            text = yaml.safe_dump(mutate(yaml.safe_load(text), rng))
+        (folder / "shared" / name).write_text(text)
 
 
 COMMANDS = {
@@ -180,8 +235,18 @@ COMMANDS = {
     "--unit position=rad --unit torque=N.m --unit time=s",
     "confusability": "confusability irb120-arm motion.csv --noise 0.1",
     "next": "next verdict.json --robot irb120-arm --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next",
+    "diagnose": "diagnose rec --out out",
+    "compare-recordings": "diagnose rec --compare rec --out out",
+    "servo": "diagnose servo --out out",
+    "check-servo": "recording check servo --out check.html",
+    "report": "report shared --out page.html",
+    "duels": "duels shared spso --out duels",
+    "draw": "draw shared --out drawn",
+    "share": "share shared --as latex --out tables",
+    "compare": "compare shared shared --out compared",
 }
-WRITES_WITH_REFUSAL = {"check": "check.html"}
+WRITES_WITH_REFUSAL = {"check": "check.html", "check-servo": "check.html"}
+OF_RESULTS = ("report", "duels", "draw", "share", "compare")
 
 
 @dataclass(frozen=True)
@@ -217,6 +282,26 @@ KINDS = (
     Kind("next", "verdict", 4),
     Kind("next", "words", 4),
     Kind("run", "words", 4),
+    Kind("diagnose", "recording", 2),
+    Kind("diagnose", "table", 2),
+    Kind("diagnose", "words", 2),
+    Kind("compare-recordings", "table", 2),
+    Kind("compare-recordings", "words", 2),
+    Kind("servo", "servo", 4),
+    Kind("servo", "log", 4),
+    Kind("servo", "robot", 2),
+    Kind("check-servo", "servo", 4),
+    Kind("report", "trials", 2),
+    Kind("report", "curves", 2),
+    Kind("report", "settings", 2),
+    Kind("duels", "trials", 4),
+    Kind("duels", "settings", 2),
+    Kind("duels", "words", 4),
+    Kind("draw", "curves", 2),
+    Kind("share", "trials", 4),
+    Kind("share", "settings", 4),
+    Kind("compare", "trials", 4),
+    Kind("compare", "words", 4),
 )
 
 
@@ -231,7 +316,10 @@ def damage_words(words: list[str], rng: random.Random) -> list[str]:
 def run_case(kind: Kind, seed: int, folder: Path) -> Outcome:
     """One case in an empty folder, which is the working folder meanwhile."""
     rng = random.Random(f"{kind.damaged} {kind.command} {seed}")
-    _write_inputs(folder, rng, kind.damaged)
+    if kind.command in OF_RESULTS:
+        _write_results(folder, rng, kind.damaged)
+    else:
+        _write_inputs(folder, rng, kind.damaged)
     words = COMMANDS[kind.command].split()
     if kind.damaged == "words":
         words = damage_words(words, rng)
@@ -297,16 +385,26 @@ def _is_free_of_nan(path: Path) -> bool:
     return not re.search(r"(?i)(^|[\s,:\[\"])[+-]?\.?(nan|inf|infinity)($|[\s,\]\"])", path.read_text(encoding="utf-8"))
 
 
-def outcomes_of(kind: Kind) -> Iterator[Outcome]:
-    """The outcomes of all seeds of a kind."""
+def outcomes_of(kind: Kind, seeds: Iterable[int]) -> Iterator[Outcome]:
+    """The outcomes of some seeds of a kind."""
     home = Path.cwd()
-    for seed in range(kind.seeds):
+    for seed in seeds:
         with TemporaryDirectory() as name:
             os.chdir(name)
             try:
                 yield run_case(kind, seed, Path(name))
             finally:
                 os.chdir(home)
+
+
+def outcomes_beyond_the_list(kinds: Sequence[Kind], seconds: float, first_seed: int) -> Iterator[Outcome]:
+    """The outcomes of further seeds, all kinds in turn, until the time is over."""
+    end = time.monotonic() + seconds
+    for number in count(first_seed):
+        for kind in kinds:
+            if time.monotonic() > end:
+                return
+            yield from outcomes_of(kind, [kind.seeds + number])
 
 
 def read_outcomes() -> list[Outcome]:
@@ -332,19 +430,29 @@ def main(arguments: list[str]) -> int:
     """Runs the cases of the named kinds, else all, and puts them into the list; 1 if a case is broken."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kinds", nargs="*", choices=[[], *(kind.name for kind in KINDS)], default=[])
-    chosen = parser.parse_args(arguments).kinds
+    parser.add_argument("--seconds", type=float, help="try seeds beyond the list for as long")
+    parser.add_argument("--first-seed", type=int, default=0, help="of those beyond the list")
+    options = parser.parse_args(arguments)
+    kinds = [kind for kind in KINDS if not options.kinds or kind.name in options.kinds]
     counts = Counter[str]()
-    for kind in KINDS:
-        if chosen and kind.name not in chosen:
-            continue
-        found = list(outcomes_of(kind))
-        write_outcomes(found)
-        counts.update(each.verdict for each in found)
-        for each in found:
-            if each.verdict.startswith("broken"):
-                print(each.case, each.verdict, each.told, flush=True)
-    print(f"{counts.total()} cases:", ", ".join(f"{count} {verdict}" for verdict, count in sorted(counts.items())))
+    if options.seconds is not None:
+        for each in outcomes_beyond_the_list(kinds, options.seconds, options.first_seed):
+            counts[each.verdict] += 1
+            _print_broken(each)
+    else:
+        for kind in kinds:
+            found = list(outcomes_of(kind, range(kind.seeds)))
+            write_outcomes(found)
+            counts.update(each.verdict for each in found)
+            for each in found:
+                _print_broken(each)
+    print(f"{counts.total()} cases:", ", ".join(f"{number} {verdict}" for verdict, number in sorted(counts.items())))
     return 1 if any(verdict.startswith("broken") for verdict in counts) else 0
+
+
+def _print_broken(outcome: Outcome) -> None:
+    if outcome.verdict.startswith("broken"):
+        print(outcome.case, outcome.verdict, outcome.told, flush=True)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ stored: that row has the largest double too.
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -21,7 +21,14 @@ import yaml
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import write_whole
-from bench.result_sets.result_set import TRIAL_COLUMNS, ResultSet, TableOfCurves, read_stored_results, runs_by_algorithm
+from bench.result_sets.result_set import (
+    CELL_COLUMNS,
+    TRIAL_COLUMNS,
+    ResultSet,
+    TableOfCurves,
+    read_stored_results,
+    runs_by_algorithm,
+)
 from bench.statistics.performance import Run
 from bench.tables import summary_latex, summary_table
 
@@ -65,27 +72,75 @@ def read_tidy(folder: Path) -> ResultSet:
         name = str(yaml.safe_load(settings)["name"])
     except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
         raise InputError(f"{folder} is no folder of results: {error!s}".splitlines()[0]) from None
-    trials, curves = (_read_table(folder, table) for table in TABLES)
+    trials_file, curves_file = (_table_file(folder, table) for table in TABLES)
+    trials, curves = _read_table(trials_file, []), _read_table(curves_file, ["evaluations"])
+    _check_repetitions(trials, trials_file)
+    _check_same_trials(trials, curves, trials_file, curves_file)
     return ResultSet(name, settings, tuple(origins), trials, TableOfCurves(curves))
 
 
-def _read_table(folder: Path, name: str) -> pd.DataFrame:
-    for form, reader in _READERS.items():
+def _table_file(folder: Path, name: str) -> Path:
+    for form in _READERS:
         path = folder / f"{name}.{form}"
         if path.exists():
-            return _read_checked_table(reader, path)
+            return path
     raise InputError(f"{folder} is no folder of results: it holds neither {name}.csv nor {name}.parquet")
 
 
-def _read_checked_table(reader: Callable[[Path], pd.DataFrame], path: Path) -> pd.DataFrame:
+def _read_table(path: Path, also_key: Sequence[str]) -> pd.DataFrame:
+    """A table whose columns hold what they should. also_key: what tells its rows apart beside the trial."""
     try:
-        table = reader(path)
+        table = _READERS[path.suffix.removeprefix(".")](path)
     except (OSError, ValueError) as error:  # of pandas and pyarrow alike
         raise InputError(f"cannot read {path}: {error!s}".splitlines()[0]) from None
-    missing = [column for column in [*TRIAL_COLUMNS, "evaluations", "value", "violation"] if column not in table]
+    missing = [column for column in [*TRIAL_COLUMNS, *_LEAST, "value"] if column not in table]
     if missing:
         raise InputError(f"{path} lacks the columns {', '.join(missing)}")
+    if table.empty:
+        raise InputError(f"{path} has no rows: share the results again")
+    for column in ("problem", "algorithm"):
+        _check_cells(table[column].notna(), table, column, path, "a name")
+    for column in ("value", *_LEAST):
+        wanted = "a number" if column == "value" else f"a {_KIND[column]} of {_LEAST[column]} or more"
+        numbers = pd.to_numeric(table[column], errors="coerce")
+        right = numbers.notna() & (numbers >= _LEAST.get(column, -np.inf))
+        if _KIND.get(column) == "whole number":
+            right &= numbers % 1 == 0
+        _check_cells(right, table, column, path, wanted)
+        table[column] = numbers
+    repeated = table.duplicated([*TRIAL_COLUMNS, *also_key])
+    if repeated.any():
+        raise InputError(f"{path}, row {int(repeated.to_numpy().argmax()) + 1}: the same trial stands above it")
     return table
+
+
+_LEAST = {"swarm_size": 1, "budget": 1, "repetition": 0, "evaluations": 1, "violation": 0}
+_KIND = {column: "number" if column == "violation" else "whole number" for column in _LEAST}
+
+
+def _check_cells(right: "pd.Series[bool]", table: pd.DataFrame, column: str, path: Path, wanted: str) -> None:
+    if not right.all():
+        row = int(np.argmin(right.to_numpy()))
+        raise InputError(
+            f"{path}, row {row + 1}: {column} is {str(table[column].iloc[row])[:40]!r}, should be {wanted}"
+        )
+
+
+def _check_repetitions(trials: pd.DataFrame, path: Path) -> None:
+    """Trials of one repetition began alike: algorithms are compared in pairs of them."""
+    for cell, rows in trials.groupby(CELL_COLUMNS, sort=False):
+        counts = rows.groupby("algorithm", sort=False)["repetition"].agg(frozenset)
+        wrong = counts[counts != counts.iloc[0]]
+        if len(wrong):
+            where = ", ".join(map(str, cell))
+            raise InputError(f"{path}: in {where}, {wrong.index[0]} has other repetitions than {counts.index[0]}")
+
+
+def _check_same_trials(trials: pd.DataFrame, curves: pd.DataFrame, trials_file: Path, curves_file: Path) -> None:
+    one, other = (set(map(tuple, table[TRIAL_COLUMNS].drop_duplicates().to_numpy())) for table in (trials, curves))
+    if one != other:
+        example = ", ".join(map(str, min(one ^ other, key=str)))
+        raise InputError(f"{trials_file} and {curves_file} are not of the same trials: only one of them has {example}")
 
 
 def make_folder(folder: Path) -> None:
