@@ -202,6 +202,10 @@ def load_algorithm(name: str) -> AnyAlgorithm:
 
 def _make_outcome(result: Result, tape: _RecordedObjective, seconds: float) -> Outcome:
     best = tape.problem.evaluate(result.best_x[None])
+    if best.value[0] < 0:
+        raise ValueError(
+            f"problem {tape.problem.name!r} gave the value {best.value[0]:g}: add a constant, none below 0"
+        )
     return Outcome(
         value=float(best.value[0]),
         violation=float(best.violation[0]),

@@ -10,7 +10,8 @@ class Evaluation(NamedTuple):
     """Results of a population, (points,) each.
 
     fitness: what is minimised, with penalties. value: what is reported, without penalties (for an excitation the
-    condition number of the trajectory). violation: 0 where every limit is kept.
+    condition number of the trajectory); not negative, since statistics take its logarithm. violation: 0 where every
+    limit is kept.
     """
 
     fitness: Array

@@ -31,6 +31,7 @@ class ProblemContract:
         evaluation = self._problem().evaluate(self._points())
         assert [np.shape(figures) for figures in evaluation] == [(7,)] * 3
         assert not np.isnan(evaluation.fitness).any()
+        assert not (np.asarray(evaluation.value) < 0.0).any()
         assert (np.asarray(evaluation.violation) >= 0.0).all()
 
     def test_a_point_has_the_same_figures_to_the_bit_in_any_batch(self) -> None:

@@ -69,7 +69,7 @@ def read_tidy(folder: Path) -> ResultSet:
     try:
         settings = (folder / SETTINGS).read_text()
         origins = json.loads((folder / ORIGINS).read_text())
-        name = str(yaml.safe_load(settings)["name"])
+        name = _check_settings(yaml.safe_load(settings))
     except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
         raise InputError(f"{folder} is no folder of results: {error!s}".splitlines()[0]) from None
     trials_file, curves_file = (_table_file(folder, table) for table in TABLES)
@@ -77,6 +77,21 @@ def read_tidy(folder: Path) -> ResultSet:
     _check_repetitions(trials, trials_file)
     _check_same_trials(trials, curves, trials_file, curves_file)
     return ResultSet(name, settings, tuple(origins), trials, TableOfCurves(curves))
+
+
+def _check_settings(settings: Any) -> str:
+    """The name of the results; raises ValueError where settings are not as `share` writes them."""
+    wanted = {"name": str, "seed": int, "problem": dict, "algorithms": dict}
+    for key, kind in wanted.items():
+        if not isinstance(settings, dict) or not isinstance(settings.get(key), kind):
+            raise ValueError(f"{SETTINGS} should have `{key}`, {_KINDS[kind]}")
+    for label, entry in settings["algorithms"].items():
+        if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
+            raise ValueError(f"{SETTINGS}, algorithms, {str(label)[:40]}: should have `name`, a text")
+    return str(settings["name"])
+
+
+_KINDS = {str: "a text", int: "a whole number", dict: "a mapping"}
 
 
 def _table_file(folder: Path, name: str) -> Path:
@@ -101,12 +116,14 @@ def _read_table(path: Path, also_key: Sequence[str]) -> pd.DataFrame:
     for column in ("problem", "algorithm"):
         _check_cells(table[column].notna(), table, column, path, "a name")
     for column in ("value", *_LEAST):
-        wanted = "a number" if column == "value" else f"a {_KIND[column]} of {_LEAST[column]} or more"
+        unit = "whole number" if column in _COUNTED else "number"
         numbers = pd.to_numeric(table[column], errors="coerce")
-        right = numbers.notna() & (numbers >= _LEAST.get(column, -np.inf))
-        if _KIND.get(column) == "whole number":
+        right = numbers.notna() & (numbers >= _LEAST.get(column, 0))
+        if column in _COUNTED:
             right &= numbers % 1 == 0
-        _check_cells(right, table, column, path, wanted)
+        if column == "value":  # a problem may have none at a point
+            right |= table[column].isna()
+        _check_cells(right, table, column, path, f"a {unit} of {_LEAST.get(column, 0)} or more")
         table[column] = numbers
     repeated = table.duplicated([*TRIAL_COLUMNS, *also_key])
     if repeated.any():
@@ -115,7 +132,7 @@ def _read_table(path: Path, also_key: Sequence[str]) -> pd.DataFrame:
 
 
 _LEAST = {"swarm_size": 1, "budget": 1, "repetition": 0, "evaluations": 1, "violation": 0}
-_KIND = {column: "number" if column == "violation" else "whole number" for column in _LEAST}
+_COUNTED = _LEAST.keys() - {"violation"}
 
 
 def _check_cells(right: "pd.Series[bool]", table: pd.DataFrame, column: str, path: Path, wanted: str) -> None:

@@ -70,16 +70,17 @@ def duels_against_all(frame: pd.DataFrame, subject: str) -> list[Duel]:
 
 
 def log_losses(frame: pd.DataFrame) -> dict[str, Array]:
-    """By algorithm, log10 of its ends in the order of the repetitions.
+    """By algorithm, log10 of its ends in the order of the repetitions; an end of 0 counts as the least number.
 
     An infeasible end gets a loss above every feasible one of the frame, so that it has the worst rank; two infeasible
     ends are equal.
     """
     values, violations = frame["value"].to_numpy(), frame["violation"].to_numpy()
     feasible = is_feasible(values, violations)
-    logs = np.log10(values[feasible]) if feasible.any() else np.zeros(1)
-    loss = pd.Series(logs.max() + np.ptp(logs) + 1.0, index=frame.index)
-    loss[feasible] = np.log10(values[feasible])
+    logs = np.log10(np.maximum(values, np.finfo(float).tiny)[feasible])
+    worst = logs.max() + np.ptp(logs) + 1.0 if feasible.any() else 1.0
+    loss = pd.Series(worst, index=frame.index)
+    loss[feasible] = logs
     ordered = frame.assign(loss=loss).sort_values("repetition", kind="stable")
     return {str(label): rows["loss"].to_numpy() for label, rows in ordered.groupby("algorithm", sort=False)}
 

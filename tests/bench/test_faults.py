@@ -233,6 +233,21 @@ def test_an_objective_that_is_not_a_number_is_a_loss_and_no_end_is_feasible(smal
     assert summarise(np.array([outcome.value]), np.array([outcome.violation])).feasible_share == 0.0
 
 
+def test_a_problem_whose_value_is_negative_is_told_what_to_do(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Statistics take the logarithm of the ends."""
+    trial = load_experiment(small).entries[0].trial
+
+    class Below:
+        name, lower, upper = "below", np.zeros(3), np.ones(3)
+
+        def evaluate(self, points: np.ndarray) -> Evaluation:
+            return Evaluation(*(np.full(len(points), number) for number in (-1.0, -1.0, 0.0)))
+
+    monkeypatch.setattr("bench.execute.build_problem", lambda settings: Below())
+    with pytest.raises(ValueError, match="'below' gave the value -1: add a constant"):
+        run_trial(trial)
+
+
 def test_a_clock_that_is_set_back_changes_no_duration(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     trial = load_experiment(small).entries[0].trial
     times = iter(range(10**9, 0, -3600))

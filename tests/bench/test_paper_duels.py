@@ -29,6 +29,11 @@ def test_an_infeasible_end_is_worse_than_any_feasible_one_and_two_are_equal() ->
     assert losses["b"][0] - losses["a"].max() > np.ptp(losses["a"])
 
 
+def test_an_end_of_zero_is_better_than_any_other_and_two_are_equal() -> None:
+    losses = log_losses(_frame(a=[0.0, 1e-300], b=[0.0, 1.0]))
+    assert losses["a"][0] == losses["b"][0] < losses["a"][1] < losses["b"][1]
+
+
 def test_equal_ends_give_a_p_value_of_one() -> None:
     assert signed_rank_p(np.ones(5), np.ones(5)) == 1.0
 

@@ -101,6 +101,33 @@ def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: 
     assert "is no folder of results" in refusal(read_results, tmp_path, small_run.store)
 
 
+@pytest.mark.parametrize(
+    ("file", "row", "column", "cell", "message"),
+    [
+        ("trials.csv", 3, "value", "-2.0", "row 4: value is '-2.0', should be a number of 0 or more"),
+        ("trials.csv", 0, "budget", "1.5", "row 1: budget is '1.5', should be a whole number of 1 or more"),
+        ("trials.csv", 1, "algorithm", "", "row 2: algorithm is 'nan', should be a name"),
+        ("trials.csv", 2, "repetition", "1", "row 3: the same trial stands above it"),
+        ("trials.csv", 6, "repetition", "99", "has other repetitions than"),
+        ("curves.csv", 5, "value", "x", "row 6: value is 'x', should be a number of 0 or more"),
+        ("curves.csv", 0, "repetition", "99", "are not of the same trials: only one of them has"),
+        ("settings.yaml", None, "algorithms", "[1]", "settings.yaml should have `algorithms`, a mapping"),
+    ],
+)
+def test_shared_results_that_were_edited_are_refused_in_one_line(
+    small_run: Ran, tmp_path: Path, file: str, row: int | None, column: str, cell: str, message: str
+) -> None:
+    share_results(*small_run, "csv", tmp_path)
+    path = tmp_path / file
+    if row is None:
+        path.write_text("\n".join([f"{column}: {cell}", "name: n", "seed: 1", "problem: {}"]))
+    else:
+        table = pd.read_csv(path, dtype=str)
+        table.loc[row, column] = cell
+        table.to_csv(path, index=False)
+    assert message in refusal(read_results, tmp_path, small_run.store)
+
+
 def test_the_iohprofiler_files_hold_every_run_with_its_best(small_run: Ran, results: ResultSet, tmp_path: Path) -> None:
     written = share_results(*small_run, "ioh", tmp_path)
     assert len(written) == 2 * 3
