@@ -26,12 +26,13 @@ MIN_TOLD_SHARE = 0.01  # of the gap: less is not in that sentence
 
 @dataclass(frozen=True)
 class Chapter:
-    """Findings with one cause. findings: their places among the claims, from 0. share: of the gap."""
+    """Findings with one cause. findings: their places among the claims, from 0. share: of the gap. effects: theirs."""
 
     cause: Cause
     joints: tuple[int, ...]
     share: float
     findings: tuple[int, ...]
+    effects: tuple[str, ...]
 
 
 def with_story(diagnosis: Diagnosis) -> Diagnosis:
@@ -52,6 +53,7 @@ def tell_story(diagnosis: Diagnosis) -> tuple[Chapter, ...]:
             tuple(sorted({joint for place in own for joint in _joints(diagnosis, place)})),
             float(sum(shares[place] for place in own)),
             own,
+            tuple(dict.fromkeys(diagnosis.claims[place].effect for place in own)),
         )
         for cause, own in _places_by_cause(diagnosis).items()
     ]
@@ -104,11 +106,13 @@ def add_in_order(start: Array, torques: Mapping[K, Array]) -> dict[K, float]:
 
 
 def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
-    """The causes with their shares in one sentence of at most MAX_WORDS words."""
+    """The causes with their shares in one sentence of at most MAX_WORDS words; a share of several is never 100 %."""
     first, *others = chapters
-    sentence = f"{_cause_in_words(first, joints)} explains {100 * first.share:.0f} % of the error"
+    most = 100 - max(round(100 * sum(each.share for each in others)), 1) if others else 100
+    share = min(round(100 * first.share), most)
+    sentence = f"{share} % of the error comes from {_cause_in_words(first, joints)}"
     for each in others:
-        longer = f"{sentence}; {_cause_in_words(each, joints).lower()} ({100 * each.share:.0f} %)"
+        longer = f"{sentence}, {100 * each.share:.0f} % from {_cause_in_words(each, joints)}"
         if each.share < MIN_TOLD_SHARE or len(longer.split()) > MAX_WORDS:
             break
         sentence = longer
@@ -116,14 +120,20 @@ def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
 
 
 def _cause_in_words(each: Chapter, joints: int) -> str:
-    name = {"unknown": "Structure without a name", "links": "Errors of the links"}.get(each.cause)
-    name = name or each.cause.capitalize()
-    if not each.joints or each.cause == "links":
+    """The effect itself where there is only one, else what they have in common."""
+    if each.cause == "unknown":
+        name = "something without a name"
+    elif len(each.effects) == 1:
+        name = effect_named(each.effects[0]).words
+    else:
+        name = {"links": "masses and inertias", "drive": "the drive"}.get(each.cause, each.cause)
+    if not each.joints:
         return name
+    where = "of {}link" if each.cause == "links" else "at {}joint"
     if len(each.joints) == joints > 1:
-        return f"{name} on all {joints} joints"
+        return f"{name} {where.format(f'all {joints} ')}s"
     plural = "s" if len(each.joints) > 1 else ""
-    return f"{name} on joint{plural} {_join_numbers(each.joints)}"
+    return f"{name} {where.format('')}{plural} {_join_numbers(each.joints)}"
 
 
 def _join_numbers(numbers: Sequence[int]) -> str:

@@ -9,7 +9,7 @@ from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.tuning import ClaimTuning
 from armlab.identification.torque_model import TorqueModel
 
-MAX_NAMED_FINDINGS = 6  # findings that the summary names; the others are counted
+MAX_NAMED_FINDINGS = 6  # differences that the summary names; the others are counted
 
 
 def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit], simulation: Simulation) -> str:

@@ -21,6 +21,7 @@ ROTOR_INERTIA_FACTS = Effect(
     common=True,
     axis="acceleration",
     experiment="compare with the motor's data sheet; armlab next says whether any motion tells it from the link",
+    figures="{inertia}",
 )
 TORQUE_GAIN_FACTS = Effect(
     "torque_gain_error",

@@ -41,6 +41,7 @@ COULOMB_FACTS = Effect(
     common=True,
     axis="velocity",
     experiment="record several constant speeds in both directions, slow ones too, with many reversals",
+    figures="{level}",
 )
 VISCOUS_FACTS = Effect(
     "viscous_friction",
@@ -52,6 +53,7 @@ VISCOUS_FACTS = Effect(
     common=True,
     axis="velocity",
     experiment="record the same speeds at different frequencies of motion, and several constant speeds",
+    figures="{coefficient}",
 )
 NONLINEAR_VISCOUS_FACTS = Effect(
     "nonlinear_viscous_friction",
@@ -118,6 +120,7 @@ LOAD_DEPENDENT_FACTS = Effect(
     prior_scale=0.3,
     common=True,
     experiment="repeat one motion with two payloads, or one speed in two poses of different load",
+    figures="{coefficient}",
 )
 
 PARTS_PER_SAMPLE = 4  # of a sample's interval, for friction with memory

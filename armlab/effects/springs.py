@@ -44,6 +44,7 @@ TORQUE_RIPPLE_FACTS = Effect(
     scanned=True,
     axis="cycle",
     experiment="turn the joint slowly at constant speed, sampled well above the ripple",
+    figures="{amplitude} at {order}",
 )
 GRAVITY_COMPENSATOR_FACTS = Effect(
     "gravity_compensator",
@@ -70,6 +71,7 @@ CABLE_STIFFNESS_FACTS = Effect(
     axis="position",
     origin="gravity and springs",
     experiment="move the joint slowly over its full range in both directions",
+    figures="{stiffness}",
 )
 
 MIN_ORDER = 4.0  # cycles a turn: slower waves are gravity and springs

@@ -47,6 +47,7 @@ JOINT_ELASTICITY_FACTS = Effect(
     prior_scale=1e-3,
     origin="transmission",
     experiment="excite the joint with a chirp past its resonance, or read an encoder on the link side",
+    figures="{stiffness}",
 )
 BACKLASH_FACTS = Effect(
     "backlash",
@@ -62,6 +63,7 @@ BACKLASH_FACTS = Effect(
     axis="position",
     origin="transmission",
     experiment="let the load change its sign slowly, or read an encoder on the link side",
+    figures="{gap}",
 )
 
 PLAYS = (0.03, 0.1)  # of the joint's travel: gaps before friction, for a first look

@@ -15,7 +15,13 @@ from problem.presets import load_arm
 ARM = load_arm("irb120-arm")
 SIMULATION = Simulation("nominal", ARM, None)
 REFIT = Simulation("refit", ARM, None)
-VECTORS = {"centre": (-1e-9, 0.02, 0.06), "inertia": (0.0,) * 6, "gravity": (0.17, 0.0, -9.81)}
+VECTORS = {
+    "centre": (-1e-9, 0.02, 0.06),
+    "inertia": (0.0,) * 6,
+    "gravity": (0.17, 0.0, -9.81),
+    "velocities": (0.1, 1.0),
+    "torques": (1.0, 2.0),
+}
 SENTENCES = {
     "coulomb_friction": "The simulation lacks Coulomb friction at joint 2",
     "viscous_friction": "The simulation lacks viscous friction at joint 2",
@@ -34,12 +40,15 @@ SENTENCES = {
     "joint_elasticity": "The simulation lacks joint elasticity at joint 2",
     "backlash": "The simulation lacks backlash at joint 2",
     "joint_coupling": "The simulation lacks joint coupling at joint 2 from joint 1",
-    "gravity_compensator": "A gravity compensator that the simulation does not have acts on joint 2",
+    "gravity_compensator": "A gravity compensator that the simulation does not have acts on joint 2: "
+    "stiffness 0.500 N m/rad (0.4 to 0.6)",
     "cable_stiffness": "The simulation lacks cable stiffness at joint 2",
     "payload": (
         "The arm carries a load that the simulation does not have: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint2"
     ),
-    "inertial_parameter_error": ("The mass, centre of mass or inertia of link 2 differs from that in the simulation"),
+    "inertial_parameter_error": (
+        "The mass, centre of mass or inertia of link 2 differs from that in the simulation: mass 0.500 kg (0.4 to 0.6)"
+    ),
     "base_tilt": "Gravity points in another direction than in the simulation: (0.170, 0.00, −9.81) m/s²",
     "encoder_offset": ("The zero position of joint 2 differs from that in the simulation: 0.500 rad (0.4 to 0.6)"),
     "geometry_error": "A length or a twist at joint 2 differs from that in the simulation: 0.500 m (0.4 to 0.6)",
@@ -53,7 +62,9 @@ SENTENCES = {
         "The torque of joint 2 stays below a limit that the simulation does not have: 0.500 N m (0.4 to 0.6)"
     ),
     "friction_curve": "The friction of joint 2 follows a curve over velocity that the simulation does not have",
-    "controller_gain_error": "The controller gain of joint 2 differs from that in the simulation",
+    "controller_gain_error": (
+        "The controller gain of joint 2 differs from that in the simulation: kp 0.500 N m/rad (0.4 to 0.6)"
+    ),
     "command_delay": "A command to joint 2 takes effect later than in the simulation: 0.500 s (0.4 to 0.6)",
     "controller_dead_band": (
         "The servo of joint 2 ignores small errors, and in the simulation it does not: 0.500 rad (0.4 to 0.6)"
@@ -99,8 +110,8 @@ def test_what_the_model_lacks_stands_in_one_sentence_with_its_joints_and_rivals(
         claim("coulomb_friction", 2, ("asymmetric_friction", "stribeck_friction")),
     ]
     assert findings_in_sentences(found, REFIT, 3) == (
-        "The rigid-body model of irb120-arm lacks viscous friction at joints 1 and 3 and Coulomb friction at joint 2 "
-        "(or asymmetric friction or Stribeck friction)."
+        "The rigid-body model of irb120-arm lacks viscous friction at joints 1 and 3 and Coulomb friction of 0.500 N m "
+        "at joint 2 (or asymmetric friction or Stribeck friction)."
     )
 
 
@@ -115,10 +126,12 @@ def test_other_findings_are_counted_and_what_is_unknown_is_told() -> None:
     found = [
         claim("torque_offset", 1, ("encoder_offset",)),
         claim("backlash", 3),
+        claim("encoder_offset", 2),
         claim("unknown", 1),
         claim("unknown", 3),
     ]
     assert findings_in_sentences(found, SIMULATION, 1) == (
+        "The simulation of irb120-arm lacks backlash of 0.500 rad at joint 3. "
         "The torque of joint 1 has a constant part that the simulation does not have: 0.500 N m (0.4 to 0.6); "
         "encoder offset fits as well. There is 1 more finding. "
         "Something that no known effect explains acts at joints 1 and 3."

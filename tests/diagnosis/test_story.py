@@ -23,15 +23,22 @@ def test_torques_that_explain_the_same_error_do_not_count_it_twice() -> None:
 
 def test_the_sentence_names_the_causes_and_has_at_most_thirty_words() -> None:
     chapters = [
-        Chapter("friction", (1, 2, 3, 4, 5, 6), 0.91, (0, 1)),
-        Chapter("gravity and springs", (2,), 0.05, (2,)),
-        *(Chapter("transmission", (joint,), 0.01, (2 + joint,)) for joint in range(1, 7)),
+        Chapter("friction", (1, 2, 3, 4, 5, 6), 0.85, (0, 1), ("coulomb_friction", "viscous_friction")),
+        Chapter("gravity and springs", (2,), 0.05, (2,), ("cable_stiffness",)),
+        *(Chapter("transmission", (joint,), 0.01, (2 + joint,), ("backlash",)) for joint in range(1, 7)),
     ]
     sentence = story_sentence(chapters, 6)
     assert sentence.startswith(
-        "Friction on all 6 joints explains 91 % of the error; gravity and springs on joint 2 (5 %)"
+        "85 % of the error comes from friction at all 6 joints, 5 % from cable stiffness at joint 2"
     )
     assert len(sentence.split()) <= MAX_WORDS
+
+
+def test_one_of_several_causes_never_explains_all() -> None:
+    chapters = [Chapter("links", (2,), 0.998, (0,), ("payload",)), Chapter("unknown", (1,), 0.02, (1,), ("unknown",))]
+    assert story_sentence(chapters, 3) == (
+        "98 % of the error comes from payload of link 2, 2 % from something without a name at joint 1."
+    )
 
 
 @pytest.mark.parametrize(

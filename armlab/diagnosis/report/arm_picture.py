@@ -16,7 +16,7 @@ from armlab.common.report.charts import (
 )
 from problem.arm import Arm
 
-PICTURE_WIDTH, ROW_HEIGHT = 372.0, 17.0
+PICTURE_WIDTH, ROW_HEIGHT = 412.0, 17.0
 ARM_WIDTH = 168.0  # px: width of the arm itself; the names stand beside it
 MARKED_NAME_WIDTH = 66.0  # px: width of a guilty joint's name before its finding
 ELEVATION = np.deg2rad(18)
@@ -26,7 +26,7 @@ MIN_LENGTH = 1e-9
 
 @dataclass(frozen=True)
 class JointMark:
-    """What is said of a joint. unknown: no effect of the library explains it."""
+    """What is said of a joint. unknown: no effect of the library explains all of it."""
 
     text: str
     unknown: bool = False

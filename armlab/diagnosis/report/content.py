@@ -69,16 +69,6 @@ def story_text(diagnosis: Diagnosis) -> str:
     return story_sentence(chapters, len(diagnosis.simulation.arm)) if chapters else ""
 
 
-def guilty_joints(diagnosis: Diagnosis) -> str:
-    """The joints of the findings by their names; empty where none is guilty."""
-    joints = diagnosis.simulation.arm.joints
-    numbers = sorted({claim.joint for claim in diagnosis.claims if claim.joint is not None})
-    if not numbers:
-        return ""
-    names = [f"{number} ({joints[number - 1].name})" for number in numbers]
-    return f"Guilty: joint{'s' if len(names) > 1 else ''} {join_words(names)}."
-
-
 def cause_table(diagnosis: Diagnosis) -> Table | None:
     """The causes with their findings, the largest first; None without findings."""
     rows = []

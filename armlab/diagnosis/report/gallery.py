@@ -17,11 +17,15 @@ from armlab.diagnosis.report.torque_pictures import (
 )
 from armlab.diagnosis.report.words import effect_in_words
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.story import finding_shares
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 
 MAX_POSTURES = 100  # recorded ones, of which the most telling is drawn
 MAX_LOCATED_JOINTS = 4  # joints whose error is drawn against every variable
+
+
+SOMETHING_UNKNOWN = "something unknown"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,17 +86,20 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
 def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
     """What is said of each joint in the picture of the arm."""
     texts: dict[int, list[str]] = {}
-    unknown: dict[int, bool] = {}
-    for claim in diagnosis.claims:
+    shares = [share or 0.0 for share in finding_shares(diagnosis)]
+    for place in sorted(range(len(shares)), key=lambda place: -shares[place]):
+        claim = diagnosis.claims[place]
         if claim.joint is not None:
             facts = effect_named(claim.effect)
-            texts.setdefault(claim.joint, []).append(f"{facts.words} (link)" if facts.where == "link" else facts.words)
-            unknown[claim.joint] = unknown.get(claim.joint, True) and facts == UNKNOWN
-    return {joint: JointMark(_short_mark(names), unknown[joint]) for joint, names in texts.items()}
+            words = SOMETHING_UNKNOWN if facts == UNKNOWN else facts.words
+            texts.setdefault(claim.joint, []).append(f"link: {words}" if facts.where == "link" else words)
+    return {joint: JointMark(_short_mark(names), SOMETHING_UNKNOWN in names) for joint, names in texts.items()}
 
 
 def _short_mark(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{names[0]} + {len(names) - 1}"
+    """What is unknown first, else what explains most."""
+    first = SOMETHING_UNKNOWN if SOMETHING_UNKNOWN in names else names[0]
+    return first if len(names) == 1 else f"{first}, {len(names) - 1} more"
 
 
 def _file_name(effect: str) -> str:

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from armlab.common.report.page import Table
-from armlab.diagnosis.report.sentences import finding_sentence
-from armlab.diagnosis.report.words import effect_in_words, format_measured
+from armlab.diagnosis.report.sentences import finding_sentence, number_in_words, rivals_in_words
+from armlab.diagnosis.report.words import effect_in_words, format_measured, join_words
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.drive import ROTOR_INERTIA_FACTS
@@ -19,41 +19,68 @@ NOTHING = "–"
 
 
 def joint_table(diagnosis: Diagnosis) -> Table:
-    """What is to be added to the simulation, joint by joint, with units and 95 % intervals."""
-    arm, rows = diagnosis.simulation.arm, []
+    """What is to be added to the simulation at each joint of a finding, with units and 95 % intervals."""
+    arm, claims = diagnosis.simulation.arm, [each for each in diagnosis.claims if each.effect != PAYLOAD_FACTS.id]
+    columns = [effect for effect in OWN_COLUMN if any(claim.effect == effect.id for claim in claims)]
+    rows = []
     for number, joint in enumerate(arm.joints, 1):
-        own = [claim for claim in diagnosis.claims if claim.joint == number and claim.effect != PAYLOAD_FACTS.id]
-        rows.append([f"{number}  {joint.name}", *_cells(own)])
-    whole = [claim for claim in diagnosis.claims if claim.joint is None]
+        own = [claim for claim in claims if claim.joint == number]
+        if own:
+            rows.append([f"{number}\N{NO-BREAK SPACE}{joint.name}", *_cells(own, columns)])
+    whole = [claim for claim in claims if claim.joint is None]
     if whole:
-        rows.append(["whole robot", *_cells(whole)])
-    headings = ["joint", *(_heading(effect) for effect in OWN_COLUMN), "other"]
-    return Table(headings, rows, (4,), stacked=True)
+        rows.append(["whole robot", *_cells(whole, columns)])
+    if all(row[-1] == NOTHING for row in rows):
+        return Table(["joint", *map(_heading, columns)], [row[:-1] for row in rows], (), stacked=True)
+    return Table(["joint", *map(_heading, columns), "Other"], rows, (len(columns) + 1,), stacked=True)
+
+
+def joints_without_finding(diagnosis: Diagnosis) -> str:
+    """`Joints 1, 2 and 5: nothing was found.`; empty where each has a finding."""
+    guilty = {claim.joint for claim in diagnosis.claims if claim.effect != PAYLOAD_FACTS.id}
+    free = [str(number) for number in range(1, len(diagnosis.simulation.arm) + 1) if number not in guilty]
+    return f"Joint{'s' if len(free) > 1 else ''} {join_words(free)}: nothing was found." if free else ""
 
 
 def _heading(effect: Effect) -> str:
     return effect.words[0].upper() + effect.words[1:]
 
 
-def _cells(claims: Sequence[Claim]) -> list[str]:
+def _cells(claims: Sequence[Claim], columns: Sequence[Effect]) -> list[str]:
     cells = []
-    for effect in OWN_COLUMN:
+    for effect in columns:
         own = [claim for claim in claims if claim.effect == effect.id]
-        cells.append("; ".join(format_measured(each) for claim in own for each in claim.parameters) or NOTHING)
-    columns = {effect.id for effect in OWN_COLUMN}
-    others = [_other_cell(claim) for claim in claims if claim.effect not in columns]
+        values = [f"{_together(format_measured(each))}{_rivals(claim)}" for claim in own for each in claim.parameters]
+        cells.append("; ".join(values) or NOTHING)
+    shown = {effect.id for effect in columns}
+    others = [_other_cell(claim) for claim in claims if claim.effect not in shown]
     return [*cells, "; ".join(others) or NOTHING]
 
 
 def _other_cell(claim: Claim) -> str:
-    """The effect, and the number that its facts name first."""
+    """The effect with the numbers that its sentence has, else with its first one."""
     if claim.effect == UNKNOWN.id:
         return "something that no known effect explains"
-    words = effect_in_words(claim.effect)
-    if effect_named(claim.effect).where == "link":
+    facts, words = effect_named(claim.effect), effect_in_words(claim.effect)
+    if facts.where == "link":
         words = f"{words} of its link"
     scalars = [each for each in claim.parameters if np.ndim(each.value) == 0]
-    return f"{words}: {scalars[0].name.replace('_', ' ')} {format_measured(scalars[0])}" if scalars else words
+    numbers = [_together(format_measured(each)) for each in scalars if f"{{{each.name}}}" in facts.figures]
+    if not numbers and scalars:
+        name = number_in_words(scalars[0].name)
+        shown = "" if name in words.split() else f"{name} "
+        numbers = [f"{shown}{_together(format_measured(scalars[0]))}"]
+    return f"{words}{': ' if numbers else ''}{', '.join(numbers)}{_rivals(claim)}"
+
+
+def _together(text: str) -> str:
+    """A value with its interval on one line."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def _rivals(claim: Claim) -> str:
+    rivals = rivals_in_words(claim)
+    return f", or {rivals}" if rivals else ""
 
 
 def body_sentences(diagnosis: Diagnosis) -> list[str]:

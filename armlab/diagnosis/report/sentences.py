@@ -7,6 +7,7 @@ Every other effect says in a sentence of its own what was found (`Effect.sentenc
 import math
 import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import starmap
 
 import numpy as np
@@ -23,23 +24,18 @@ MILLI = 1e3  # mm in a m
 
 
 def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most: int) -> str:
-    """All findings; of those with a name the first `most`, the others are counted. Empty without findings."""
-    known = [claim for claim in claims if claim.effect != UNKNOWN.id]
+    """All that the model lacks, then the first `most` of what differs; the others are counted, and what is unknown is
+    told. Empty without findings.
+    """
     unknown = [claim for claim in claims if claim.effect == UNKNOWN.id]
-    sentences = [*_named_sentences(known[:most], simulation), *_count_sentence(len(known) - most)]
+    lacking = [claim for claim in claims if claim.effect != UNKNOWN.id and not _facts(claim).sentence]
+    differing = [claim for claim in claims if claim.effect != UNKNOWN.id and _facts(claim).sentence]
+    sentences = [_lacking_sentence(lacking, simulation)] if lacking else []
+    sentences += [finding_sentence(each, simulation) + _rivals_that_fit(each) for each in differing[:most]]
+    sentences += _count_sentence(len(differing) - most)
     if unknown:
         sentences.append(UNKNOWN.sentence.format(place=_places(unknown)))
     return " ".join(f"{each}." for each in sentences)
-
-
-def _named_sentences(claims: Sequence[Claim], simulation: Simulation) -> Iterator[str]:
-    """In the order of the findings; all that the model lacks stands where the first of it does."""
-    lacking = [claim for claim in claims if not _facts(claim).sentence]
-    for claim in claims:
-        if _facts(claim).sentence:
-            yield finding_sentence(claim, simulation) + _rivals_that_fit(claim)
-        elif claim is lacking[0]:
-            yield _lacking_sentence(lacking, simulation)
 
 
 def finding_sentence(claim: Claim, simulation: Simulation) -> str:
@@ -65,12 +61,21 @@ def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
     """What the model lacks, one effect at several joints together where its rivals are the same."""
     groups: dict[tuple[str, str], list[Claim]] = {}
     for claim in sorted(claims, key=lambda each: each.joint or 0):
-        groups.setdefault((claim.effect, _rivals(claim)), []).append(claim)
+        groups.setdefault((claim.effect, rivals_in_words(claim)), []).append(claim)
     lacking = [
-        f"{effect_in_words(effect)} at {_places(own)}{f' (or {rivals})' if rivals else ''}"
+        f"{effect_in_words(effect)}{_size(own)} at {_places(own)}{f' (or {rivals})' if rivals else ''}"
         for (effect, rivals), own in groups.items()
     ]
     return _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
+
+
+def _size(claims: Sequence[Claim]) -> str:
+    """` of 3.03 N m s/rad` of a single finding."""
+    facts = _facts(claims[0])
+    if len(claims) > 1 or not facts.figures:
+        return ""
+    values = {each.name: _format_value(replace(each, interval=None)) for each in claims[0].parameters}
+    return f" of {facts.figures.format(**values)}"
 
 
 def _places(claims: Sequence[Claim]) -> str:
@@ -82,13 +87,14 @@ def _places(claims: Sequence[Claim]) -> str:
     return join_words(places)
 
 
-def _rivals(claim: Claim) -> str:
+def rivals_in_words(claim: Claim) -> str:
+    """Other effects that fit as well: `Stribeck friction or friction drift`; empty where there is none."""
     names = dict.fromkeys(effect_in_words(each.effect) for each in claim.rivals if each.effect != claim.effect)
     return join_words(list(names), "or") if names else ""
 
 
 def _rivals_that_fit(claim: Claim) -> str:
-    rivals = _rivals(claim)
+    rivals = rivals_in_words(claim)
     return f"; {rivals} fits as well" if rivals else ""
 
 
@@ -98,15 +104,22 @@ def _count_sentence(number: int) -> Iterator[str]:
 
 
 def _figures(facts: Effect, parameters: Sequence[ParameterValue], frame: str) -> str:
-    """`: 2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of wrist_3`; all numbers by name where a law has others."""
-    if not facts.figures or not parameters:
-        return ""
+    """`: 2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of wrist_3`; where a law has other numbers, these by name."""
     values = {each.name: _format_value(each) for each in parameters}
+    if not facts.figures:
+        first = next((each for each in parameters if np.ndim(each.value) == 0), None)
+        return "" if first is None else f": {number_in_words(first.name)} {values[first.name]}"
+    if not values:
+        return ""
     try:
         return f": {facts.figures.format(frame=frame, **values)}"
     except KeyError:  # as of a body of which this arm feels only some numbers
-        named = [f"{name.replace('_', ' ')} {value}" for name, value in values.items()]
-        return f": {', '.join(named)}"
+        return f": {', '.join(f'{number_in_words(name)} {value}' for name, value in values.items())}"
+
+
+def number_in_words(name: str) -> str:
+    """The name of a number of a law in a sentence."""
+    return "mass" if name == "m" else name.replace("_", " ")
 
 
 def _format_value(parameter: ParameterValue) -> str:

@@ -53,7 +53,7 @@ def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> Markup:
     axis = fit_axis(f"rms error, {' or '.join(sorted(kinds))}", *(each for _, each in series), floors, log=True)
     top = 62.0
     height = top + JOINT_ROW_HEIGHT * len(floors) + 42
-    content = svg_text("Error on data that took no part", 6, 14, 12, font_weight="600") + _draw_marks_legend(series)
+    content = svg_text("Error on held-out data", 6, 14, 12, font_weight="600") + _draw_marks_legend(series)
     content += _draw_grid(axis, top, height)
     for joint in range(len(floors)):
         content += _draw_joint_row(axis, top + JOINT_ROW_HEIGHT * (joint + 0.5), joint, series, float(floors[joint]))
@@ -101,7 +101,7 @@ def _axis_position(axis: Axis, value: float) -> float:
 def _draw_mark(x: float, y: float, look: Look) -> str:
     """A shape of its own for each series: square, ring, disc, bar."""
     if look is GIVEN_LOOK:
-        return svg_element("rect", x=x - 4.5, y=y - 4.5, width=9, height=9, fill=look.color)
+        return svg_element("rect", x=x - 7, y=y - 7, width=14, height=14, fill=look.color)
     if look is REFITTED_LOOK:
         return svg_element("circle", cx=x, cy=y, r=4.6, fill=palette.BACK, stroke=look.color, stroke_width=2.2)
     if look is FOUND_LOOK:

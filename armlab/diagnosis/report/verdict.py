@@ -11,16 +11,20 @@ from armlab.diagnosis.report.sentences import findings_in_sentences, model_in_wo
 from armlab.diagnosis.report.words import (
     effect_in_words,
     finding_in_words,
+    format_fixed,
     format_gap,
     format_probability,
+    join_words,
     joint_unit,
     place_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit
+from armlab.diagnosis.story import finding_shares
+from armlab.effects.contract import UNKNOWN
 from armlab.recordings.reading.answer import SetupFinding
 from problem.arm import Arm
 
-MAX_NAMED_FINDINGS = 3  # findings that the verdict names; the others are counted
+MAX_NAMED_FINDINGS = 4  # differences that the verdict names; the others are counted
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
@@ -34,7 +38,7 @@ def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
     simulation = diagnosis.simulation
     if diagnosis.status == "none":
         size = "" if worst is None else _largest_error_text(worst, simulation.arm)
-        left = f"On data that took no part the largest error is {size}." if size else ""
+        left = f"The largest error on held-out data is {size}." if size else ""
         return f"Nothing is missing: {model_in_words(simulation)} explains the recordings down to their noise.", left
     return findings_in_sentences(diagnosis.claims, simulation, MAX_NAMED_FINDINGS), gain_sentence(diagnosis)
 
@@ -45,24 +49,38 @@ def _largest_error_text(worst: JointFit, arm: Arm) -> str:
 
 
 def gain_sentence(diagnosis: Diagnosis) -> str:
-    """How far the held-out error falls at the joint that gains most, and its share of the gap to the noise."""
+    """How far the held-out error falls at the joint of a finding that gains most, and what noise and a refit reach."""
+    shares = [share or 0.0 for share in finding_shares(diagnosis)]
+    largest = diagnosis.claims[int(np.argmax(shares))]
+    if largest.effect == UNKNOWN.id:
+        return _unknown_gain_sentence(diagnosis, largest)
     data = select_residuals(diagnosis)
     refit = np.array([each.before for each in diagnosis.fit])
     start = refit if data is None or data.given is None else data.held_out_rms(data.given)
     after = np.array([each.after for each in diagnosis.fit])
-    joint = int(np.argmax(start / np.maximum(after, 1e-300)))
-    best = diagnosis.fit[joint]
-    size = joint_unit(diagnosis.simulation.arm, joint)
-    before = f"{format_number(best.before)} {size} with the rigid body refitted"
-    if start is not refit:
-        before = f"{format_number(float(start[joint]))} {size} ({before})"
-    closed = "" if best.gap_closed is None else f", {100 * min(best.gap_closed, 1.0):.0f} % of the way to the noise"
-    if data is not None and not is_white(data.final[:, joint], joint, data.observed):
-        closed = "; what is left there still holds structure"
-    this = "With it" if len(diagnosis.claims) == 1 else "With these"
+    joints = sorted({claim.evidence.joint for claim in diagnosis.claims})
+    joint = joints[int(np.argmax(start[joints] / np.maximum(after[joints], 1e-300)))]
+    best, size = diagnosis.fit[joint], joint_unit(diagnosis.simulation.arm, joint)
+    alone = "" if start is refit else f" (to {format_fixed(best.before)} by a refit of the rigid body alone)"
+    white = data is None or is_white(data.final[:, joint], joint, data.observed)
+    rest = "" if white else " What is left there is not all noise."
+    with_it = "With it" if len(diagnosis.claims) == 1 else "With these"
+    falls = "falls" if best.after < start[joint] else "does not fall, it goes"
     return (
-        f"{this} the error on data that took no part falls from {before} to {format_number(best.after)} {size} "
-        f"at joint {best.joint}{closed}."
+        f"{with_it} the error of joint {best.joint} on held-out data {falls} "
+        f"from {format_fixed(float(start[joint]))} to {format_fixed(best.after)} {size}{alone}; "
+        f"its noise is {format_fixed(best.noise_floor)} {size}.{rest}"
+    )
+
+
+def _unknown_gain_sentence(diagnosis: Diagnosis, claim: Claim) -> str:
+    """A surrogate tells how much there is to explain; it is no physics."""
+    evidence, size = claim.evidence, joint_unit(diagnosis.simulation.arm, claim.evidence.joint)
+    variables = join_words([name.replace("_", " of joint ") for name in claim.depends_on])
+    return (
+        f"It depends on {variables}: a curve of these lowers the error of joint {evidence.joint + 1} on held-out data "
+        f"from {format_fixed(evidence.rms_before)} to {format_fixed(evidence.rms_after)} {size}; "
+        f"its noise is {format_fixed(diagnosis.fit[evidence.joint].noise_floor)} {size}."
     )
 
 
@@ -83,7 +101,7 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     for each in diagnosis.unexplained:
         yield f"  unexplained: {100 * each.share:.0f} % of joint {each.joint}, by {', '.join(each.depends_on)}"
     if diagnosis.fit:
-        yield "  joint   refitted      found      noise   gap closed   (rms on data that took no part)"
+        yield "  joint   refitted      found      noise   gap closed   (rms on held-out data)"
     for fit in diagnosis.fit:
         closed = format_gap(fit.gap_closed)
         errors = "".join(f"{format_number(value):>11}" for value in (fit.before, fit.after, fit.noise_floor))

@@ -16,6 +16,7 @@ from problem.arm import Arm
 MAX_NAME_LENGTH = 24  # letters
 PARAMETER_DIGITS = 4  # of a parameter
 COMPONENT_NAMES = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "xz", "yz")}
+MAX_LENGTH_IN_MM = 0.1  # m
 VALUE_DIGITS = 3  # of a value with its interval
 
 
@@ -99,12 +100,14 @@ def format_gap(closed: float | None) -> str:
 
 def format_measured(parameter: ParameterValue) -> str:
     """`2.31 N m (2.28 to 2.34)` of a scalar: three digits, and an interval as fine as it is wide."""
-    value, unit = float(np.asarray(parameter.value)), format_unit(parameter.unit)
-    shown = f"{format_fixed(value)} {unit}".rstrip()
+    value, unit, scale = float(np.asarray(parameter.value)), format_unit(parameter.unit), 1.0
+    if parameter.unit == "m" and abs(value) < MAX_LENGTH_IN_MM:
+        unit, scale = "mm", 1e3
+    shown = f"{format_fixed(scale * value)} {unit}".rstrip()
     if parameter.interval is None:
         return shown
     low, high = np.asarray(parameter.interval, dtype=float).tolist()
-    return f"{shown} ({format_interval(low, high)})"
+    return f"{shown} ({format_interval(scale * low, scale * high)})"
 
 
 def format_fixed(value: float) -> str:
