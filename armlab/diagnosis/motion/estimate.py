@@ -171,8 +171,12 @@ def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning
 
 def thin_windows(windows: Windows, most: int) -> Windows:
     """At most so many windows, spread evenly over all."""
-    chosen = np.unique(np.linspace(0, windows.count - 1, min(most, windows.count)).astype(int))
-    return windows.select(chosen)
+    return windows.select(evenly_spread(windows.count, most))
+
+
+def evenly_spread(count: int, most: int) -> NDArray[np.intp]:
+    """At most so many of the numbers below a count, ascending."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.intp))
 
 
 def fill_unknown(nominal: Array) -> Array:
