@@ -14,6 +14,7 @@ from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
 from armlab.cli.main import main
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
+from armlab.diagnosis.motion.choose import learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
@@ -23,6 +24,7 @@ from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.servo import NEUTRAL, Servos, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.tuning import MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.windows import make_windows
 from armlab.diagnosis.motion.words import motion_lines
@@ -123,6 +125,28 @@ def test_replay_of_one_joint_agrees_with_mujoco(soft: Path) -> None:
     for windows in make_windows(recording.with_role("identify"), simulation):
         errors = replay_joint(windows, true)[0] - windows.position
         assert np.sqrt(np.mean(errors**2)) < 0.03 * np.std(windows.position)
+
+
+def test_windows_that_are_replayed_together_do_not_touch_each_other(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    values = np.stack([NEUTRAL, NEUTRAL])
+    values[:, [place("kp"), place("damping"), place("friction"), place("delay")]] = 8.0, 0.5, 0.1, 0.0203
+    values[1, [place("limit"), place("dead_band"), place("payload")]] = 0.5, 0.01, 0.1
+    alone = [replay_joint(windows.select(np.array([window])), values) for window in range(windows.count)]
+    np.testing.assert_array_equal(np.concatenate(alone, axis=1), replay_joint(windows, values))
+
+
+def test_an_integral_at_the_start_of_a_run_is_settled_where_it_is_judged(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    values = NEUTRAL.copy()
+    values[[place("kp"), place("damping"), place("ki")]] = 8.0, 0.5, 1.0
+    loaded = windows.with_integral(np.array([0.2, -0.2]))
+    windows = replace(windows, position=replay_joint(loaded, values)[0])
+    halves = windows.select(np.flatnonzero(windows.run == 0)), windows.select(np.flatnonzero(windows.run == 1))
+    errors = learned_errors(halves, values, np.zeros(len(values), dtype=bool), MotionTuning())
+    assert np.sqrt(errors.sum() / len(halves[1].position)) < 1e-5
 
 
 def test_mujoco_replays_its_own_recording_down_to_the_encoder(soft: Path) -> None:

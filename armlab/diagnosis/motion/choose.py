@@ -18,6 +18,7 @@ from armlab.diagnosis.motion.estimate import (
     find_start,
     fit_servo,
     jacobian,
+    settle,
     thin_windows,
     unsaturated_limit,
 )
@@ -246,10 +247,13 @@ def errors_on_other_half(windows: Windows, values: Array, free: NDArray[np.bool_
 def learned_errors(
     halves: tuple[Windows, Windows], values: Array, free: NDArray[np.bool_], tuning: MotionTuning
 ) -> Array:
-    """Squared error of each window of the second half, by parameters that were fitted on the first."""
+    """Squared error of each window of the second half, by parameters that were fitted on the first.
+
+    What an integral holds at the start of a run is no parameter of the servo: it is settled where it is judged.
+    """
     train, test = halves
     fitted = fit_servo(train, values, free, tuning.refit_evaluations)
-    judged = test.with_integral(fitted.integral)
+    judged = settle(test.with_integral(fitted.integral), fitted.values)
     errors = joint_errors(judged, fitted.values)[0]
     return np.bincount(judged.window, errors**2, judged.count).astype(float)
 

@@ -133,12 +133,7 @@ def diagnose_motion(
         return MotionDiagnosis(recording, simulation, "inconclusive", reason)
     learned, held_out = split_runs(recording, tuning.held_out_share)
     progress("replaying the joints together")
-    windows = make_windows(learned, simulation, tuning)
-    still = [bool(np.ptp(joint.position) < MIN_MOVED) for joint in windows]
-    firsts = [
-        None if still[number] else first_fit(joint, simulation.nominal.values[number], tuning).values
-        for number, joint in enumerate(windows)
-    ]
+    firsts = _first_fits(learned, simulation, tuning)
     held = holds_samples(recording.runs, given.rate_hz)
     if held:
         progress("finding the clock of the drives")
@@ -192,6 +187,14 @@ def split_runs(
         held_out = [run.rows(slice(cut, None)) for run, cut in zip(learned, cuts, strict=True)]
         learned = [run.rows(slice(cut)) for run, cut in zip(learned, cuts, strict=True)]
     return learned, held_out
+
+
+def _first_fits(runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: MotionTuning) -> list[Array | None]:
+    """Numbers, (parameters,) of each joint, by the measured loads; None for a joint that stands still."""
+    return [
+        None if np.ptp(joint.position) < MIN_MOVED else first_fit(joint, nominal, tuning).values
+        for joint, nominal in zip(make_windows(runs, simulation, tuning), simulation.nominal.values, strict=True)
+    ]
 
 
 def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:

@@ -104,27 +104,29 @@ def fit_servo(
         return np.concatenate([jacobian(moved, at, free), _integral_slopes(moved, at, runs, push)], axis=1)
 
     part = np.concatenate([to_coordinates(values)[chosen], windows.integral[runs]])
-    if len(part):
-        low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -wound_up)])
-        high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), wound_up)])
-        margin = 1e-9 * (high - low)
-        part = least_squares(
-            lambda part: joint_errors(*whole(part))[0],
-            np.clip(part, low + margin, high - margin),
-            jac=slopes,
-            bounds=(low, high),
-            x_scale=np.concatenate([np.where(LOGARITHMIC, 0.2, SCALE)[chosen], np.full(len(runs), push)]),
-            max_nfev=evaluations,
-            ftol=1e-5,
-            xtol=1e-5,
-        ).x
-    moved, values = whole(part)
-    errors = joint_errors(moved, values)[0]
-    covariance = np.zeros((0, 0))
-    if len(chosen):
-        covariance = _block_covariance(slopes(part), errors, windows.window)[: len(chosen), : len(chosen)]
-    rms = float(np.sqrt(np.mean(errors**2)))
-    return ServoFit(values, free, covariance, rms, windows.count, moved.integral)
+    if len(part) == 0:
+        errors = joint_errors(windows, values)[0]
+        return ServoFit(values, free, np.zeros((0, 0)), _root_mean_square(errors), windows.count, windows.integral)
+    low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -wound_up)])
+    high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), wound_up)])
+    margin = 1e-9 * (high - low)
+    solution = least_squares(
+        lambda part: joint_errors(*whole(part))[0],
+        np.clip(part, low + margin, high - margin),
+        jac=slopes,
+        bounds=(low, high),
+        x_scale=np.concatenate([np.where(LOGARITHMIC, 0.2, SCALE)[chosen], np.full(len(runs), push)]),
+        max_nfev=evaluations,
+        ftol=1e-5,
+        xtol=1e-5,
+    )
+    moved, values = whole(solution.x)
+    covariance = _block_covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
+    return ServoFit(values, free, covariance, _root_mean_square(solution.fun), windows.count, moved.integral)
+
+
+def _root_mean_square(errors: Array) -> float:
+    return float(np.sqrt(np.mean(errors**2)))
 
 
 def settle(windows: Windows, values: Array) -> Windows:
@@ -169,8 +171,12 @@ def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning
 
 def thin_windows(windows: Windows, most: int) -> Windows:
     """At most so many windows, spread evenly over all."""
-    chosen = np.unique(np.linspace(0, windows.count - 1, min(most, windows.count)).astype(int))
-    return windows.select(chosen)
+    return windows.select(evenly_spread(windows.count, most))
+
+
+def evenly_spread(count: int, most: int) -> NDArray[np.intp]:
+    """At most so many of the numbers below a count, ascending."""
+    return np.unique(np.linspace(0, count - 1, min(most, count)).astype(np.intp))
 
 
 def fill_unknown(nominal: Array) -> Array:

@@ -6,8 +6,17 @@
 
 #include <math.h>
 #include <stdint.h>
+#include <string.h>
 
 #define LEAST_MASS 0.5 /* of an inertia: what a negative payload leaves of it */
+
+/* Compiled for processors with and without AVX2, whichever runs it: the operations and their results are the same. */
+#if defined(__x86_64__) && defined(__GLIBC__) && defined(__GNUC__) && !defined(__clang__)
+#define SEVERAL_PROCESSORS __attribute__((target_clones("avx2", "default")))
+#else
+#define SEVERAL_PROCESSORS
+#endif
+#define INLINE static inline __attribute__((always_inline))
 
 /* In the order of PARAMETERS in servo.py. */
 typedef struct {
@@ -70,46 +79,145 @@ static void integrate_runs(const Stretch *at, const Servo *servo, double *integr
     }
 }
 
-static void replay_window(const Stretch *at, int64_t window, const Servo *servo, double integral, double *out) {
-    const int64_t from = window * at->steps;
-    const double *command = at->command + window * at->columns, h = at->step, late = servo->delay / h;
-    double position = at->measured[from], velocity = at->first_velocity[window];
-    int64_t sample = at->begin[window];
-    for (int64_t step = 0; sample < at->begin[window + 1] && step < at->steps; step++) {
-        int64_t now = from + step, next = step + 1 < at->steps ? now + 1 : now;
-        double before = position, middle = position + 0.5 * h * velocity;
-        double away = middle - 0.5 * (at->measured[now] + at->measured[next]);
-        double bare = at->inertia[now] + servo->armature;
-        double mass = fmax(bare + servo->payload * at->unit_inertia[now], LEAST_MASS * bare);
-        double load = at->load[now] + servo->payload * at->unit_load[now];
-        load += (at->slope[now] + servo->payload * at->unit_slope[now]) * away;
-        double asked = command_at(command, at->columns, (double)(at->history + step) - late);
-        double error = acting_error(servo, asked, middle), supply = at->supply ? at->supply[now] : 1.0;
-        integral = clip(integral + h * servo->ki * error, servo->integral_limit);
-        double pull = servo->kp * error + integral, slow = 0.5 * h * (servo->damping + supply * servo->kd);
-        double free = ((mass - slow) * velocity + h * (supply * pull - load)) / (mass + slow);
-        double torque = pull - 0.5 * servo->kd * (velocity + free);
-        if (fabs(torque) > servo->limit) {
-            slow = 0.5 * h * servo->damping;
-            free = ((mass - slow) * velocity + h * (supply * clip(torque, servo->limit) - load)) / (mass + slow);
-        }
-        double level = h * (servo->friction + servo->load_friction * fabs(load)) / (mass + slow);
-        velocity = free;
-        velocity -= clip(velocity, level);
-        position = middle + 0.5 * h * velocity;
-        for (; sample < at->begin[window + 1] && at->row[sample] == step; sample++)
-            out[sample] = before + at->fraction[sample] * (position - before);
+/* A vector of numbers, and a mask with all bits of a number set or none (extensions of GCC and Clang). */
+typedef double Vector __attribute__((vector_size(32)));
+typedef int64_t Mask __attribute__((vector_size(32)));
+#define WIDTH 4
+#define PARTS (LANES / WIDTH)
+#define EACH_PART for (int part = 0; part < PARTS; part++)
+
+INLINE Vector choose(Mask mask, Vector yes, Vector no) {
+    return (Vector)((mask & (Mask)yes) | (~mask & (Mask)no));
+}
+
+INLINE Vector clip_each(Vector value, Vector bound) {
+    return choose(value > bound, bound, choose(value < -bound, -bound, value));
+}
+
+INLINE Vector size_of(Vector value) { return choose(value < 0, -value, value); }
+
+/* Column `step` of LANES rows of a table, each from its place on. */
+INLINE void take(const double *table, const int64_t from[LANES], int64_t step, Vector out[PARTS]) {
+    EACH_PART {
+        const int64_t *own = from + part * WIDTH;
+        const double *at = table + step;
+        out[part] = (Vector){at[own[0]], at[own[1]], at[own[2]], at[own[3]]};
     }
 }
 
-/* servos: (sets). out: (sets, samples), simulated positions; integrals: (windows), room for those of a set. */
-void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *out) {
+/* Positions at the beginning of each step, (steps + 1, LANES), of LANES windows at once, which are independent of each
+ * other: a processor computes several in one instruction. */
+SEVERAL_PROCESSORS
+static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t steps, const Servo *servo,
+    const double *integrals, double *path) {
+    const double h = at->step, half = 0.5 * h, late = servo->delay / h, limit = servo->limit;
+    const Vector none = {0}, full = none + 1.0, widest = none + limit, band = none + 0.5 * servo->dead_band;
+    const Vector wound_up = none + servo->integral_limit;
+    Vector position[PARTS], velocity[PARTS], integral[PARTS], passed[PARTS];
+    int64_t from[LANES], commands[LANES], own[LANES];
+    for (int lane = 0; lane < LANES; lane++) {
+        from[lane] = window[lane] * at->steps;
+        commands[lane] = window[lane] * at->columns;
+        own[lane] = window[lane];
+    }
+    take(at->measured, from, 0, position);
+    take(at->measured, from, 0, passed);
+    take(at->first_velocity, own, 0, velocity);
+    take(integrals, own, 0, integral);
+    for (int64_t step = 0; step < steps; step++) {
+        Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
+        Vector free[PARTS], slow[PARTS], torque[PARTS];
+        const double place = (double)(at->history + step) - late, whole = floor(place), share = place - whole;
+        const int64_t row = (int64_t)whole, last = at->columns - 1;
+        const int64_t first = row < 0 ? 0 : row < last ? row : last;
+        take(at->command, commands, first, before);
+        take(at->command, commands, row < 0 ? 0 : row < last ? row + 1 : last, after);
+        take(at->inertia, from, step, mass);
+        take(at->load, from, step, load);
+        take(at->slope, from, step, slope);
+        take(at->measured, from, step + 1 < at->steps ? step + 1 : step, next);
+        EACH_PART mass[part] += servo->armature;
+        if (servo->payload != 0) {
+            Vector unit_mass[PARTS], unit_load[PARTS], unit_slope[PARTS];
+            take(at->unit_inertia, from, step, unit_mass);
+            take(at->unit_load, from, step, unit_load);
+            take(at->unit_slope, from, step, unit_slope);
+            EACH_PART {
+                const Vector least = LEAST_MASS * mass[part], loaded = mass[part] + servo->payload * unit_mass[part];
+                mass[part] = choose(loaded > least, loaded, least);
+                load[part] += servo->payload * unit_load[part];
+                slope[part] += servo->payload * unit_slope[part];
+            }
+        }
+        EACH_PART supply[part] = full;
+        if (at->supply)
+            take(at->supply, from, step, supply);
+        Mask beyond = {0};
+        EACH_PART {
+            const Vector middle = position[part] + half * velocity[part];
+            load[part] += slope[part] * (middle - 0.5 * (passed[part] + next[part]));
+            passed[part] = next[part];
+            const Vector asked = before[part] + share * (after[part] - before[part]);
+            Vector error = asked + servo->offset - middle;
+            if (servo->dead_band > 0)
+                error -= clip_each(error, band);
+            Vector pull = servo->kp * error;
+            if (servo->ki > 0) {
+                integral[part] = clip_each(integral[part] + h * servo->ki * error, wound_up);
+                pull += integral[part];
+            }
+            slow[part] = half * (servo->damping + supply[part] * servo->kd);
+            free[part] = (mass[part] - slow[part]) * velocity[part] + h * (supply[part] * pull - load[part]);
+            free[part] /= mass[part] + slow[part];
+            torque[part] = pull - 0.5 * servo->kd * (velocity[part] + free[part]);
+            beyond |= size_of(torque[part]) > widest;
+        }
+        if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
+            EACH_PART {
+                const Mask over = size_of(torque[part]) > widest;
+                const Vector held = supply[part] * clip_each(torque[part], widest);
+                const Vector outside = none + half * servo->damping;
+                const Vector pushed = (mass[part] - outside) * velocity[part] + h * (held - load[part]);
+                free[part] = choose(over, pushed / (mass[part] + outside), free[part]);
+                slow[part] = choose(over, outside, slow[part]);
+            }
+        EACH_PART {
+            const Vector friction = servo->friction + servo->load_friction * size_of(load[part]);
+            const Vector moved = position[part] + half * velocity[part];
+            memcpy(path + step * LANES + part * WIDTH, position + part, sizeof(Vector));
+            velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
+            position[part] = moved + half * velocity[part];
+        }
+    }
+    memcpy(path + steps * LANES, position, sizeof position);
+}
+
+/* servos: (sets). out: (sets, samples), simulated positions; integrals: (sets, windows), room for those of the sets;
+ * path: (steps + 1, LANES), room for positions. */
+void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *path, double *out) {
+    const int64_t samples = at->begin[at->windows];
     for (int64_t set = 0; set < sets; set++) {
         for (int64_t window = 0; window < at->windows; window++)
-            integrals[window] = 0;
+            integrals[set * at->windows + window] = 0;
         if (servos[set].ki > 0)
-            integrate_runs(at, servos + set, integrals);
-        for (int64_t window = 0; window < at->windows; window++)
-            replay_window(at, window, servos + set, integrals[window], out + set * at->begin[at->windows]);
+            integrate_runs(at, servos + set, integrals + set * at->windows);
+    }
+    for (int64_t first = 0; first < at->windows; first += LANES) {
+        int64_t window[LANES], steps = 0;
+        int lanes = at->windows - first < LANES ? (int)(at->windows - first) : LANES;
+        for (int lane = 0; lane < LANES; lane++) {
+            window[lane] = first + (lane < lanes ? lane : lanes - 1);
+            int64_t end = at->begin[window[lane] + 1];
+            if (end > at->begin[window[lane]] && at->row[end - 1] >= steps)
+                steps = at->row[end - 1] + 1;
+        }
+        for (int64_t set = 0; set < sets; set++) {
+            replay_lanes(at, window, steps, servos + set, integrals + set * at->windows, path);
+            for (int lane = 0; lane < lanes; lane++)
+                for (int64_t sample = at->begin[window[lane]]; sample < at->begin[window[lane] + 1]; sample++) {
+                    const double *before = path + at->row[sample] * LANES + lane;
+                    out[set * samples + sample] = before[0] + at->fraction[sample] * (before[LANES] - before[0]);
+                }
+        }
     }
 }

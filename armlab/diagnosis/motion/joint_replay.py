@@ -55,8 +55,9 @@ def replay_joint(windows: Windows, values: Array) -> Array:
     stretch.supply = ffi.NULL if windows.supply is None else ffi.from_buffer("double[]", windows.supply)
     for name in ("begin", "row", "run", "start"):
         setattr(stretch, name, ffi.from_buffer("int64_t[]", getattr(windows, name)))
-    integrals = ffi.new("double[]", windows.count)
-    places = (ffi.from_buffer("Servo[]", servos), integrals, ffi.from_buffer("double[]", out))
+    integrals = ffi.new("double[]", len(servos) * windows.count)
+    path = ffi.from_buffer("double[]", np.empty((windows.measured.shape[1] + 1, lib.LANES)))
+    places = (ffi.from_buffer("Servo[]", servos), integrals, path, ffi.from_buffer("double[]", out))
     lib.replay_joint(stretch, len(servos), *places)
     return out
 

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import cffi
 
+LANES = 8  # windows that are replayed at once
+
 DECLARED = """
 typedef struct {
     double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, ki,
@@ -17,13 +19,14 @@ typedef struct {
     const int64_t *begin, *row, *run, *start;
     const double *fraction;
 } Stretch;
-void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *out);
+void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *path,
+    double *out);
 """
 
 ffibuilder = cffi.FFI()
-ffibuilder.cdef(DECLARED)
+ffibuilder.cdef(f"#define LANES {LANES}\n{DECLARED}")
 ffibuilder.set_source(
     "armlab.diagnosis.motion._joint_replay",
-    Path(__file__).with_name("joint_replay.c").read_text(),
+    f"#define LANES {LANES}\n" + Path(__file__).with_name("joint_replay.c").read_text(),
     extra_compile_args=["-O3", "-ffp-contract=off"],
 )

@@ -33,7 +33,7 @@ from armlab.diagnosis.motion.choose import (
     learned_errors,
 )
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.estimate import fit_servo, thin_windows
+from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
@@ -235,7 +235,8 @@ def _odd_windows(chosen: Sequence[ChosenServo | None]) -> NDArray[np.intp]:
 
 
 def _sound(windows: Windows, odd: NDArray[np.intp], tuning: MotionTuning) -> Windows:
-    return thin_windows(windows.select(np.setdiff1d(np.arange(windows.count), odd)), tuning.max_judged_windows)
+    kept = np.setdiff1d(np.arange(windows.count), odd)
+    return windows.select(kept[evenly_spread(len(kept), tuning.max_judged_windows)])
 
 
 def _carries_tool(windows: Windows) -> bool:

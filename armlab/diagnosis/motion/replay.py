@@ -1,6 +1,6 @@
 """Closed-loop replay in MuJoCo: the recorded commands through a whole simulated arm, beside the measured motion."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,11 +52,13 @@ def replay(simulation: ServoSimulation, servos: Servos | None, runs: Sequence[Mo
     return [_replay_run(model, simulation, servos, run) for run in runs]
 
 
-def replay_paths(simulation: ServoSimulation, servos: Servos, runs: Sequence[MotionRun], step_s: float) -> list[Array]:
-    """The same with another step: positions (steps, joints) of the recorded joints from the first stamp on, rad."""
+def replay_paths(
+    simulation: ServoSimulation, servos: Servos, runs: Sequence[MotionRun], step_s: float
+) -> Iterator[Array]:
+    """The same with another step: positions (steps, joints) of recorded joints from their start on, rad."""
     model = _free_model(simulation, servos)
     model.opt.timestep = step_s
-    return [_path(model, simulation, servos, run)[:, list(simulation.joints)] for run in runs]
+    return (_path(model, simulation, servos, run)[:, list(simulation.joints)] for run in runs)
 
 
 def _free_model(simulation: ServoSimulation, servos: Servos | None) -> Any:
@@ -130,29 +132,33 @@ def _step_through(
 ) -> Array:
     """The same step by step, with dead band, load friction and supply voltage."""
     mujoco = import_mujoco()
-    joints = list(simulation.joints)
-    actuators = [actuator_of(model, joint) for joint in joints]
+    joints = np.array(simulation.joints)
+    actuators = np.array([actuator_of(model, joint) for joint in simulation.joints])
     half, share, level = servos.get("dead_band") / 2, servos.get("load_friction"), servos.get("friction")
     limit, kp, kd = servos.get("limit"), servos.get("kp"), servos.get("kd")
     wound_up, gain = servos.get("integral_limit"), servos.get("ki") * model.opt.timestep
     integral = _resting_integral(data, simulation, servos, control[0][actuators])
     time = run.time[0] + model.opt.timestep * np.arange(len(control))
     factors = [supply_factor(run, row, time, simulation.supply) for row in range(len(joints))]
+    supplies = [(row, factor) for row, factor in enumerate(factors) if factor is not None]
+    loads_friction, has_dead_band = bool(share.any()), bool(half.any())
     path = np.empty((len(control), model.nq))
-    for number, command in enumerate(control):
-        path[number] = now = data.qpos
-        error = command[actuators] - now[joints]
-        error -= np.clip(error, -half, half)
-        integral = np.clip(integral + gain * error, -wound_up, wound_up)
-        data.ctrl[actuators] = now[joints] + error + integral / kp
-        if share.any():
-            model.dof_frictionloss[joints] = level + share * np.abs(data.qfrc_bias[joints])
-        for row, factor in enumerate(factors):
-            if factor is not None:
-                scaled = factor[number] * np.array([-kp[row], -kd[row]])
-                model.actuator_gainprm[actuators[row], 0] = -scaled[0]
-                model.actuator_biasprm[actuators[row], 1:3] = scaled
-                model.actuator_forcerange[actuators[row]] = factor[number] * limit[row] * np.array([-1.0, 1.0])
+    position, bias, asked = data.qpos, data.qfrc_bias, data.ctrl  # views of what MuJoCo computes
+    for number, command in enumerate(control[:, actuators]):
+        path[number] = position
+        now = position[joints]
+        error = command - now
+        if has_dead_band:
+            error -= np.minimum(np.maximum(error, -half), half)
+        integral = np.minimum(np.maximum(integral + gain * error, -wound_up), wound_up)
+        asked[actuators] = now + error + integral / kp
+        if loads_friction:
+            model.dof_frictionloss[joints] = level + share * np.abs(bias[joints])
+        for row, factor in supplies:
+            scaled = factor[number] * np.array([-kp[row], -kd[row]])
+            model.actuator_gainprm[actuators[row], 0] = -scaled[0]
+            model.actuator_biasprm[actuators[row], 1:3] = scaled
+            model.actuator_forcerange[actuators[row]] = factor[number] * limit[row] * np.array([-1.0, 1.0])
         mujoco.mj_step(model, data)
     return path
 
