@@ -88,7 +88,7 @@ def imported(tmp_path: Path, messages: list[Message], **options: Any) -> tuple[M
     (tmp_path / "arm.xml").write_text(arm_text())
     bag = write_bag(tmp_path / "bag", messages)
     chosen = {**OPTIONS, "robot": str(tmp_path / "arm.xml"), **options}
-    lines = import_files([bag], tmp_path / "new", chosen, None).lines
+    lines = import_files([bag], tmp_path / "new", chosen).lines
     return load_motion_recording(tmp_path / "new").runs[0], lines
 
 
@@ -191,7 +191,7 @@ def test_what_is_missing_in_a_bag_is_told_in_one_line(
     (tmp_path / "arm.xml").write_text(arm_text())
     bag = write_bag(tmp_path / "bag", change(states()))
     chosen = {**OPTIONS, "robot": str(tmp_path / "arm.xml"), **options}
-    assert reason in refusal(import_files, [bag], tmp_path / "new", chosen, None)
+    assert reason in refusal(import_files, [bag], tmp_path / "new", chosen)
     assert not (tmp_path / "new").exists()
 
 
@@ -204,7 +204,7 @@ def test_the_command_imports_some_joints_of_a_bag(tmp_path: Path) -> None:
     ]
     bag = write_bag(tmp_path / "bag", messages)
     command = ["recording", "import", str(bag), "--robot", str(tmp_path / "arm.xml"), "--joints", "elbow"]
-    result = CliRunner().invoke(main, [*command, "--out", str(tmp_path / "new"), "--no-ask"])
+    result = CliRunner().invoke(main, [*command, "--out", str(tmp_path / "new")])
     assert result.exit_code == 0, result.output
     assert "reference_position: command_elbow [rad]" in result.output
     assert load_motion_recording(tmp_path / "new").joints == (1,)
