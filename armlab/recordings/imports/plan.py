@@ -341,7 +341,7 @@ def _choose_units(
             values = source.table.columns(names, signal)
             proposal = propose_unit(signal, names, values, log.sliding)
             text = f"unit of {signal.replace('_', ' ')}: one of {', '.join(SIGNAL_QUANTITIES[signal].units)}"
-            questions.append(Question("units", _missing_unit(signal), text, proposal, signal))
+            questions.append(Question("units", _missing_unit(signal, proposal), text, proposal, signal))
     return units, tuple(questions)
 
 
@@ -352,9 +352,10 @@ def _unit_by_name(source: Source, signal: str, names: tuple[str, ...]) -> str | 
     return unit if unit in SIGNAL_QUANTITIES[signal].units else None
 
 
-def _missing_unit(signal: str) -> str:
+def _missing_unit(signal: str, proposal: str) -> str:
     known = ", ".join(SIGNAL_QUANTITIES[signal].units)
-    return f"no unit is known for {signal}: give --unit {signal}=UNIT ({known})"
+    other = "; a torque in A or V needs --gains, too" if signal == "torque" else ""
+    return f"no unit is known for {signal}: give --unit {signal}=UNIT ({known}), perhaps {proposal}{other}"
 
 
 def _parse_unit_option(text: str) -> tuple[str, str]:
