@@ -4,7 +4,7 @@
 |---|---|
 | motor currents | RealMan API, rm_joint_status_t: joint_current in mA, joint_position in deg, joint_speed in rpm |
 | ROS 2 bag | sensor_msgs/JointState: a driver lists joints in an order of its own, and a gripper among them |
-| LeRobot | dataset v3.0 of an SO-101: float32 vectors in degrees, gripper in percent, an episode of 30 frames a second |
+| LeRobot | dataset v3.0 of an SO-101: float32 vectors in degrees, gripper in percent, 30 frames a second |
 | UR RTDE | RTDE client library, rtde/csv_writer.py: blanks between cells, VECTOR6D as NAME_0 ... NAME_5, current in A |
 """
 

@@ -26,7 +26,7 @@ MAX_ERROR = 0.05  # of a number, relative
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a trial took, and what came of it. found: the findings of the hidden effects, None for one that is missed."""
+    """What a trial took, and what came of it. found: a finding for each hidden effect, None for one that is missed."""
 
     name: str
     log: ForeignLog

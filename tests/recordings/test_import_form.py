@@ -1,12 +1,15 @@
 """The form of an import in a terminal: what is open is asked, and nothing else; a wrong answer is asked again."""
 
+import json
 import shlex
 import shutil
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 from click.testing import CliRunner
+from foreign_logs import SO101_JOINTS, lerobot_log
 from numpy.testing import assert_allclose
 from recording_folders import POSITION, TORQUE, frame
 from terminal_sessions import TerminalSession
@@ -134,6 +137,35 @@ def test_columns_of_joints_with_other_names_are_a_question_with_the_order_by_wor
         ("position", "position_arm_base,position_arm_shoulder,position_arm_elbow"),
         ("torque", "effort_arm_base,effort_arm_shoulder,effort_arm_elbow"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("names", "answers"),
+    [
+        ([f"main_{joint}" for joint in SO101_JOINTS], ["units"]),
+        ([[f"{joint}.pos" for joint in SO101_JOINTS]], ["units"]),
+        ([f"left_{joint}.pos" for joint in SO101_JOINTS], ["position", "reference_position", "units"]),
+    ],
+)
+def test_the_joints_of_a_lerobot_dataset_are_found_by_its_names(
+    tmp_path: Path, names: list[Any], answers: list[str]
+) -> None:
+    log = lerobot_log(tmp_path)
+    info = log.files[0] / "meta" / "info.json"
+    content = json.loads(info.read_text())
+    for vector in ("action", "observation.state"):
+        content["features"][vector]["names"] = names
+    info.write_text(json.dumps(content))
+    plan = plan_import(log.files, {**NOTHING, "robot": str(log.robot), "out": str(tmp_path / "new")})
+    asked = []
+    while plan.questions:
+        question = plan.questions[0]
+        assert question.proposal is not None
+        asked.append(question.option)
+        plan = plan_import(log.files, question.with_answer(plan.options, question.proposal))
+    assert asked == answers
+    assert all("shoulder_pan" in columns[0] for signal, columns in plan.columns.items() if signal != "time")
+    assert plan.units["reference_position"] == "deg"
 
 
 def test_an_order_is_proposed_only_where_the_names_tell_it() -> None:

@@ -55,7 +55,10 @@ def _features(folder: Path) -> dict[str, Any]:
 
 
 def _entry_names(features: dict[str, Any], vector: str, folder: Path) -> tuple[str, ...]:
-    """Names of the entries of a vector; some datasets hold them below a word such as `motors`, or in a list more."""
+    """Names of the joints in a vector; some datasets hold them below a word such as `motors`, or in a list more.
+
+    LeRobot writes `shoulder_pan.pos`, in older datasets `main_shoulder_pan`.
+    """
     given = features.get(vector, {}).get("names")
     if isinstance(given, dict):
         given = next(iter(given.values()), None)
@@ -63,7 +66,7 @@ def _entry_names(features: dict[str, Any], vector: str, folder: Path) -> tuple[s
         given = given[0]
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise InputError(f"{folder / INFO}: features.{vector}.names should be a list of names, one a joint")
-    return tuple(name.removesuffix(".pos") for name in given)
+    return tuple(name.removeprefix("main_").removesuffix(".pos") for name in given)
 
 
 def _read_columns(path: Path) -> dict[str, Array]:

@@ -226,8 +226,9 @@ def _choose_commands(log: _Log) -> tuple[_Log, dict[str, tuple[str, ...]], tuple
     listed = options.get("joints") is not None or len(open_signals) < len(source.prefixes)
     recorded = {signal: source.joints_of(signal) for signal in source.prefixes}
     both = [joint for joint in recorded["position"] if joint in recorded["reference_position"]]
-    wanted = [joint for joint in log.joints or both if listed or joint not in source.not_angles]
-    own = tuple(joint for joint in wanted if joint in both)
+    angles = [joint for joint in log.joints or both if listed or joint not in source.not_angles]
+    own = tuple(joint for joint in angles if joint in both)
+    wanted = angles if own else list(log.joints)
     columns, questions = {}, list[Question]()
     for signal in open_signals:
         prefix = source.prefixes[signal]
@@ -274,7 +275,7 @@ def _choose_columns(
             columns[signal] = commands[signal]
         elif given or (given is not None and signal != "reference_position"):
             try:
-                columns[signal] = _expand_names(given, names, signal, log.joints)
+                columns[signal] = _expand_names(given, names, signal, log.joints, motion)
             except JointNamesError as error:
                 questions.append(_ask_columns(log, signal, columns, str(error)))
         elif given is not None or (signal in ASKED_SIGNALS and not (signal == "torque" and motion)):
@@ -400,9 +401,12 @@ def _parse_gains(text: str | None) -> tuple[float, ...] | None:
         raise InputError(f"--gains {text} should be numbers with commas between them") from None
 
 
-def _expand_names(given: str, names: Sequence[str], signal: str, joints: Sequence[str]) -> tuple[str, ...]:
+def _expand_names(
+    given: str, names: Sequence[str], signal: str, joints: Sequence[str], some_joints: bool
+) -> tuple[str, ...]:
     """Names and patterns with commas between them as column names, in the order of the robot's joints.
 
+    some_joints: whether a log of this kind may have some of the robot's joints.
     Raises InputError for a name that is no column, for more or fewer columns than the robot has joints, and for listed
     joints in another order than the robot's.
     """
@@ -423,7 +427,10 @@ def _expand_names(given: str, names: Sequence[str], signal: str, joints: Sequenc
     if len(chosen) != len(joints):
         flag = signal.replace("_", "-")
         shown = ", ".join(chosen)
-        raise InputError(f"--{flag} {given} names {len(chosen)} columns ({shown}); the robot has {len(joints)} joints")
+        other = ": name those that were recorded with --joints" if len(chosen) < len(joints) and some_joints else ""
+        raise InputError(
+            f"--{flag} {given} names {len(chosen)} columns ({shown}); the robot has {len(joints)} joints{other}"
+        )
     if listed:
         check_joint_order(chosen, joints, signal)
         return chosen
