@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from armlab.cli.options import OutputPath
+from armlab.cli.options import OutputPath, PagePath
 from armlab.cli.output import can_ask, prints_result
 from armlab.common.documents import FailedResultError, ResultLines
 
@@ -42,7 +42,7 @@ def recording() -> None:
 
 @recording.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--out", type=OutputPath(), help="HTML file to write [default: NAME-check.html].")
+@click.option("--out", type=PagePath(), help="HTML file to write [default: NAME-check.html].")
 @prints_result
 def check(folder: Path, out: Path | None) -> ResultLines:
     """Check and draw a recording.

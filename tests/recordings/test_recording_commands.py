@@ -35,6 +35,14 @@ def test_check_of_a_sound_recording_says_so(tmp_path: Path) -> None:
     assert "nothing was repaired and nothing looks wrong" in result.output
 
 
+@pytest.mark.parametrize("name", ["page", "page.txt", "."])
+def test_a_page_without_the_ending_of_a_page_is_refused(tmp_path: Path, name: str) -> None:
+    result = call("check", folder_with(tmp_path / "arm", frame()), "--out", tmp_path / name)
+    assert result.exit_code == 2
+    assert "should end with .html" in " ".join(result.output.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["arm"]
+
+
 def test_check_of_a_recording_with_an_unusable_run_ends_with_an_error_after_the_page(tmp_path: Path) -> None:
     folder = folder_with(tmp_path / "arm", "t,q1\n")
     result = call("check", folder, "--out", tmp_path / "page.html")
