@@ -11,6 +11,7 @@ from typing import Any
 
 from armlab.common.errors import InputError, UndecidedError
 from armlab.common.settings import suggest_name
+from armlab.recordings.channels import MAX_GAIN
 from armlab.recordings.imports.proposals import match_joints, propose_columns, propose_robot, propose_time, propose_unit
 from armlab.recordings.imports.recognition import (
     JointNamesError,
@@ -110,7 +111,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     try:
         sources = _read_files(files, options, chosen or whole, read)
     except UndecidedError as error:
-        robots = () if robot else (_ask_robot(files[0], None),)
+        robots = () if robot else (_ask_robot(files[0], None, ()),)
         return ImportPlan(options, place, questions=(*robots, _ask_choice(error), *_ask_out(files, options)))
     _check_validate(options["validate"], sources)
     log = _Log(next(iter(sources.values())), options, arm, chosen or whole)
@@ -119,7 +120,8 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     _check_sources(sources, columns)
     units, unmeasured = _choose_units(log, columns)
     gains, unscaled = _choose_gains(options.get("gains"), columns, units)
-    robots = () if robot else (_ask_robot(files[0], len(columns["position"]) if "position" in columns else None),)
+    count = len(columns["position"]) if "position" in columns else None
+    robots = () if robot else (_ask_robot(files[0], count, log.joints),)
     return ImportPlan(
         options=options,
         robot=place,
@@ -127,7 +129,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         columns=columns,
         units=units,
         gains=gains,
-        joints=log.joints if log.joints != whole or chosen else (),
+        joints=log.joints if arm and (log.joints != whole or chosen) else (),
         questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *_ask_out(files, options)),
     )
 
@@ -196,10 +198,10 @@ def _check_sources(sources: Mapping[str, Source], columns: Mapping[str, tuple[st
                     )
 
 
-def _ask_robot(log: Path, count: int | None) -> Question:
+def _ask_robot(log: Path, count: int | None, joints: tuple[str, ...]) -> Question:
     known = ", ".join(built_in_arms())
     missing = f"the robot is missing: give --robot with one of {known}, or with the path of a robot file"
-    return Question("robot", missing, f"robot: a file, or one of {known}", propose_robot(log, count))
+    return Question("robot", missing, f"robot: a file, or one of {known}", propose_robot(log, count, joints))
 
 
 def _ask_choice(error: UndecidedError) -> Question:
@@ -334,6 +336,7 @@ def _choose_units(
                 units[signal] = units[same]
             continue
         if one is not None:
+            _check_unit(signal, one, log)
             units[signal] = one
         elif all(known):
             listed = tuple(unit for unit in known if unit)
@@ -344,6 +347,18 @@ def _choose_units(
             text = f"unit of {signal.replace('_', ' ')}: one of {', '.join(SIGNAL_QUANTITIES[signal].units)}"
             questions.append(Question("units", _missing_unit(signal, proposal), text, proposal, signal))
     return units, tuple(questions)
+
+
+def _check_unit(signal: str, unit: str, log: _Log) -> None:
+    """Raises InputError for a length where all joints turn, and for an angle where all slide."""
+    kinds = {joint.kind for joint in log.arm.joints if joint.name in log.joints} if log.arm else set()
+    if signal in ("time", *SENSOR_SIGNALS) or unit in DRIVE_UNITS or len(kinds) != 1:
+        return
+    quantity = SIGNAL_QUANTITIES[signal]
+    right = quantity.si[1 if kinds == {"prismatic"} else 0]
+    if quantity.units[unit].quantity != right:
+        known = ", ".join(name for name, each in quantity.units.items() if each.quantity == right)
+        raise InputError(f"--unit {signal}={unit} does not fit joints that are {kinds.pop()}: give one of {known}")
 
 
 def _unit_by_name(source: Source, signal: str, names: tuple[str, ...]) -> str | None:
@@ -388,17 +403,23 @@ def _choose_gains(
     listed = (unit,) if isinstance(unit, str) else unit
     if gains is not None or not any(each in DRIVE_UNITS for each in listed):
         return gains, ()
-    wanted = f"gains of {', '.join(names)}, N.m per A or V, with commas between them"
-    return None, (Question("gains", f"the torque is measured in A or V: give --gains, {wanted}", wanted),)
+    missing = f"give --gains, gains of {', '.join(names)}, N.m per A or V, with commas between them"
+    text = f"gains of the joints, N.m per A or V: {len(names)} numbers with commas between them"
+    return None, (Question("gains", f"the torque is measured in A or V: {missing}", text),)
 
 
 def _parse_gains(text: str | None) -> tuple[float, ...] | None:
     if text is None:
         return None
     try:
-        return tuple(float(part) for part in text.split(","))
+        gains = tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"--gains {text} should be numbers with commas between them") from None
+        gains = ()
+    if not gains or not all(0 < abs(gain) <= MAX_GAIN for gain in gains):
+        raise InputError(
+            f"--gains {text} should be numbers from -{MAX_GAIN:g} to {MAX_GAIN:g} with commas between them, not zero"
+        )
+    return gains
 
 
 def _expand_names(
@@ -420,6 +441,9 @@ def _expand_names(
         listed = listed and part in names
         wanted += found
     chosen = tuple(wanted)
+    twice = [name for name in chosen if chosen.count(name) > 1]
+    if twice:
+        raise InputError(f"--{signal.replace('_', '-')} {given} names column {twice[0]} twice")
     if signal == "time" and len(chosen) > 1:
         raise InputError(f"--time {given} names {len(chosen)} columns: {', '.join(chosen)}; give one")
     if not joints or signal in ("time", *SENSOR_SIGNALS):

@@ -10,7 +10,6 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.imports.recognition import split_name, time_unit
 from armlab.recordings.units import SIGNAL_QUANTITIES
-from problem.arm import Arm
 from problem.robot_file import load_arm
 
 COLUMN_NAME_PATTERNS = {
@@ -24,20 +23,26 @@ MAX_ANGLE_RAD = 4 * np.pi  # of usual joints: greater numbers are degrees
 MAX_CURRENT_A = 60.0  # of usual joint motors: greater numbers are milliamperes
 
 
-def propose_robot(log: Path, count: int | None) -> str | None:
-    """The one robot file beside a log with `count` joints (any number for None), if there is just one."""
+def propose_robot(log: Path, count: int | None, joints: Sequence[str]) -> str | None:
+    """The one robot file beside a log that fits it, if there is just one.
+
+    count: of the position's columns, None while unknown. joints: their names, where the format tells them: a robot may
+    have more.
+    """
     files = [path for path in sorted(log.resolve().parent.iterdir()) if path.suffix.lower() in ROBOT_SUFFIXES]
     if len(files) > MAX_ROBOT_FILES:
         return None
-    arms = {path: arm for path in files if (arm := _arm_of(path)) is not None and count in (None, len(arm))}
-    return str(log.parent / next(iter(arms)).name) if len(arms) == 1 else None
+    fitting = [path for path in files if _fits(path, count, joints)]
+    return str(log.parent / fitting[0].name) if len(fitting) == 1 else None
 
 
-def _arm_of(path: Path) -> Arm | None:
+def _fits(path: Path, count: int | None, joints: Sequence[str]) -> bool:
     try:
-        return load_arm(str(path))
+        arm = load_arm(str(path))
     except InputError:
-        return None
+        return False
+    names = {joint.name for joint in arm.joints}
+    return count in (None, len(arm)) or (bool(joints) and set(joints) <= names)
 
 
 def propose_time(names: Sequence[str], values: Array) -> str | None:
