@@ -12,7 +12,8 @@ import click
 
 from armlab.common.errors import InputError
 from armlab.recordings.imports.files import describe_plan
-from armlab.recordings.imports.plan import ImportPlan, Question, plan_import
+from armlab.recordings.imports.plan import ImportPlan, plan_import
+from armlab.recordings.imports.questions import Question
 from armlab.recordings.imports.sources import read_sources
 from bench.errors import StoppedError
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
-from armlab.recordings.imports.plan import ImportPlan, Options, plan_import
+from armlab.recordings.imports.plan import ImportPlan, plan_import
+from armlab.recordings.imports.questions import Options
 from armlab.recordings.imports.sources import Source
 from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
