@@ -11,6 +11,7 @@ from servo_arms import arm_text
 
 from armlab.cli.main import main
 from armlab.recordings.imports.files import import_files
+from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.imports.ros_messages import DEFINITIONS, SINGLE_STATE, TRAJECTORY_STATE
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
@@ -208,3 +209,13 @@ def test_the_command_imports_some_joints_of_a_bag(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     assert "reference_position: command_elbow [rad]" in result.output
     assert load_motion_recording(tmp_path / "new").joints == (1,)
+
+
+def test_the_topic_of_a_bag_with_several_is_a_question_with_their_names(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(arm_text())
+    bag = write_bag(tmp_path / "bag", [*states(), *no_reference(states())])
+    plan = plan_import([bag], {**OPTIONS, "robot": str(tmp_path / "arm.xml"), "out": tmp_path / "new"})
+    (question,) = plan.questions
+    assert question.option == "topic"
+    assert question.proposal in question.text
+    assert "choose one with --topic" in question.missing

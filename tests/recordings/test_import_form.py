@@ -168,6 +168,14 @@ def test_the_joints_of_a_lerobot_dataset_are_found_by_its_names(
     assert plan.units["reference_position"] == "deg"
 
 
+def test_the_robot_beside_a_log_is_proposed_where_just_one_fits(tmp_path: Path) -> None:
+    log = lerobot_log(tmp_path)
+    shutil.copy(BUILT_IN_FOLDER / "irb120-arm.yaml", tmp_path / "other.yaml")
+    assert plan_import(log.files, NOTHING).questions[0].proposal == str(log.robot)
+    shutil.copy(log.robot, tmp_path / "again.xml")
+    assert plan_import(log.files, NOTHING).questions[0].proposal is None
+
+
 def test_an_order_is_proposed_only_where_the_names_tell_it() -> None:
     assert match_joints(["main_wrist", "main_elbow"], ["elbow_joint", "wrist_joint"]) == ("main_elbow", "main_wrist")
     assert match_joints(["left", "right"], ["elbow", "wrist"]) == ()
