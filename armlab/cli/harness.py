@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armlab.cli.options import FiniteNumber, OutputPath
+from armlab.cli.options import FiniteNumber, OutputPath, PagePath
 from armlab.cli.output import prints_lines, prints_result, trial_bar
 from armlab.cli.safety_options import safety_options
 from armlab.common.documents import Document, ResultLines, written_files
@@ -233,7 +233,7 @@ _STORE_OPTION = click.option(
 @click.command()
 @click.argument("results", type=_PATH)
 @_STORE_OPTION
-@click.option("--out", type=OutputPath(), help="HTML file [default: results/NAME_report.html].")
+@click.option("--out", type=PagePath(), help="HTML file [default: results/NAME_report.html].")
 @prints_result
 def report(results: Path, store: Path, out: Path | None) -> ResultLines:
     """Write one HTML page about RESULTS.

@@ -29,3 +29,14 @@ class OutputPath(click.Path):
         if not str(value):
             self.fail("an empty name; the working folder is '.'", param, ctx)
         return super().convert(value, param, ctx)
+
+
+class PagePath(OutputPath):
+    """An HTML page to write; a name without the ending .html, which no browser opens as a page, is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path; a usage error for another ending."""
+        path = super().convert(value, param, ctx)
+        if path.suffix.lower() not in (".html", ".htm"):
+            self.fail(f"'{value}' should end with .html, like page.html.", param, ctx)
+        return path

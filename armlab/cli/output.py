@@ -16,6 +16,7 @@ import click
 from armlab.common.documents import Document, FailedResultError, ResultLines, json_text
 
 _PROGRESS = "armlab.progress"  # key of the running command's progress in click's context
+_SILENT = "armlab.silent"  # key in click's context: whether the command was told to print no lines
 
 _STANDARD_OUTPUT, _STANDARD_ERROR = 1, 2  # file descriptors, which processes of plug-ins inherit
 _quiet_option = click.option("--quiet", is_flag=True, help="Print no lines and no progress, only errors.")
@@ -45,6 +46,12 @@ def tell_progress(message: str) -> None:
     progress = _current_progress()
     if progress is not None:
         progress.tell(message)
+
+
+def can_ask() -> bool:
+    """Whether someone can answer questions: a terminal at both ends, and neither `--quiet` nor `--json`."""
+    silent = click.get_current_context().meta.get(_SILENT, False)
+    return not silent and sys.stdin.isatty() and sys.stdout.isatty()
 
 
 def trial_bar(total: int, done: int) -> Any:
@@ -77,6 +84,7 @@ def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
     @wraps(command)
     def run(*, quiet: bool, as_json: bool, **options: Any) -> None:
         progress = _start_progress(quiet)
+        click.get_current_context().meta[_SILENT] = quiet or as_json
         try:
             with _prints_to_errors() if as_json else nullcontext():
                 document = _print_lines(command(**options), progress, hidden=as_json)

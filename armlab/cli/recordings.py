@@ -1,14 +1,13 @@
 """Commands `armlab recording ...`: options and messages; heavy imports wait until a command runs."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
-from armlab.cli.options import OutputPath
-from armlab.cli.output import prints_result
+from armlab.cli.options import OutputPath, PagePath
+from armlab.cli.output import can_ask, prints_result
 from armlab.common.documents import FailedResultError, ResultLines
 
 PUBLIC_RECORDING_NAMES = (
@@ -43,7 +42,7 @@ def recording() -> None:
 
 @recording.command()
 @click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--out", type=OutputPath(), help="HTML file to write [default: NAME-check.html].")
+@click.option("--out", type=PagePath(), help="HTML file to write [default: NAME-check.html].")
 @prints_result
 def check(folder: Path, out: Path | None) -> ResultLines:
     """Check and draw a recording.
@@ -109,7 +108,7 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @recording.command("import")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--robot", help="Built-in robot, or path of a robot file.")
-@click.option("--out", type=OutputPath(), required=True, help="New folder for the recording.")
+@click.option("--out", type=OutputPath(), help="New folder for the recording.")
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
 @click.option("--gains", metavar="NUMBERS", help="Gain of each channel, N.m per A or V.")
@@ -119,21 +118,26 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file.")
 @click.option("--topic", help="Topic of the joint or controller states in a bag.")
 @click.option("--command-topic", metavar="TOPIC", help="Topic of the commands in a bag.")
-@click.option("--ask/--no-ask", default=None, help="Ask for missing options [default: ask if the input is a terminal].")
 @prints_result
-def import_(files: tuple[Path, ...], out: Path, ask: bool | None, **options: Any) -> ResultLines:
+def import_(files: tuple[Path, ...], **options: Any) -> ResultLines:
     """Convert files of other formats.
 
     Reads .mat, ROS bags, MCAP, Parquet, CSV of any layout and LeRobot datasets, and writes a new recording folder.
     Without --torque, --reference-position makes a recording of motion only, and
     so does a bag with the states of a controller or with --command-topic.
 
+    In a terminal the command shows what it recognised and asks for the rest.
+    Elsewhere, and with --quiet or --json, one message names all missing options.
+
     NAMES are column names with commas between them; * and ? stand for any characters.
     """
-    from armlab.recordings.imports.files import import_files
+    from armlab.cli.import_form import command_of, fill_in
+    from armlab.recordings.imports.files import write_plan
+    from armlab.recordings.imports.plan import plan_import
 
-    asked = sys.stdin.isatty() if ask is None else ask
-    prompt = (lambda text, default: str(click.prompt(text, default=default, err=True))) if asked else None
-    imported = import_files(files, out, options, prompt)
+    plan = fill_in(files, options) if can_ask() else plan_import(files, options)
+    imported = write_plan(plan)
     yield from imported.lines
+    if plan.options != options:
+        yield f"the same without questions: {command_of(files, plan.options)}"
     return imported.document

@@ -5,6 +5,15 @@ class InputError(Exception):
     """A user's mistake; the message is one line that says what was wrong, where, and what would be right."""
 
 
+class UndecidedError(InputError):
+    """Several answers are possible, and the user has to choose one with an option of the command."""
+
+    def __init__(self, message: str, option: str, choices: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.option = option
+        self.choices = choices
+
+
 class DataError(ValueError):
     """Data or settings that a computation cannot use; the message says why, without the place that the caller knows."""
 

@@ -237,13 +237,18 @@ class Draft:
         return {"schema": "recording/1", "robot": self.robot, **given}
 
 
+def check_new_folder(folder: Path) -> None:
+    """Raises InputError for a folder that holds something already."""
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder} is there already and not empty: choose a new folder")
+
+
 def write_recording(draft: Draft, folder: Path, beside: Mapping[str, str] = MappingProxyType({})) -> Path:
     """Writes a draft into a new folder and returns its path. beside: further files by name, such as the robot.
 
     Raises InputError for a folder that holds something already and for a draft that is no valid recording.
     """
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder} is there already and not empty: choose a new folder")
+    check_new_folder(folder)
     settings = draft.settings()
     file = validate(RecordingFile, settings, str(folder / FILE_NAME))
     wanted = [name for names in file.columns.signals().values() for name in names]

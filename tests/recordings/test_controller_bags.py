@@ -11,6 +11,7 @@ from servo_arms import arm_text
 
 from armlab.cli.main import main
 from armlab.recordings.imports.files import import_files
+from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.imports.ros_messages import DEFINITIONS, SINGLE_STATE, TRAJECTORY_STATE
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
@@ -88,7 +89,7 @@ def imported(tmp_path: Path, messages: list[Message], **options: Any) -> tuple[M
     (tmp_path / "arm.xml").write_text(arm_text())
     bag = write_bag(tmp_path / "bag", messages)
     chosen = {**OPTIONS, "robot": str(tmp_path / "arm.xml"), **options}
-    lines = import_files([bag], tmp_path / "new", chosen, None).lines
+    lines = import_files([bag], tmp_path / "new", chosen).lines
     return load_motion_recording(tmp_path / "new").runs[0], lines
 
 
@@ -191,7 +192,7 @@ def test_what_is_missing_in_a_bag_is_told_in_one_line(
     (tmp_path / "arm.xml").write_text(arm_text())
     bag = write_bag(tmp_path / "bag", change(states()))
     chosen = {**OPTIONS, "robot": str(tmp_path / "arm.xml"), **options}
-    assert reason in refusal(import_files, [bag], tmp_path / "new", chosen, None)
+    assert reason in refusal(import_files, [bag], tmp_path / "new", chosen)
     assert not (tmp_path / "new").exists()
 
 
@@ -204,7 +205,17 @@ def test_the_command_imports_some_joints_of_a_bag(tmp_path: Path) -> None:
     ]
     bag = write_bag(tmp_path / "bag", messages)
     command = ["recording", "import", str(bag), "--robot", str(tmp_path / "arm.xml"), "--joints", "elbow"]
-    result = CliRunner().invoke(main, [*command, "--out", str(tmp_path / "new"), "--no-ask"])
+    result = CliRunner().invoke(main, [*command, "--out", str(tmp_path / "new")])
     assert result.exit_code == 0, result.output
     assert "reference_position: command_elbow [rad]" in result.output
     assert load_motion_recording(tmp_path / "new").joints == (1,)
+
+
+def test_the_topic_of_a_bag_with_several_is_a_question_with_their_names(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text(arm_text())
+    bag = write_bag(tmp_path / "bag", [*states(), *no_reference(states())])
+    plan = plan_import([bag], {**OPTIONS, "robot": str(tmp_path / "arm.xml"), "out": tmp_path / "new"})
+    (question,) = plan.questions
+    assert question.option == "topic"
+    assert question.proposal in question.text
+    assert "choose one with --topic" in question.missing

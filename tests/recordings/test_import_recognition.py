@@ -60,7 +60,7 @@ def bracketed(stem: str) -> tuple[str, ...]:
 )
 def test_columns_and_units_of_drivers_need_no_flags(tmp_path: Path, names: tuple[str, ...], gains: str | None) -> None:
     path = write_log(tmp_path / "log.csv", names)
-    import_files([path], tmp_path / "new", {**NOTHING, "gains": gains}, None)
+    import_files([path], tmp_path / "new", {**NOTHING, "gains": gains})
     run = load_recording(tmp_path / "new").runs[0]
     assert_allclose(run.position, frame()[POSITION])
     assert_allclose(run.torque, frame()[TORQUE])
@@ -68,7 +68,7 @@ def test_columns_and_units_of_drivers_need_no_flags(tmp_path: Path, names: tuple
 
 def test_the_axes_of_a_kuka_controller_count_in_degrees(tmp_path: Path) -> None:
     names = ("t", *(f"AIPos.A{n}" for n in range(1, 4)), *(f"GearTorque.A{n}" for n in range(1, 4)))
-    import_files([write_log(tmp_path / "log.csv", names)], tmp_path / "new", NOTHING, None)
+    import_files([write_log(tmp_path / "log.csv", names)], tmp_path / "new", NOTHING)
     run = load_recording(tmp_path / "new").runs[0]
     assert_allclose(run.position, np.radians(frame()[POSITION]))
     assert_allclose(run.torque, frame()[TORQUE])
@@ -80,7 +80,7 @@ def test_stamps_that_count_from_1970_are_taken_from_the_first_one_and_said(
 ) -> None:
     stamps = (EPOCH_S + frame()["t"].to_numpy()) * factor
     path = write_log(tmp_path / "log.csv", (name, *(f"q{n}_rad" for n in range(3)), *bracketed("tau_J")), stamps)
-    import_files([path], tmp_path / "new", NOTHING, None)
+    import_files([path], tmp_path / "new", NOTHING)
     run = load_recording(tmp_path / "new").runs[0]
     assert_allclose(run.time, frame()["t"], atol=1e-5)
     assert "2025-11-20 23:06:40 UTC" in next(each.text for each in run.findings if each.kind == "epoch_stamps")
@@ -102,43 +102,41 @@ def test_joints_in_columns_are_matched_with_the_robot_whatever_their_order(tmp_p
     pd.DataFrame(shuffled, columns=["t", *names]).to_csv(tmp_path / "log.csv", index=False)
     options = {**NOTHING, "robot": write_robot(tmp_path)}
     for folder, change in (("a", {}), ("b", {"position": "position_*", "torque": "effort_*"})):
-        import_files([tmp_path / "log.csv"], tmp_path / folder, {**options, **change}, None)
+        import_files([tmp_path / "log.csv"], tmp_path / folder, {**options, **change})
         run = load_recording(tmp_path / folder).runs[0]
         assert_allclose(run.position, frame()[POSITION])
         assert_allclose(run.torque, frame()[TORQUE])
     listed = {**options, "position": ",".join(names[:3])}
-    assert "the robot's order is base_joint" in refusal(
-        import_files, [tmp_path / "log.csv"], tmp_path / "c", listed, None
-    )
+    assert "the robot's order is base_joint" in refusal(import_files, [tmp_path / "log.csv"], tmp_path / "c", listed)
 
 
 def test_joints_that_the_robot_does_not_have_are_never_taken_in_the_order_of_the_file(tmp_path: Path) -> None:
     names = tuple(f"{kind}_{joint}" for kind in ("position", "effort") for joint in JOINT_NAMES)
     path = write_log(tmp_path / "log.csv", ("t", *names))
-    assert "name other joints than the robot" in refusal(import_files, [path], tmp_path / "new", NOTHING, None)
+    assert "name other joints than the robot" in refusal(import_files, [path], tmp_path / "new", NOTHING)
 
 
 def test_a_pattern_of_too_many_columns_is_an_error(tmp_path: Path) -> None:
     path = write_log(tmp_path / "log.csv", ("t", *bracketed("tau_J"), *bracketed("tau_J_d")))
     options = {**NOTHING, "torque": "tau_J*", "position": "tau_J[?]"}
-    message = refusal(import_files, [path], tmp_path / "new", options, None)
+    message = refusal(import_files, [path], tmp_path / "new", options)
     assert "--torque tau_J* names 6 columns (tau_J[0], tau_J[1], " in message
     assert read_odd_csv(path).table.names[1] == "tau_J[0]"
 
 
 def test_everything_that_is_missing_is_asked_for_at_once(tmp_path: Path) -> None:
     path = write_log(tmp_path / "log.csv", ("clock", "x1", "x2", "x3", "current_0_mA", "current_1_mA", "current_2_mA"))
-    message = refusal(import_files, [path], tmp_path / "new", NOTHING, None)
+    message = refusal(import_files, [path], tmp_path / "new", NOTHING)
     assert all(text in message for text in ("give --time", "give --position", "give --gains"))
-    assert "give --robot" in refusal(import_files, [path], tmp_path / "new", {**NOTHING, "robot": None}, None)
+    assert "give --robot" in refusal(import_files, [path], tmp_path / "new", {**NOTHING, "robot": None})
 
 
 def test_a_folder_that_a_check_would_refuse_for_its_gains_is_not_written(tmp_path: Path) -> None:
     names = ("timestamp", *(f"actual_q_{n}" for n in range(3)), *(f"actual_current_{n}" for n in range(3)))
     path = write_log(tmp_path / "log.csv", names)
-    assert "give --gains" in refusal(import_files, [path], tmp_path / "new", NOTHING, None)
+    assert "give --gains" in refusal(import_files, [path], tmp_path / "new", NOTHING)
     short = {**NOTHING, "gains": "1,2"}
-    assert "2 numbers for 3 columns" in refusal(import_files, [path], tmp_path / "new", short, None)
+    assert "2 numbers for 3 columns" in refusal(import_files, [path], tmp_path / "new", short)
     assert not (tmp_path / "new").exists()
 
 
@@ -148,6 +146,6 @@ def test_two_files_of_one_name_are_two_runs_and_one_file_twice_is_refused(tmp_pa
     for folder in ("a", "b"):
         (tmp_path / folder).mkdir()
         paths.append(write_log(tmp_path / folder / "run.csv", names))
-    import_files(paths, tmp_path / "new", {**NOTHING, "validate": (paths[1],)}, None)
+    import_files(paths, tmp_path / "new", {**NOTHING, "validate": (paths[1],)})
     assert [run.file for run in load_recording(tmp_path / "new").runs] == ["a-run-1.csv", "b-run-2.csv"]
-    assert "given twice" in refusal(import_files, [paths[0], paths[0]], tmp_path / "again", NOTHING, None)
+    assert "given twice" in refusal(import_files, [paths[0], paths[0]], tmp_path / "again", NOTHING)

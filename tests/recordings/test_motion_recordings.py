@@ -143,7 +143,7 @@ def test_a_log_of_commands_and_positions_is_imported(folder: Path, tmp_path: Pat
         "--reference-position",
         "c1,c2",
     ]
-    options += ["--unit", "time=s", "--unit", "position=rad", "--unit", "reference_position=rad", "--no-ask"]
+    options += ["--unit", "time=s", "--unit", "position=rad", "--unit", "reference_position=rad"]
     command = ["recording", "import", str(folder / "run-1.csv"), "--out", str(tmp_path / "new"), *options]
     result = CliRunner().invoke(main, command)
     assert result.exit_code == 0, result.output
@@ -163,7 +163,7 @@ def test_a_lerobot_dataset_is_imported_an_episode_a_run(folder: Path, tmp_path: 
     for key, values in (("action", command), ("observation.state", position)):
         row[key] = [[*np.degrees(each), 0.0] for each in values]
     pd.DataFrame(row).to_parquet(data / "data" / "chunk-000" / "file-000.parquet")
-    options = ["--robot", str(folder / "arm.xml"), "--joints", "shoulder,elbow", "--no-ask"]
+    options = ["--robot", str(folder / "arm.xml"), "--joints", "shoulder,elbow"]
     options += ["--unit", "position=deg", "--unit", "reference_position=deg"]
     result = CliRunner().invoke(main, ["recording", "import", str(data), "--out", str(tmp_path / "new"), *options])
     assert result.exit_code == 0, result.output

@@ -15,8 +15,8 @@ from armlab.recordings.load import load_recording
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 
 
-def call(*words: object, answers: str = "") -> Result:
-    return CliRunner().invoke(recording, [str(word) for word in words], input=answers)
+def call(*words: object) -> Result:
+    return CliRunner().invoke(recording, [str(word) for word in words])
 
 
 def test_check_prints_each_finding_in_a_line_and_writes_one_page_with_pictures(tmp_path: Path) -> None:
@@ -33,6 +33,14 @@ def test_check_prints_each_finding_in_a_line_and_writes_one_page_with_pictures(t
 def test_check_of_a_sound_recording_says_so(tmp_path: Path) -> None:
     result = call("check", folder_with(tmp_path / "arm", frame()), "--out", tmp_path / "page.html")
     assert "nothing was repaired and nothing looks wrong" in result.output
+
+
+@pytest.mark.parametrize("name", ["page", "page.txt", "."])
+def test_a_page_without_the_ending_of_a_page_is_refused(tmp_path: Path, name: str) -> None:
+    result = call("check", folder_with(tmp_path / "arm", frame()), "--out", tmp_path / name)
+    assert result.exit_code == 2
+    assert "should end with .html" in " ".join(result.output.split())
+    assert [path.name for path in tmp_path.iterdir()] == ["arm"]
 
 
 def test_check_of_a_recording_with_an_unusable_run_ends_with_an_error_after_the_page(tmp_path: Path) -> None:
@@ -67,18 +75,10 @@ def test_import_by_flags_gives_a_recording_that_loads(tmp_path: Path) -> None:
         "--out",
         tmp_path / "new",
     ]
-    words += ["--robot", "irb120-arm", "--time", "t", "--position", "q*", "--torque", "tau*", "--no-ask"]
+    words += ["--robot", "irb120-arm", "--time", "t", "--position", "q*", "--torque", "tau*"]
     result = call(*words, "--unit", "time=s", "--unit", "position=rad", "--unit", "torque=N.m")
     assert result.exit_code == 0
     assert [run.role for run in load_recording(tmp_path / "new").runs] == ["identify", "validate"]
-
-
-def test_import_asks_for_what_was_not_said(tmp_path: Path) -> None:
-    frame().to_csv(tmp_path / "a.csv", index=False)
-    answers = "irb120-arm\n\n\n\n\n\n\n"
-    result = call("import", tmp_path / "a.csv", "--out", tmp_path / "new", "--ask", answers=answers)
-    assert result.exit_code == 0
-    assert load_recording(tmp_path / "new").arm.name == "irb120-arm"
 
 
 @pytest.mark.skipif(local_copies() is None, reason=f"{LOCAL_COPIES_VARIABLE} names no local copies")

@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from armlab.recordings.imports.files import import_files
 from armlab.recordings.imports.matlab import read_mat
+from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.load import load_recording
@@ -62,7 +63,7 @@ def test_separator_and_decimal_sign_are_found_in_the_file(
 def test_units_are_read_from_the_header_or_the_row_below(tmp_path: Path, top: str) -> None:
     path = tmp_path / "log.csv"
     path.write_text(top + "\n" + odd_text(";", ",", None))
-    import_files([path], tmp_path / "new", {**OPTIONS, "units": ()}, None)
+    import_files([path], tmp_path / "new", {**OPTIONS, "units": ()})
     run = load_recording(tmp_path / "new").runs[0]
     assert_allclose(run.position, np.deg2rad(frame()[POSITION]), rtol=1e-8)
     assert_allclose(run.torque, frame()[TORQUE], rtol=1e-8)
@@ -77,7 +78,7 @@ def test_numbers_in_a_comment_are_no_measurement(tmp_path: Path) -> None:
 def test_a_cut_last_row_of_an_odd_file_is_left_out_and_said_so(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text() + "9.9,0.1")
-    lines = import_files([path], tmp_path / "new", OPTIONS, None).lines
+    lines = import_files([path], tmp_path / "new", OPTIONS).lines
     assert "the last row (line 1602) has 2 cells of 7; left out" in lines[0]
 
 
@@ -94,7 +95,7 @@ def test_matlab_matrices_become_columns_whichever_way_they_lie(tmp_path: Path) -
     found = read_mat(path)
     assert set(found.names) == {"t", *(f"rec.{name}_{n}" for name in ("q", "tau") for n in (1, 2, 3))}
     options = {**OPTIONS, "position": "rec.q_*", "torque": "rec.tau_*"}
-    import_files([path], tmp_path / "new", options, None)
+    import_files([path], tmp_path / "new", options)
     run = load_recording(tmp_path / "new").runs[0]
     assert_array_equal(run.position, table[POSITION])
     assert_array_equal(run.torque, table[TORQUE])
@@ -106,7 +107,7 @@ def test_a_bag_of_joint_states_arrives_joint_by_joint(tmp_path: Path, storage: s
     file = write_bag(tmp_path / "bag", storage, frame())
     options = {**OPTIONS, "position": "position_j1,position_j2,position_j3", "units": ()}
     options["torque"] = "effort_j1,effort_j2,effort_j3"
-    import_files([file.parent if whole else file], tmp_path / "new", options, None)
+    import_files([file.parent if whole else file], tmp_path / "new", options)
     run = load_recording(tmp_path / "new").runs[0]
     assert_array_equal(run.position, frame()[POSITION])
     assert_array_equal(run.torque, frame()[TORQUE])
@@ -139,6 +140,9 @@ def test_a_truncated_mcap_file_is_refused_in_one_line(tmp_path: Path) -> None:
         ({"units": ("time=s", "torque=Nm")}, "no unit is known for position: give --unit position=UNIT"),
         ({"units": ("position=degre",)}, "unknown unit 'degre' of position: did you mean 'deg'?"),
         ({"units": ("deg",)}, "should be SIGNAL=UNIT"),
+        ({"units": ("position=mm",)}, "--unit position=mm does not fit joints that are revolute: give one of rad, deg"),
+        ({"gains": "1,nan,1"}, "--gains 1,nan,1 should be numbers from -1e+06 to 1e+06"),
+        ({"position": "q1,q1,q2"}, "--position q1,q1,q2 names column q1 twice"),
         ({"gains": "1,x"}, "--gains 1,x should be numbers"),
         ({"validate": ("b.csv",)}, "--validate b.csv should be one of the imported files"),
         ({"separator": ";", "decimal": ","}, "holds no rows of numbers"),
@@ -147,32 +151,27 @@ def test_a_truncated_mcap_file_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_each_mistake_in_the_options_is_told_in_one_line(tmp_path: Path, change: dict, message: str) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text())
-    assert message in refusal(import_files, [path], tmp_path / "new", {**OPTIONS, **change}, None)
+    assert message in refusal(import_files, [path], tmp_path / "new", {**OPTIONS, **change})
     assert not (tmp_path / "new").exists()
 
 
-def test_what_is_missing_is_asked_for_with_a_guess_from_the_names(tmp_path: Path) -> None:
+def test_questions_come_with_a_proposal_from_names_and_values(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text())
-    asked: list[tuple[str, str | None]] = []
-
-    def ask(question: str, offer: str | None) -> str:
-        asked.append((question.split(" (")[0].split(",")[0], offer))
-        return offer or "irb120-arm"
-
     nothing = {**dict.fromkeys(OPTIONS), "units": (), "validate": ()}
-    import_files([path], tmp_path / "new", nothing, ask)
-    assert [offer for _, offer in asked] == [None, "rad", "N.m"]
-    assert_allclose(load_recording(tmp_path / "new").runs[0].position, frame()[POSITION], rtol=1e-8)
+    plan = plan_import([path], {**nothing, "robot": "irb120-arm"})
+    asked = [(question.option, question.signal, question.proposal) for question in plan.questions]
+    assert asked == [("units", "position", "rad"), ("units", "torque", "N.m"), ("out", None, "log-recording")]
+    assert plan_import([path], nothing).questions[0].option == "robot"
 
 
 def test_a_folder_that_holds_something_is_never_written_over(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text())
-    assert "choose a new folder" in refusal(import_files, [path], tmp_path, OPTIONS, None)
+    assert "choose a new folder" in refusal(import_files, [path], tmp_path, OPTIONS)
 
 
 @pytest.mark.parametrize("name", ["log.xlsx", "absent.csv"])
 def test_a_file_of_no_known_format_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "log.xlsx").write_text("x")
-    assert name in refusal(import_files, [tmp_path / name], tmp_path / "new", OPTIONS, None)
+    assert name in refusal(import_files, [tmp_path / name], tmp_path / "new", OPTIONS)

@@ -16,6 +16,7 @@ from armlab.recordings.table import HEADER_LINES, Table
 
 INFO = Path("meta/info.json")
 COMMAND, STATE, STAMP, EPISODE = "action", "observation.state", "timestamp", "episode_index"
+PERCENT_NAMES = ("gripper",)  # LeRobot normalises a gripper's position to 0 ... 100, all other joints to one unit
 
 
 def is_lerobot(path: Path) -> bool:
@@ -34,7 +35,7 @@ def read_lerobot(folder: Path) -> dict[str, Table]:
         frame = _read_columns(path)
         vectors = [_check_width(frame[key], names[key], key, path) for key in names]
         values = np.column_stack([frame[STAMP][:, None], *vectors])
-        columns = ("timestamp", *(f"{key}.{name}" for key in names for name in names[key]))
+        columns = (STAMP, *(f"{key}.{name}" for key in names for name in names[key]))
         for episode in np.unique(frame[EPISODE]):
             rows = values[frame[EPISODE] == episode]
             name = f"episode-{int(episode):06d}"
@@ -54,13 +55,18 @@ def _features(folder: Path) -> dict[str, Any]:
 
 
 def _entry_names(features: dict[str, Any], vector: str, folder: Path) -> tuple[str, ...]:
-    """Names of the entries of a vector; versions before 2.1 hold them below a word such as `motors`."""
+    """Names of the joints in a vector; some datasets hold them below a word such as `motors`, or in a list more.
+
+    LeRobot writes `shoulder_pan.pos`, in older datasets `main_shoulder_pan`.
+    """
     given = features.get(vector, {}).get("names")
     if isinstance(given, dict):
         given = next(iter(given.values()), None)
+    if isinstance(given, list) and len(given) == 1 and isinstance(given[0], list):
+        given = given[0]
     if not isinstance(given, list) or not all(isinstance(name, str) for name in given):
         raise InputError(f"{folder / INFO}: features.{vector}.names should be a list of names, one a joint")
-    return tuple(name.removesuffix(".pos") for name in given)
+    return tuple(name.removeprefix("main_").removesuffix(".pos") for name in given)
 
 
 def _read_columns(path: Path) -> dict[str, Array]:

@@ -13,7 +13,6 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.recordings.units import TIME_UNITS
-from problem.arm import Arm
 
 TIME_NAMES = ("__time", "time", "timestamp", "timestamps", "stamp", "t", "robot_time", "header_stamp")
 STEMS: Mapping[str, tuple[str, str | None]] = {
@@ -59,6 +58,10 @@ UNIT_SUFFIXES = {
 RATES_HZ = (10.0, 5000.0)  # of logs: narrower than a factor of 1000, so that at most one unit of time fits
 
 
+class JointNamesError(InputError):
+    """Columns name other joints than the robot, so that their order is unknown."""
+
+
 @dataclass(frozen=True)
 class Column:
     """A column's name in parts; unit: None where the name does not tell it."""
@@ -78,15 +81,18 @@ class Found:
 
 
 def recognise_time(names: Sequence[str], values: Array) -> Found | None:
-    """The time column and its unit: by its name, else by its steps, of which at most one unit makes a usual rate."""
-    for column in (_split_unit(name) for name in names):
-        if column.stem in TIME_NAMES:
-            stamps = values[:, list(names).index(column.name)]
-            return Found((column.name,), column.unit or _time_unit(stamps))
+    """The time column, by its name, and its unit. values: (samples, columns)."""
+    for place, name in enumerate(names):
+        if _split_unit(name).stem in TIME_NAMES:
+            return Found((name,), time_unit(name, values[:, place]))
     return None
 
 
-def _time_unit(stamps: Array) -> str | None:
+def time_unit(name: str, stamps: Array) -> str | None:
+    """The unit of a time column: by its name, else by its steps, of which at most one unit makes a usual rate."""
+    named = _split_unit(name).unit
+    if named in TIME_UNITS:
+        return named
     steps = np.diff(stamps[np.isfinite(stamps)])
     steps = steps[steps > 0]
     if not len(steps):
@@ -96,19 +102,25 @@ def _time_unit(stamps: Array) -> str | None:
     return fitting[0] if fitting else None
 
 
-def recognise_signal(names: Sequence[str], signal: str, arm: Arm) -> Found | None:
+def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -> Found | None:
     """The columns of a signal, one a joint, or None.
 
-    Of several stems the first of the table counts that has a column for each joint. Raises InputError where the columns
-    name joints that the robot does not have.
+    joints: names, in the robot's order; empty while the robot is unknown, and then any number of columns will do.
+    Of several stems the first of the table counts that has a column for each joint. Columns of joints that the robot
+    does not have are left out where all others carry the names of its joints. Raises JointNamesError where the columns
+    name other joints.
     """
     columns = [split_name(name) for name in names]
     for stem, (meaning, _) in STEMS.items():
-        group = [column for column in columns if column.stem == stem and column.key]
-        if meaning != signal or len(group) != len(arm):
+        group = tuple(column.name for column in columns if column.stem == stem and column.key)
+        if meaning != signal or not group:
             continue
-        chosen = order_by_joint(tuple(column.name for column in group), arm, signal)
-        return Found(chosen, unit_by_name(chosen, names))
+        if not joints:
+            return Found(group, unit_by_name(group, names))
+        own = tuple(name for name, owner in zip(group, _owners(group, joints), strict=True) if owner)
+        if len(own) == len(joints) or len(group) == len(joints):
+            chosen = order_by_joint(own if len(own) == len(joints) else group, joints, signal)
+            return Found(chosen, unit_by_name(chosen, names))
     return None
 
 
@@ -143,14 +155,13 @@ def _split_unit(name: str) -> Column:
     return Column(name, last, "", None)
 
 
-def order_by_joint(names: tuple[str, ...], arm: Arm, signal: str) -> tuple[str, ...]:
+def order_by_joint(names: tuple[str, ...], joints: Sequence[str], signal: str) -> tuple[str, ...]:
     """The columns in the order of the robot's joints, whose names or numbers they end with.
 
-    Raises InputError where they name other joints: their order in a file says nothing.
+    Raises JointNamesError where they name other joints: their order in a file says nothing.
     """
     if len(names) == 1:
         return names
-    joints = [joint.name for joint in arm.joints]
     owners = _owners(names, joints)
     if sorted(owners) == sorted(joints):
         return tuple(names[owners.index(joint)] for joint in joints)
@@ -158,17 +169,16 @@ def order_by_joint(names: tuple[str, ...], arm: Arm, signal: str) -> tuple[str, 
     found = [int(number[1]) for number in numbers if number]
     if len(set(found)) == len(names):
         return tuple(name for _, name in sorted(zip(found, names, strict=True)))
-    raise InputError(
+    raise JointNamesError(
         f"the columns of {signal} ({', '.join(names)}) name other joints than the robot ({', '.join(joints)}): "
         f"list them in the robot's order, --{signal.replace('_', '-')} NAME,NAME,..."
     )
 
 
-def check_joint_order(names: tuple[str, ...], arm: Arm, signal: str) -> None:
+def check_joint_order(names: tuple[str, ...], joints: Sequence[str], signal: str) -> None:
     """Raises InputError where listed columns carry the names of the robot's joints in another order."""
-    joints = [joint.name for joint in arm.joints]
     owners = _owners(names, joints)
-    if sorted(owners) == sorted(joints) and owners != joints:
+    if sorted(owners) == sorted(joints) and owners != list(joints):
         raise InputError(
             f"--{signal.replace('_', '-')} lists the joints {', '.join(owners)}; the robot's order is "
             f"{', '.join(joints)}"

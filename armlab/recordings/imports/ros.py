@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, UndecidedError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.ros_messages import (
     COMMAND_TYPES,
@@ -138,7 +138,9 @@ def _state_topics(reader: Any, wanted: str | None, commands: str | None, path: P
         raise InputError(f"{path} holds none of {types}, only {', '.join(carried) or 'nothing'}")
     if len(kinds) > 1 and set(kinds.values()) != {SINGLE_STATE}:
         listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(kinds.items()))
-        raise InputError(f"{path} holds joint states on {listed}: choose one with --topic")
+        raise UndecidedError(
+            f"{path} holds joint states on {listed}: choose one with --topic", "topic", tuple(sorted(kinds))
+        )
     return sorted(kinds)
 
 

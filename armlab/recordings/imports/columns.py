@@ -1,0 +1,181 @@
+"""The columns of each signal: as given, else as recognised, else a question."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+
+from armlab.common.errors import InputError
+from armlab.common.settings import suggest_name
+from armlab.recordings.imports.proposals import match_joints, propose_columns, propose_time
+from armlab.recordings.imports.questions import NO_TORQUE, Options, Question
+from armlab.recordings.imports.recognition import (
+    JointNamesError,
+    check_joint_order,
+    order_by_joint,
+    recognise_signal,
+    recognise_time,
+)
+from armlab.recordings.imports.sources import Source
+from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES
+from problem.arm import Arm
+
+ASKED_SIGNALS = ("time", "position", "torque")
+SHOWN_COLUMNS = 20  # of a file, in a message
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """The first file, the options and the robot. joints: names in the order of the columns; empty while unknown."""
+
+    source: Source
+    options: Options
+    arm: Arm | None
+    joints: tuple[str, ...]
+
+    @property
+    def sliding(self) -> bool:
+        """Whether all joints of the robot are prismatic."""
+        return self.arm is not None and all(joint.kind == "prismatic" for joint in self.arm.joints)
+
+
+def choose_commands(log: Log) -> tuple[Log, dict[str, tuple[str, ...]], tuple[Question, ...]]:
+    """Columns of positions and commands where the format tells them, by the names of the joints.
+
+    The log that is returned has the joints that the columns belong to. A joint that was not recorded is a question;
+    one whose numbers are no angles is left out, unless joints or columns are listed.
+    """
+    source, options = log.source, log.options
+    open_signals = [signal for signal in source.prefixes if options.get(signal) is None]
+    if options.get("torque") is not None or not source.has_commands or not open_signals:
+        return log, {}, ()
+    listed = options.get("joints") is not None or len(open_signals) < len(source.prefixes)
+    recorded = {signal: source.joints_of(signal) for signal in source.prefixes}
+    both = [joint for joint in recorded["position"] if joint in recorded["reference_position"]]
+    angles = [joint for joint in log.joints or both if listed or joint not in source.not_angles]
+    own = tuple(joint for joint in angles if joint in both)
+    wanted = angles if own else list(log.joints)
+    columns, questions = {}, list[Question]()
+    for signal in open_signals:
+        prefix = source.prefixes[signal]
+        lacking = [joint for joint in wanted if joint not in recorded[signal]]
+        missing = (
+            f"{source.table.file} has no {prefix.strip('._')} of joint {', '.join(lacking)}, only of "
+            f"{', '.join(recorded[signal])}: give --joints with those that were recorded, or "
+            f"--{signal.replace('_', '-')} NAME,... in their order"
+        )
+        if lacking and own and not listed:
+            text = "joints of the robot that were recorded"
+            questions = questions or [Question("joints", missing, text, ",".join(own))]
+        elif lacking:
+            names = [f"{prefix}{joint}" for joint in recorded[signal]]
+            matched = ",".join(match_joints(names, wanted))
+            questions.append(Question(signal, missing, _column_text(signal, wanted), matched or None))
+            continue
+        columns[signal] = tuple(f"{prefix}{joint}" for joint in (own if not listed else wanted))
+    return replace(log, joints=tuple(wanted) if listed or not own else own), columns, tuple(questions)
+
+
+def _column_text(signal: str, joints: Sequence[str]) -> str:
+    words = signal.replace("_", " ")
+    if signal == "time":
+        return "column of time"
+    return f"columns of {words}, joint by joint ({', '.join(joints)})" if joints else f"columns of {words}"
+
+
+def choose_columns(
+    log: Log, commands: Mapping[str, tuple[str, ...]], unmatched: Sequence[Question]
+) -> tuple[dict[str, tuple[str, ...]], tuple[Question, ...]]:
+    """Columns of each signal as given, else as recognised; a question for each that is missing.
+
+    commands, unmatched: columns and questions of a log whose format tells its commands.
+    """
+    columns: dict[str, tuple[str, ...]] = {}
+    questions: list[Question] = []
+    motion = bool(commands or unmatched or log.options.get("reference_position") is not None)
+    settled = {question.option for question in unmatched if question.option not in commands}
+    names = log.source.table.names
+    for signal in SIGNAL_QUANTITIES:
+        given = log.options.get(signal)
+        if given is None and signal in commands:
+            columns[signal] = commands[signal]
+        elif given or (given is not None and signal != "reference_position"):
+            try:
+                columns[signal] = _expand_names(given, names, signal, log.joints, motion)
+            except JointNamesError as error:
+                questions.append(_ask_columns(log, signal, columns, str(error)))
+        elif given is not None or (signal in ASKED_SIGNALS and not (signal == "torque" and motion)):
+            if signal in settled:
+                continue
+            try:
+                found = _recognise(log, signal)
+            except JointNamesError as error:
+                questions.append(_ask_columns(log, signal, columns, str(error)))
+                continue
+            if found is not None:
+                columns[signal] = found
+            else:
+                questions.append(_ask_columns(log, signal, columns, None))
+    return columns, tuple(questions)
+
+
+def _recognise(log: Log, signal: str) -> tuple[str, ...] | None:
+    table = log.source.table
+    if signal == "time":
+        found = recognise_time(table.names, table.values)
+    else:
+        found = recognise_signal(table.names, signal, log.joints)
+    return found.names if found else None
+
+
+def _ask_columns(log: Log, signal: str, columns: Mapping[str, Sequence[str]], reason: str | None) -> Question:
+    names, values = log.source.table.names, log.source.table.values
+    shown = ", ".join(names[:SHOWN_COLUMNS]) + (", ..." if len(names) > SHOWN_COLUMNS else "")
+    other = ", or --reference-position of a position servo" if signal == "torque" else ""
+    flag = signal.replace("_", "-")
+    missing = reason or f"the columns of {signal} are missing: give --{flag}{other}; the file holds {shown}"
+    text = _column_text(signal, log.joints)
+    if signal == "torque":
+        text += f", or '{NO_TORQUE}' for a log of commands and positions"
+    if signal == "time":
+        return Question(signal, missing, text, propose_time(names, values))
+    proposal = ",".join(propose_columns(names, signal, log.joints, columns))
+    return Question(signal, missing, text, proposal or None)
+
+
+def _expand_names(
+    given: str, names: Sequence[str], signal: str, joints: Sequence[str], some_joints: bool
+) -> tuple[str, ...]:
+    """Names and patterns with commas between them as column names, in the order of the robot's joints.
+
+    some_joints: whether a log of this kind may have some of the robot's joints.
+    Raises InputError for a name that is no column, for more or fewer columns than the robot has joints, and for listed
+    joints in another order than the robot's.
+    """
+    wanted: list[str] = []
+    listed = True
+    for part in (part.strip() for part in given.split(",")):
+        pattern = part.replace("[", "[[]")
+        found = [part] if part in names else [name for name in names if fnmatchcase(name, pattern)]
+        if not found:
+            raise InputError(f"no column '{part}' for {signal}: {suggest_name(part, names)}")
+        listed = listed and part in names
+        wanted += found
+    chosen = tuple(wanted)
+    twice = [name for name in chosen if chosen.count(name) > 1]
+    if twice:
+        raise InputError(f"--{signal.replace('_', '-')} {given} names column {twice[0]} twice")
+    if signal == "time" and len(chosen) > 1:
+        raise InputError(f"--time {given} names {len(chosen)} columns: {', '.join(chosen)}; give one")
+    if not joints or signal in ("time", *SENSOR_SIGNALS):
+        return chosen
+    if len(chosen) != len(joints):
+        flag = signal.replace("_", "-")
+        shown = ", ".join(chosen)
+        other = ": name those that were recorded with --joints" if len(chosen) < len(joints) and some_joints else ""
+        raise InputError(
+            f"--{flag} {given} names {len(chosen)} columns ({shown}); the robot has {len(joints)} joints{other}"
+        )
+    if listed:
+        check_joint_order(chosen, joints, signal)
+        return chosen
+    return order_by_joint(chosen, joints, signal)

@@ -1,0 +1,146 @@
+"""What an import knows and what it has to ask: files, options and robot together, before anything is written.
+
+A plan is made anew with each answer: an answer is an option, as if it had been given with the command.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from armlab.common.errors import InputError, UndecidedError
+from armlab.common.settings import suggest_name
+from armlab.recordings.imports.columns import Log, choose_columns, choose_commands
+from armlab.recordings.imports.proposals import propose_robot
+from armlab.recordings.imports.questions import Options, Question
+from armlab.recordings.imports.scales import choose_gains, choose_units
+from armlab.recordings.imports.sources import ReadOptions, Source, read_sources
+from armlab.recordings.recording_file import check_new_folder
+from problem.robot_file import built_in_arms, load_arm
+
+SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semicolon": ";"}
+ReadSources = Callable[[Path, ReadOptions], Mapping[str, Source]]
+
+
+@dataclass(frozen=True, eq=False)
+class ImportPlan:
+    """A recording to be written once no question is open.
+
+    options: as they were given. robot: as the recording names it. sources: by the path of the run. columns: names by
+    the signal. units: of each signal, one for all its columns or one a column. gains: of the torque, where it is in A
+    or V. joints: of the robot, in the order of the columns, where the recording has only some of them.
+    """
+
+    options: Options
+    robot: str | None
+    sources: Mapping[str, Source] = field(default_factory=dict)
+    columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    units: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
+    gains: tuple[float, ...] | None = None
+    joints: tuple[str, ...] = ()
+    questions: tuple[Question, ...] = ()
+
+
+def plan_import(files: Sequence[Path], options: Options, read: ReadSources = read_sources) -> ImportPlan:
+    """What is known of an import, and the questions that are open.
+
+    options: out, robot, the columns of each signal, units, gains, joints, validate, separator, decimal, topic,
+    command_topic. read: reads a file; a form that plans after each answer gives one that keeps what it read.
+    Raises InputError for an option that cannot be right, whatever the answers to the questions are.
+    """
+    robot = options.get("robot")
+    arm = None if robot is None else load_arm(robot)
+    whole = tuple(joint.name for joint in arm.joints) if arm else ()
+    chosen = _choose_joints(options.get("joints"), whole)
+    if options.get("out") is not None:
+        check_new_folder(Path(options["out"]))
+    place = robot if robot is None or robot in built_in_arms() else str(Path(robot).resolve())
+    try:
+        sources = _read_files(files, options, chosen or whole, read)
+    except UndecidedError as error:
+        robots = () if robot else (_ask_robot(files[0], None, ()),)
+        return ImportPlan(options, place, questions=(*robots, _ask_choice(error), *_ask_out(files, options)))
+    _check_validate(options["validate"], sources)
+    log = Log(next(iter(sources.values())), options, arm, chosen or whole)
+    log, commands, unmatched = choose_commands(log)
+    columns, unnamed = choose_columns(log, commands, unmatched)
+    _check_sources(sources, columns)
+    units, unmeasured = choose_units(log, columns)
+    gains, unscaled = choose_gains(options.get("gains"), columns, units)
+    count = len(columns["position"]) if "position" in columns else None
+    robots = () if robot else (_ask_robot(files[0], count, log.joints),)
+    return ImportPlan(
+        options=options,
+        robot=place,
+        sources=sources,
+        columns=columns,
+        units=units,
+        gains=gains,
+        joints=log.joints if arm and (log.joints != whole or chosen) else (),
+        questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *_ask_out(files, options)),
+    )
+
+
+def _choose_joints(given: str | None, whole: tuple[str, ...]) -> tuple[str, ...]:
+    chosen = tuple(part.strip() for part in given.split(",")) if given else ()
+    for name in chosen:
+        if whole and name not in whole:
+            raise InputError(f"--joints names '{name}', which the robot does not have: {suggest_name(name, whole)}")
+    return chosen
+
+
+def _read_files(
+    files: Sequence[Path], options: Options, joints: tuple[str, ...], read: ReadSources
+) -> dict[str, Source]:
+    separator = options["separator"]
+    reading = ReadOptions(
+        separator=SEPARATOR_WORDS.get(separator, separator),
+        decimal=options["decimal"],
+        topic=options["topic"],
+        commands=options.get("command_topic"),
+        joints=joints,
+    )
+    sources: dict[str, Source] = {}
+    for path in files:
+        for name, source in read(path, reading).items():
+            if name in sources:
+                raise InputError(f"{name} is given twice: a run cannot both identify and validate")
+            sources[name] = source
+    return sources
+
+
+def _check_validate(validate: Sequence[Path], sources: Mapping[str, Source]) -> None:
+    unknown = sorted({str(path) for path in validate} - set(sources))
+    if unknown:
+        raise InputError(f"--validate {unknown[0]} should be one of the imported files")
+
+
+def _check_sources(sources: Mapping[str, Source], columns: Mapping[str, tuple[str, ...]]) -> None:
+    """Raises InputError for a file that lacks a column, or that names another unit than the first file."""
+    first_path, first = next(iter(sources.items()))
+    for path, source in sources.items():
+        for signal, names in columns.items():
+            source.table.columns(names, signal)
+            for name in names:
+                unit, other = first.units.get(name), source.units.get(name)
+                if unit != other:
+                    raise InputError(
+                        f"{name} is in {other or 'no unit'} in {path}, in {unit or 'no unit'} in {first_path}: "
+                        "import files of one kind together"
+                    )
+
+
+def _ask_robot(log: Path, count: int | None, joints: tuple[str, ...]) -> Question:
+    known = ", ".join(built_in_arms())
+    missing = f"the robot is missing: give --robot with one of {known}, or with the path of a robot file"
+    return Question("robot", missing, f"robot: a file, or one of {known}", propose_robot(log, count, joints))
+
+
+def _ask_choice(error: UndecidedError) -> Question:
+    return Question(error.option, str(error), f"{error.option}: one of {', '.join(error.choices)}", error.choices[0])
+
+
+def _ask_out(files: Sequence[Path], options: Options) -> tuple[Question, ...]:
+    if options.get("out") is not None:
+        return ()
+    name = f"{files[0].resolve().stem}-recording"
+    return (Question("out", "the folder to write is missing: give --out FOLDER", "new folder for the recording", name),)
