@@ -10,7 +10,7 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 
 from algorithms.contract import AnyAlgorithm
-from armlab.common.errors import describe_failure
+from armlab.common.plug_ins import BrokenPlugInError, load_plug_in
 
 ENTRY_POINT_GROUP = "armlab.algorithms"
 
@@ -111,18 +111,11 @@ def _name_hint(name: str) -> str:
 
 def _load_entry(entry: EntryPoint) -> AnyAlgorithm:
     try:
-        algorithm: AnyAlgorithm = entry.load()
-    except ModuleNotFoundError as error:
-        if entry.name not in _EXTRAS:
-            raise _import_failure(entry, error) from error
-        missing = f"algorithm {entry.name!r} needs the package {error.name!r}"
-        raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[{_EXTRAS[entry.name]}]'") from error
-    except (Exception, SystemExit) as error:  # whatever a third party's module does when it is imported
-        raise _import_failure(entry, error) from error
+        algorithm: AnyAlgorithm = load_plug_in(entry)
+    except BrokenPlugInError as error:
+        if isinstance(error.__cause__, ModuleNotFoundError) and entry.name in _EXTRAS:
+            missing = f"algorithm {entry.name!r} needs the package {error.__cause__.name!r}"
+            raise BrokenAlgorithmError(f"{missing}: pip install 'armlab[{_EXTRAS[entry.name]}]'") from error
+        place = f"algorithm {entry.name!r} ({entry.value})"
+        raise BrokenAlgorithmError(f"{place} cannot be imported: {error}") from error
     return algorithm
-
-
-def _import_failure(entry: EntryPoint, error: BaseException) -> BrokenAlgorithmError:
-    return BrokenAlgorithmError(
-        f"algorithm {entry.name!r} ({entry.value}) cannot be imported: {describe_failure(error)}"
-    )

@@ -18,6 +18,7 @@ from armlab.effects.contract import Candidate
 from armlab.identification.identifier import METHODS, Identifier
 from armlab.identification.identify import robot_path, wrong_reading
 from armlab.identification.model import Model
+from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import RunError, run_error
 from armlab.recordings.recording import Recording
 from bench.config import find_algorithm, parse_params
@@ -167,9 +168,10 @@ class Prediction:
         )
 
 
-def predict(model: Model, recording: Recording) -> Prediction:
+def predict(model: TorqueModel, recording: Recording) -> Prediction:
     """The torque of a model for every run of a recording, and its errors.
 
+    model: of `identify`, of a file, or `diagnosis.model`.
     Raises InputError where the model has another number of joints than the recording.
     """
     if len(model.arm) != len(recording.arm):

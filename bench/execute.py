@@ -157,11 +157,9 @@ def run_batch(work: Sequence[tuple[str, Trial]]) -> list[tuple[str, Outcome | Fa
 
 def _run_guarded(trial: Trial) -> Outcome | Failure:
     try:
-        return run_trial(trial)
-    except (
-        Exception,
-        SystemExit,
-    ):  # whatever a third party raises: the runner reports it
+        with np.errstate():  # what a third party makes of it ends with its trial
+            return run_trial(trial)
+    except (Exception, SystemExit):  # whatever a third party raises: the runner reports it
         return Failure(trial, traceback.format_exc())
 
 
@@ -180,7 +178,7 @@ def replay(trial: Trial) -> Result:
 
 def _run_search(trial: Trial, tape: _RecordedObjective) -> Result:
     name = tape.problem.name
-    box = Box(tape.problem.lower, tape.problem.upper)
+    box = Box(tape.problem.lower.copy(), tape.problem.upper.copy())  # an algorithm may write into them
     start = first_population(trial.seed, name, trial.repetition, trial.swarm_size, box)
     rng = own_stream(trial.seed, name, trial.algorithm, trial.params_text, trial.repetition)
     source = DerivativeSource(tape.differentiate, trial.derivative_price or len(box.lower) + 1)

@@ -21,6 +21,7 @@ from bench.executors.contract import ExecutorSettings
 from bench.files import check_folder
 from bench.plan import Entry, Plan, Series, plan_trials
 from bench.store import RunStore, open_store
+from problem.registry import is_plug_in as is_plug_in_problem
 
 
 class Progress(Protocol):
@@ -133,7 +134,9 @@ def run_missing(
     Raises StoppedError on Ctrl-C, and TrialsFailedError at the end if trials failed.
     """
     missing, batches = count_missing_work(entries, store)
-    isolated = any(is_plug_in(name) for name in {entry.trial.algorithm for entry in entries})  # it may end its process
+    trials = [entry.trial for entry in entries]
+    isolated = any(map(is_plug_in, {trial.algorithm for trial in trials}))  # it may end its process
+    isolated = isolated or any(is_plug_in_problem(trial.problem) for trial in trials)
     failures = _Failures()
     try:
         with (

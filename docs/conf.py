@@ -10,12 +10,17 @@ project = "armlab"
 author = "the authors of armlab"
 version = release = version_of("armlab")
 
-extensions = ["myst_parser", "sphinx_copybutton", "sphinxcontrib.bibtex", "sphinxcontrib.mermaid"]
+extensions = ["myst_nb", "sphinx_copybutton", "sphinxcontrib.bibtex", "sphinxcontrib.mermaid"]
 myst_enable_extensions = ["colon_fence", "dollarmath"]
 myst_dmath_allow_space = False
 myst_dmath_allow_digits = False
 myst_fence_as_directive = ["mermaid"]
 myst_heading_anchors = 3
+nb_execution_mode = "force"  # no output is kept, so none is stale
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600  # s a cell
+nb_output_stderr = "warn"  # which ends the build
 bibtex_bibfiles = ["references.bib"]
 
 html_theme = "pydata_sphinx_theme"

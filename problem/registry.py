@@ -8,7 +8,8 @@ from importlib.metadata import EntryPoint, entry_points
 from types import MappingProxyType
 from typing import Any
 
-from armlab.common.errors import InputError, describe_failure
+from armlab.common.errors import InputError
+from armlab.common.plug_ins import BrokenPlugInError, load_plug_in
 from armlab.common.settings import Settings, suggest_name, validate
 from problem.functions import FUNCTIONS
 from problem.presets import (
@@ -44,6 +45,11 @@ def plug_ins() -> list[EntryPoint]:
     return list(entry_points(group=ENTRY_POINT_GROUP))
 
 
+def is_plug_in(settings: ProblemSettings) -> bool:
+    """Whether settings are those of a plug-in's problem."""
+    return type(settings) not in PRESETS.values()
+
+
 def parse_problem(data: Mapping[str, Any], where: str) -> ProblemSettings:
     """Checked settings of `{preset: NAME, ...}`; where: what the data is, for the reader of an error.
 
@@ -73,9 +79,9 @@ def settings_type(preset: str, where: str) -> type[ProblemSettings]:
 def _load_settings(entry: EntryPoint, where: str) -> type[ProblemSettings]:
     place = f"{where}: problem '{entry.name}' ({entry.value})"
     try:
-        settings: type[ProblemSettings] = entry.load()
-    except (Exception, SystemExit) as error:  # whatever a third party's module does when it is imported
-        raise InputError(f"{place} cannot be imported: {describe_failure(error)}") from error
+        settings: type[ProblemSettings] = load_plug_in(entry)
+    except BrokenPlugInError as error:
+        raise InputError(f"{place} cannot be imported: {error}") from error
     if not (isinstance(settings, type) and issubclass(settings, Settings) and hasattr(settings, "build")):
         raise InputError(f"{place} should be a class of armlab.common.settings.Settings with a method `build`")
     return settings

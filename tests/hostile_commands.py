@@ -33,6 +33,7 @@ import yaml
 from click.testing import CliRunner
 
 from armlab.cli.main import main as armlab
+from problem.robot_file import BUILT_IN_FOLDER
 
 OUTCOMES = Path(__file__).with_name("hostile_outcomes.csv")
 TIME_LIMIT_S = 120
@@ -90,10 +91,18 @@ FINDING = {
     "heldout_rms_before": 1.9,
     "heldout_rms_after": 0.1,
     "p_value": 1e-9,
-    "rivals": [],
+    "rivals": [{"effect": "coulomb_friction", "joint": 1}],
     "next_experiment": None,
 }
 FIT = {"joint": 1, "heldout_rms_before": 1.9, "heldout_rms_after": 0.1, "noise_floor": 0.05, "gap_closed": 0.9}
+SAFETY = {
+    "floor": -0.3,
+    "keep_out": [[[0.7, 0.7, 0.7], [0.8, 0.8, 0.8]]],
+    "near": [0.0, 0.0, 0.0],
+    "range": [[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]],
+    "clearance": 0.01,
+    "radius": 0.05,
+}
 VERDICT = {
     "schema": "verdict/1",
     "status": "mismatch",
@@ -101,7 +110,7 @@ VERDICT = {
     "located": [],
     "findings": [FINDING],
     "unexplained": [],
-    "fit": [FIT],
+    "fit": [FIT | {"joint": joint} for joint in (1, 2, 3)],
 }
 
 
@@ -200,7 +209,7 @@ def _scaled(cell: str, factor: float) -> str:
 
 def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
     """Sound inputs of all commands, but for the damaged one."""
-    for name, content in (("robot", ROBOT), ("model", MODEL), ("experiment", EXPERIMENT)):
+    for name, content in (("robot", ROBOT), ("model", MODEL), ("experiment", EXPERIMENT), ("safety", SAFETY)):
         whole = mutate(content, rng) if name == damaged else content
         (folder / f"{name}.yaml").write_text(yaml.safe_dump(whole))
     (folder / "rec").mkdir()
@@ -209,6 +218,9 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
     table = damage_table(run_csv(), rng) if damaged == "table" else run_csv()
     (folder / "rec" / "run.csv").write_text(table)
     (folder / "motion.csv").write_text(re.sub(r"(?m)(,[^,\n]*){3}$", "", table))
+    arm = yaml.safe_load((BUILT_IN_FOLDER / "irb120-arm.yaml").read_text(encoding="utf-8"))
+    limited = [joint | {"acceleration_limit": 10.0} for joint in arm["joints"]]
+    (folder / "arm.yaml").write_text(yaml.safe_dump(arm | {"joints": limited}))
     verdict = mutate(VERDICT, rng) if damaged == "verdict" else VERDICT
     (folder / "verdict.json").write_text(json.dumps(verdict))
     (folder / "servo").mkdir()
@@ -229,6 +241,7 @@ def _write_results(folder: Path, rng: random.Random, damaged: str) -> None:
         (folder / "shared" / name).write_text(text)
 
 
+NEXT = "next verdict.json --robot arm.yaml --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next"
 COMMANDS = {
     "base": "base robot.yaml",
     "export-model": "export-model model.yaml out.xml",
@@ -241,7 +254,6 @@ COMMANDS = {
     "import": "recording import rec/run.csv --robot irb120-arm --position q* --torque u* --time t --out new "
     "--unit position=rad --unit torque=N.m --unit time=s",
     "confusability": "confusability irb120-arm motion.csv --noise 0.1",
-    "next": "next verdict.json --robot irb120-arm --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next",
     "diagnose": "diagnose rec --out out",
     "compare-recordings": "diagnose rec --compare rec --out out",
     "servo": "diagnose servo --out out",
@@ -251,6 +263,10 @@ COMMANDS = {
     "draw": "draw shared --out drawn",
     "share": "share shared --as latex --out tables",
     "compare": "compare shared shared --out compared",
+    "next": NEXT,
+    "next-safe": f"{NEXT} --floor -0.3 --keep-out 0.7,0.7,0.7,0.8,0.8,0.8 --near 0,0,0 --range -1:1,-1:1,-1:1 "
+    "--clearance 0.01 --radius 0.05",
+    "next-safety": f"{NEXT} --safety safety.yaml",
 }
 WRITES_WITH_REFUSAL = {"check": "check.html", "check-servo": "check.html"}
 OF_RESULTS = ("report", "duels", "draw", "share", "compare")
@@ -288,6 +304,8 @@ KINDS = (
     Kind("confusability", "table", 4),
     Kind("next", "verdict", 4),
     Kind("next", "words", 4),
+    Kind("next-safe", "words", 12),
+    Kind("next-safety", "safety", 12),
     Kind("run", "words", 4),
     Kind("diagnose", "recording", 2),
     Kind("diagnose", "table", 2),

@@ -83,6 +83,7 @@ def next_experiment(
 )
 @click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
 @click.option("--only-setup", is_flag=True, help="Look for these mistakes alone, not for physics.")
+@click.option("--mcap", is_flag=True, help="Write signals.mcap for Foxglove, PlotJuggler, ros2 bag, too.")
 @prints_result
 def diagnose(
     recordings: tuple[Path, ...],
@@ -95,6 +96,7 @@ def diagnose(
     changes: tuple[str, ...],
     as_read: bool,
     only_setup: bool,
+    mcap: bool,
 ) -> ResultLines:
     """Find the physics that the simulation of RECORDING lacks.
 
@@ -111,11 +113,13 @@ def diagnose(
         raise InputError("--set: a comparison takes the usual tuning numbers, leave out --set or --compare")
     if as_read and only_setup:
         raise InputError("--as-read and --only-setup: give one of them")
+    if old is not None and mcap:
+        raise InputError("--mcap: a comparison has no predicted signals, leave out --mcap or --compare")
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     motion_only = is_motion_only(recordings[0])
     if motion_only and (baseline or without or as_read or only_setup):
-        raise InputError("a recording of motion only takes --out, --set, --compare: leave out the others")
+        raise InputError("a recording of motion only takes --out, --set, --mcap, --compare: leave out the others")
     if any(change.startswith("motion.") != motion_only for change in changes):
         raise InputError("--set: numbers of motion.* are for recordings of motion only, and these take no others")
     if old is not None and is_motion_only(old) != motion_only:
@@ -123,14 +127,16 @@ def diagnose(
     if motion_only and old is None:
         from armlab.diagnosis.motion.write import diagnose_motion_recording
 
-        return diagnose_motion_recording(recordings[0], out, tell_progress, changes)
+        return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap)
     if motion_only and old is not None:
         from armlab.diagnosis.motion.compare_write import compare_motion_recordings
 
         return compare_motion_recordings((old, *recordings), out, tell_progress)
     if old is not None:
         return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
-    return diagnose_recording(recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress)
+    return diagnose_recording(
+        recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap
+    )
 
 
 @click.command()

@@ -5,13 +5,16 @@ Only click is imported until a command runs, so that `armlab --help` answers at 
 
 import errno
 import os
+import warnings
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from typing import Any
 
 import click
 
 from armlab.common.documents import FailedResultError
-from armlab.common.errors import DataError, InputError
+from armlab.common.errors import DataError, InputError, PlugInWarning
 from bench.errors import StoppedError, TrialsFailedError
 
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -108,10 +111,12 @@ class _CommandGroup(click.Group):
                 formatter.write_dl([(name, each.get_short_help_str(80)) for name, each in commands if each])
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command with one BLAS thread; exit codes: 2 bad input, 130 stopped, 1 failed trials."""
+        """Run the command with one BLAS thread; exit codes: 2 bad input, 130 stopped, 1 failed trials or plug-in."""
         os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))  # read when numpy is imported, which comes later
         try:
-            return super().invoke(ctx)
+            with warnings.catch_warnings():
+                warnings.showwarning = partial(_show_warning, warnings.showwarning)
+                return super().invoke(ctx)
         except (InputError, DataError) as error:
             click.echo(f"armlab: {error}", err=True)
             ctx.exit(2)
@@ -129,6 +134,22 @@ class _CommandGroup(click.Group):
                 raise
             click.echo(f"armlab: {str(error.filename)[:_SHOWN_CHARACTERS]}...: {error.strerror}", err=True)
             ctx.exit(2)
+        except (Exception, SystemExit) as error:
+            from armlab.common.plug_ins import plug_in_at_fault
+
+            line = plug_in_at_fault(error)
+            if line is None:
+                raise
+            click.echo(f"armlab: {line}", err=True)
+            ctx.exit(1)
+
+
+def _show_warning(usual: Callable[..., None], message: Warning, category: type[Warning], *place: Any) -> None:
+    """A plug-in that is left out in one line; any other warning as usual."""
+    if issubclass(category, PlugInWarning):
+        click.echo(f"armlab: {message}", err=True)
+    else:
+        usual(message, category, *place)
 
 
 @click.group(cls=_CommandGroup, context_settings={"help_option_names": ["-h", "--help"]})

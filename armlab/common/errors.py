@@ -18,6 +18,10 @@ class DataError(ValueError):
     """Data or settings that a computation cannot use; the message says why, without the place that the caller knows."""
 
 
+class PlugInWarning(UserWarning):
+    """A plug-in is left out."""
+
+
 def describe_failure(error: BaseException) -> str:
     """What went wrong in code of a third party, in one line."""
     kind = "it ends the program (sys.exit)" if isinstance(error, SystemExit) else type(error).__name__

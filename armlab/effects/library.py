@@ -3,7 +3,8 @@
 import warnings
 from importlib.metadata import EntryPoint, entry_points
 
-from armlab.common.errors import InputError, describe_failure
+from armlab.common.errors import InputError, PlugInWarning, describe_failure
+from armlab.common.plug_ins import BrokenPlugInError, load_plug_in
 from armlab.common.settings import suggest_name
 from armlab.effects.contact import EXTERNAL_CONTACT
 from armlab.effects.contract import UNKNOWN, Effect, Family
@@ -65,7 +66,7 @@ class BrokenEffectError(InputError):
     """An effect of a plug-in that cannot be used."""
 
 
-class BrokenEffectWarning(UserWarning):
+class BrokenEffectWarning(PlugInWarning):
     """An effect of a plug-in is left out of the library."""
 
 
@@ -82,7 +83,7 @@ def library() -> tuple[Family, ...]:
         try:
             found = _load_families(entry)
         except BrokenEffectError as error:
-            warnings.warn(f"{error}; left out", BrokenEffectWarning, stacklevel=2)
+            warnings.warn(f"{error}; left out", BrokenEffectWarning, stacklevel=1)  # once a process
             continue
         for family in found:
             if family.effect in origins:
@@ -95,11 +96,13 @@ def library() -> tuple[Family, ...]:
 
 def _load_families(entry: EntryPoint) -> tuple[Family, ...]:
     try:
-        found = entry.load()
+        found = load_plug_in(entry)
         found = found() if isinstance(found, type) else found
-    except (Exception, SystemExit) as error:  # whatever a third party's module does when it is imported
+    except BrokenPlugInError as error:
+        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) cannot be imported: {error}") from error
+    except (Exception, SystemExit) as error:  # whatever a third party's class does when it is made
         reason = describe_failure(error)
-        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) cannot be imported: {reason}") from error
+        raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) cannot be made: {reason}") from error
     families = found if isinstance(found, tuple) else (found,)
     if not all(isinstance(each, Family) for each in families):
         raise BrokenEffectError(f"effect {entry.name!r} ({entry.value}) is no armlab.effects.contract.Family")

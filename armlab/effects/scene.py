@@ -32,6 +32,15 @@ class Scene:
     temperature: Array | None = None
     link_position: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Make the arrays read-only for laws: what one writes, all others would see."""
+        moved = self.motion
+        shown = [_read_only(each) for each in (moved.position, moved.velocity, moved.acceleration)]
+        object.__setattr__(self, "motion", Motion(*shown))
+        for name in ("time", "inertial", "torque", "temperature", "link_position"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, _read_only(getattr(self, name)))
+
     @cached_property
     def rigid_torque(self) -> Array:
         """What the links of the present model need, without friction: (samples, joints), N m (N)."""
@@ -50,6 +59,12 @@ class Scene:
     def step(self) -> float:
         """Time from sample to sample, s."""
         return float((self.time[-1] - self.time[0]) / max(len(self.time) - 1, 1))
+
+
+def _read_only(values: Array) -> Array:
+    view = values.view()
+    view.flags.writeable = False
+    return view
 
 
 def scene_of(run: Run, motion: Motion, arm: Arm) -> Scene:

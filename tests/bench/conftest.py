@@ -80,6 +80,7 @@ def plug_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
         monkeypatch.delitem(sys.modules, "plug_in", raising=False)  # that of another test
         load_algorithm.cache_clear()
         monkeypatch.setenv("PYTHONPATH", f"{ROOT}{os.pathsep}{site}")
+        monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
         return notes
 
     return install

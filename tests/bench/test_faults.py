@@ -205,8 +205,16 @@ def test_a_plug_in_that_breaks_a_promise_is_named_and_its_neighbours_are_kept(
     assert _count(small.parent / ".armlab" / "runs.sqlite") == 3
 
 
-def test_a_first_population_that_is_written_into_harms_no_neighbour(small: Path, plug_in: PlugIn) -> None:
-    plug_in("population[:] = __import__('numpy').nan; __import__('numpy').random.seed(1)")
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "population[:] = __import__('numpy').nan; __import__('numpy').random.seed(1)",
+        "box.lower[:] = 0.9 * box.upper",
+        "__import__('numpy').seterr(all='raise')",
+    ],
+)
+def test_what_an_algorithm_writes_into_harms_no_neighbour(small: Path, plug_in: PlugIn, statement: str) -> None:
+    plug_in(statement)
     small.write_text(small.read_text().replace("[spso, de]", "[plug-in, de]"))
     entries = load_experiment(small).entries
     with open_store(small.with_name("runs.sqlite")) as store:

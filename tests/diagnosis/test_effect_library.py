@@ -141,8 +141,10 @@ def test_equation_of_a_spring_reads_as_a_law() -> None:
 
 
 def test_a_joint_that_never_moves_has_no_friction() -> None:
-    still = scene("RRR")
-    still.motion.position[:, 1] = 0.3
+    moving = scene("RRR")
+    position = moving.motion.position.copy()
+    position[:, 1] = 0.3
+    still = replace(moving, motion=replace(moving.motion, position=position))
     joints = {place[0].joint for place in family("coulomb_friction").candidates(still.arm, [still])}
     assert joints == {1, 3}
 
@@ -179,7 +181,7 @@ def test_an_id_that_is_taken_is_refused_in_one_line(monkeypatch: pytest.MonkeyPa
     [
         ("no_such_module:X", "cannot be imported"),
         ("math:pi", "is no armlab.effects.contract.Family"),
-        (f"{__name__}:RaisesWhenMade", "cannot be imported: RuntimeError: boom"),
+        (f"{__name__}:RaisesWhenMade", "cannot be made: RuntimeError: boom"),
         (f"{__name__}:ExitsWhenMade", r"it ends the program \(sys.exit\)"),
     ],
 )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from engine_cases import NOISE, of_runs, recording, run
 from next_questions import verdict_file
+from refusals import refusal
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.next.experiment import choose_rival_groups, prepare_experiment
@@ -160,3 +161,11 @@ def test_hysteresis_that_turns_over_at_once_comes_near_any_coulomb_friction(tmp_
 def test_names_that_fit_far_worse_do_not_come_near(tmp_path: Path) -> None:
     far = {Name("viscous_friction", 2), Name("load_dependent_friction", 2), Name("time_delay", None)}
     assert not far & near(tmp_path, 4.0)
+
+
+def test_a_recording_that_no_diagnosis_could_use_is_refused_in_one_line(tmp_path: Path) -> None:
+    whole = recording(level)
+    short = replace(whole, runs=tuple(run.rows(slice(200)) for run in whole.runs))
+    refused = refusal(prepared, tmp_path, short)
+    assert refused.startswith(f"--recording {whole.name}: ")
+    assert len(refused.splitlines()) == 1

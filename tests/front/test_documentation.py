@@ -24,7 +24,7 @@ DOCUMENTS = [
 TUTORIALS = [ROOT / "docs" / "tutorials" / name for name in ("csv.md", "algorithm.md")]
 GENERATED = re.compile(r"(?:\.\./)?(?:gallery|reference)/")  # pages of the site that come from the code
 PAGES = [*(ROOT / "docs").glob("*.md"), *(ROOT / "docs").glob("tutorials/*.md")]
-FOLDERS = "problem|algorithms|bench|armlab|tests|docs|configs|results|templates|notebooks"
+FOLDERS = "problem|algorithms|bench|armlab|tests|docs|configs|results|templates"
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)

@@ -1,5 +1,6 @@
 """The documentation site is built without a warning, and its generated pages say what the code says."""
 
+import json
 import re
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import click
 import pytest
 
 from armlab.cli.main import main
+from armlab.effects.example import HIDDEN
 from armlab.effects.library import BUILT_IN, WITHOUT_FAMILY
 from tools.site.gallery import EXAMPLES
 
@@ -46,6 +48,33 @@ def test_no_page_leads_to_a_page_that_does_not_exist(site):
     for page in set(site.rglob("*.html")) - set((site / "_static").rglob("*")):
         links = re.findall(r'href="(?!https?:|#|mailto:)([^"#?]+)', page.read_text(encoding="utf-8"))
         assert [link for link in links if not (page.parent / link).exists()] == [], page.name
+
+
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_each_cell_of_a_notebook_is_run_at_the_build_and_none_keeps_an_output(path, site):
+    cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
+    assert [cell for cell in cells if cell["outputs"] or cell["execution_count"]] == []
+    page = (site / "notebooks" / f"{path.stem}.html").read_text(encoding="utf-8")
+    silent = [cell for cell in cells if cell["source"][-1].startswith("check_algorithm(")]
+    assert page.count('class="cell_output') == len(cells) - len(silent)
+
+
+def test_the_notebook_of_a_diagnosis_shows_what_the_log_hides(site):
+    page = (site / "notebooks" / "diagnosis.html").read_text(encoding="utf-8")
+    assert set(re.findall(r"<td>([a-z_]+)</td>", _tables(page)[0])) == {effect for effect, _, _ in HIDDEN}
+
+
+def test_the_notebook_of_a_comparison_shows_its_experiment_as_a_table(site):
+    page = (site / "notebooks" / "comparison.html").read_text(encoding="utf-8")
+    assert "Experiment mine" in page
+    assert {"spso", "l-shade", "random-search"} <= set(re.findall(r"<td>([a-z-]+)</td>", _tables(page)[0]))
+
+
+def _tables(page):
+    return re.findall(r"<table.*?</table>", page, re.DOTALL)
 
 
 def test_each_effect_has_a_law_and_an_example():

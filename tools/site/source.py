@@ -1,4 +1,4 @@
-"""The sources of the site in one folder: pages written by hand, and pages generated from the code."""
+"""The sources of the site in one folder: pages written by hand, notebooks, and pages generated from the code."""
 
 import shutil
 from pathlib import Path
@@ -15,7 +15,7 @@ FROM_ROOT = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md
 def write_source(folder: Path) -> None:
     """Writes all sources into a folder; what the folder held is removed."""
     shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(ROOT / "docs", folder)
+    shutil.copytree(ROOT / "docs", folder, ignore=shutil.ignore_patterns(".*"))
     for name, page in FROM_ROOT.items():
         text = (ROOT / name).read_text(encoding="utf-8")
         (folder / page).write_text(text.replace("](docs/", "]("), encoding="utf-8")

@@ -9,8 +9,10 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.diagnosis.motion.diagnose import diagnose_motion
 from armlab.diagnosis.motion.report import motion_page
+from armlab.diagnosis.motion.signals import motion_tracks
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.words import motion_lines
+from armlab.diagnosis.signals_file import SIGNALS_FILE, check_signals_writer, signals_content
 from armlab.diagnosis.tuning import Tuning, change_tuning, parse_change
 from armlab.recordings.motion import load_motion_recording
 
@@ -20,25 +22,34 @@ def diagnose_motion_recording(
     out: Path,
     progress: Callable[[str], None] = lambda message: None,
     changes: Sequence[str] = (),
+    with_signals: bool = False,
 ) -> ResultLines:
     """Diagnoses the recording in `folder`, writes all files into `out` or none, and yields lines to print.
 
-    changes: tuning numbers like `motion.min_gain=0.05`. Raises InputError, in one line, for a recording or a number
-    that cannot be used.
+    changes: tuning numbers like `motion.min_gain=0.05`. with_signals: whether `signals.mcap` is written. Raises
+    InputError, in one line, for a recording or a number that cannot be used.
     """
     tuning = Tuning()
     for change in changes:
         tuning = change_tuning(tuning, *parse_change(change))
+    if with_signals:
+        check_signals_writer()
     recording = load_motion_recording(folder)
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file: give a folder")
     diagnosis = diagnose_motion(recording, progress, tuning.motion)
-    settings = [part for change in changes for part in ("--set", change)]
+    settings = [part for change in changes for part in ("--set", change)] + ["--mcap"] * with_signals
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *settings])
-    texts = motion_texts(diagnosis, out) | {"report.html": motion_page(diagnosis, command)}
+    texts: dict[str, str | bytes] = {**motion_texts(diagnosis, out), "report.html": motion_page(diagnosis, command)}
+    moved = None
+    if with_signals:
+        joints = [joint.name for joint in recording.recorded_arm.joints]
+        texts[SIGNALS_FILE], moved = signals_content(motion_tracks(diagnosis), joints)
     written = write_texts(texts, out)
     yield from motion_lines(diagnosis)
     yield f"wrote {out}: {', '.join(texts)}"
+    if moved is not None:
+        yield moved
     if diagnosis.seconds:
         yield f"diagnosed in {diagnosis.seconds:.1f} s once read"
     return make_motion_verdict(diagnosis).content() | {"files": written}

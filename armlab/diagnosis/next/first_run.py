@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.errors import InputError
 from armlab.diagnosis.data import Observed, observe
 from armlab.diagnosis.next.moments import Index, Moments
 from armlab.diagnosis.next.question import Layout
 from armlab.diagnosis.next.sampling import Sampling, kept_columns
 from armlab.diagnosis.noise import Noise, fit_noise
 from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.simulation import reason_unusable
 from armlab.effects.contract import Candidate, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from armlab.recordings.cutoff import acceleration_spectrum, noise_level
@@ -108,8 +110,13 @@ class FirstRun:
 
 
 def observe_first_run(recording: Recording, present: PresentModel) -> FirstRun:
-    """Filters and thins the runs as a diagnosis does."""
-    observed = observe(recording.runs, present.arm, present.inertial, Settings())
+    """Filters and thins the runs as a diagnosis does; InputError where a diagnosis could not use them."""
+    settings = Settings()
+    reason = reason_unusable(recording, settings.tuning.soundness)
+    observed = None if reason else observe(recording.runs, present.arm, present.inertial, settings)
+    reason = reason if observed is None else observed.reason_too_short
+    if reason or observed is None:
+        raise InputError(f"--recording {recording.name}: {reason}")
     scenes, torques = [], []
     for signals in observed.signals:
         time = signals.run.time - signals.run.time[0]

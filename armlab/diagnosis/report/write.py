@@ -18,6 +18,7 @@ from armlab.diagnosis.report.residuals import select_residuals
 from armlab.diagnosis.report.verdict import verdict_lines, verdict_sentences
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
+from armlab.diagnosis.signals_file import SIGNALS_FILE, check_signals_writer, diagnosis_tracks, signals_content
 from armlab.diagnosis.tuning import parse_change
 from armlab.diagnosis.verdict_files import (
     PREDICTED_FOLDER,
@@ -93,6 +94,7 @@ def diagnose_recording(
     as_read: bool = False,
     only_setup: bool = False,
     progress: Callable[[str], None] = lambda message: None,
+    with_signals: bool = False,
 ) -> ResultLines:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
@@ -100,9 +102,12 @@ def diagnose_recording(
 
     out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
     numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted.
-    only_setup: nothing but the reading is asked. progress: called with the name of each step. Raises InputError, in one
-    line, for a recording that cannot be used, an unknown guard or an unknown tuning number.
+    only_setup: nothing but the reading is asked. progress: called with the name of each step. with_signals: whether
+    `signals.mcap` is written. Raises InputError, in one line, for a recording that cannot be used, an unknown guard or
+    an unknown tuning number.
     """
+    if with_signals:
+        check_signals_writer()
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     settings = Settings(guards=guards_without(without))
     for change in changes:
@@ -117,9 +122,14 @@ def diagnose_recording(
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += [word for guard in without for word in ("--without", guard)]
     options += [word for change in changes for word in ("--set", change)]
-    options += ["--as-read"] * as_read + ["--only-setup"] * only_setup
+    options += ["--as-read"] * as_read + ["--only-setup"] * only_setup + ["--mcap"] * with_signals
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
-    texts = verdict_texts(diagnosis, out) | report_texts(diagnosis, command) | predicted_texts(diagnosis)
+    pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
+    texts: dict[str, str | bytes] = {**pages, **predicted_texts(diagnosis)}
+    moved = None
+    if with_signals:
+        joints = [joint.name for joint in diagnosis.recording.arm.joints]
+        texts[SIGNALS_FILE], moved = signals_content(diagnosis_tracks(diagnosis), joints)
     written = write_texts(texts, out)
     yield from verdict_lines(diagnosis)
     pictures = sum(name.startswith(FIGURES_FOLDER) for name in texts)
@@ -129,6 +139,8 @@ def diagnose_recording(
         f", predicted torque in {PREDICTED_FOLDER}" if any(name.startswith(PREDICTED_FOLDER) for name in texts) else ""
     )
     yield f"wrote {out}: {files}{more}"
+    if moved is not None:
+        yield moved
     if diagnosis.setup is not None and diagnosis.setup.findings:
         yield f"corrected: {out / CORRECTED_FOLDER} holds the recording and the robot as they should be"
     if diagnosis.seconds:
