@@ -128,7 +128,7 @@ hostile: .venv/dev ## damaged input for the commands: tests/hostile_outcomes.csv
 	PYTHONPATH=tests $(BIN)/python tests/hostile_commands.py
 
 clean: ## everything that was made here, the environment included
-	rm -rf .venv .armlab build site *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
+	rm -rf .venv .armlab build site jupyter_execute *.egg-info problem/_kernel.c problem/*.so armlab/effects/_drive_train.c armlab/effects/*.so \
 		armlab/diagnosis/motion/_joint_replay.c armlab/diagnosis/motion/*.so \
 		armlab/concealed/servo/_servo_arm.c armlab/concealed/servo/*.so
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

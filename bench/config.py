@@ -16,6 +16,8 @@ from armlab.common.settings import Settings, read_yaml, validate
 from bench.executors.contract import ExecutorSettings
 from problem.suite import instances, suites
 
+NAME_PATTERN = "[A-Za-z0-9][A-Za-z0-9_-]{0,99}"  # of an experiment: part of the names of its files
+
 
 def _to_tuple(value: Any) -> Any:
     return value if isinstance(value, tuple) else (value,)
@@ -85,7 +87,7 @@ class Experiment(Settings):
     change no outcome.
     """
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]*$")]
+    name: Annotated[str, Field(pattern=f"^{NAME_PATTERN}$")]
     problem: Annotated[
         tuple[Annotated[ProblemChoice, BeforeValidator(_split_label)], ...],
         BeforeValidator(_expand_problems),

@@ -391,7 +391,7 @@ def _judge(kind: Kind, seed: int, words: list[str], result: Any, before: dict[st
         verdict = "broken: more than one line"
     elif result.exit_code == 0 and not all(map(_is_free_of_nan, _new_files(folder, changed))):
         verdict = "broken: NaN in a file"
-    elif result.exit_code == 0 and "nan" not in words and re.search(r"(?i)(?<![\w/])(?<!q\d = )-?nan\b", result.stdout):
+    elif result.exit_code == 0 and "nan" not in words and re.search(r"(?i)(?<![\w/])(?<![qu]\d = )-?nan\b", result.stdout):
         verdict = "broken: NaN on the terminal"
     return Outcome(f"{kind.name}/{seed}", result.exit_code, verdict, told)
 

@@ -217,14 +217,20 @@ def read_late(run: Run, delay: Array) -> Run:
 
 
 SLOWEST_HZ = 5.0  # no drive is recorded more slowly
+FASTEST_HZ = 1e6  # nor faster
 RATE_TOLERANCE = 0.02  # relative: clocks that are off by so little are one clock
 
 
 def check_rate(run: AnyRun, nominal_hz: float | None) -> AnyRun:
     """A warning where the time column and the nominal rate differ, or where no drive is recorded so slowly.
 
-    The time column decides. Raises InputError where it counts in another unit than it is said to.
+    The time column decides. Raises InputError where it counts in another unit than it is said to, or where no clock
+    is so fast.
     """
+    if run.rate_hz > FASTEST_HZ:
+        raise InputError(
+            f"{run.file}: time column says {run.rate_hz:.3g} Hz, should be {FASTEST_HZ:g} at most: another unit?"
+        )
     if nominal_hz is None:
         if run.rate_hz >= SLOWEST_HZ:
             return run

@@ -21,6 +21,7 @@ import yaml
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import write_whole
+from bench.config import NAME_PATTERN
 from bench.result_sets.result_set import (
     CELL_COLUMNS,
     TRIAL_COLUMNS,
@@ -85,6 +86,8 @@ def _check_settings(settings: Any) -> str:
     for key, kind in wanted.items():
         if not isinstance(settings, dict) or not isinstance(settings.get(key), kind):
             raise ValueError(f"{SETTINGS} should have `{key}`, {_KINDS[kind]}")
+    if not re.fullmatch(NAME_PATTERN, settings["name"]):
+        raise ValueError(f"{SETTINGS}: `name` should be 1 to 100 letters, digits, - and _, a letter or digit first")
     for label, entry in settings["algorithms"].items():
         if not isinstance(entry, dict) or not isinstance(entry.get("name"), str):
             raise ValueError(f"{SETTINGS}, algorithms, {str(label)[:40]}: should have `name`, a text")

@@ -111,6 +111,7 @@ def test_tables_without_a_column_or_with_damage_are_told_in_one_line(small_run: 
         ("trials.csv", 6, "repetition", "99", "has other repetitions than"),
         ("curves.csv", 5, "value", "x", "row 6: value is 'x', should be a number of 0 or more"),
         ("curves.csv", 0, "repetition", "99", "are not of the same trials: only one of them has"),
+        ("settings.yaml", None, "algorithms", "{}\nname: ../x", "`name` should be 1 to 100 letters"),
         ("settings.yaml", None, "algorithms", "[1]", "settings.yaml should have `algorithms`, a mapping"),
     ],
 )
@@ -120,7 +121,7 @@ def test_shared_results_that_were_edited_are_refused_in_one_line(
     share_results(*small_run, "csv", tmp_path)
     path = tmp_path / file
     if row is None:
-        path.write_text("\n".join([f"{column}: {cell}", "name: n", "seed: 1", "problem: {}"]))
+        path.write_text("\n".join(["name: n", "seed: 1", "problem: {}", f"{column}: {cell}"]))
     else:
         table = pd.read_csv(path, dtype=str)
         table.loc[row, column] = cell
