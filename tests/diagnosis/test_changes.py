@@ -6,6 +6,7 @@ from datetime import date
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -22,9 +23,11 @@ from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
 from armlab.diagnosis.compare.numbers import Change
+from armlab.diagnosis.compare.pooled import unite_candidates
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.found_model import model_found
 from armlab.effects.contract import Scene
+from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
@@ -37,6 +40,16 @@ LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
 def recording(name: str, seed: int, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0) -> Recording:
     runs = [frame(seed + each, 8, viscous, mass) for each in range(2)]
     return load_recording(recording_in(Path(mkdtemp()) / name, *runs))
+
+
+def test_the_laws_in_common_do_not_depend_on_the_order_of_the_recordings() -> None:
+    """A law at a place, the widest form of it, without those that it contains: so the way back mirrors the way there."""
+    narrow = [CoulombFriction.at(ARM, 1), Slopes.at(ARM, 1), ViscousFriction.at(ARM, 2)]
+    wide = [LevelsAndSlopes.at(ARM, 1)]
+    models = [SimpleNamespace(structure=SimpleNamespace(components=own)) for own in (narrow, wide)]
+    diagnoses = [SimpleNamespace(model=model) for model in models]
+    there, back = unite_candidates(diagnoses), unite_candidates(diagnoses[::-1])
+    assert there == back == (LevelsAndSlopes.at(ARM, 1), ViscousFriction.at(ARM, 2))
 
 
 @cache

@@ -180,18 +180,26 @@ def _labelled_runs(recording: Recording, number: int) -> Iterator[Run]:
 def unite_candidates(diagnoses: Sequence[Diagnosis]) -> tuple[Candidate, ...]:
     """What the models of the diagnoses have, each effect once at a place, without laws that another one contains.
 
-    A push belongs to its run: it stays with the recording in which it was found.
+    The order of the diagnoses does not matter: the comparison back is the mirror image. A push belongs to its run: it
+    stays with the recording in which it was found.
     """
-    chosen: list[Candidate] = []
+    pushes: list[Candidate] = []
+    found: dict[Place, Candidate] = {}
     for number, diagnosis in enumerate(diagnoses):
-        components = () if diagnosis.model is None else diagnosis.model.structure.components
-        for candidate in components:
+        for candidate in () if diagnosis.model is None else diagnosis.model.structure.components:
             if candidate.facts.single_event:
                 run = getattr(candidate, "run", "")
-                chosen.append(replace(candidate, run=f"{number + 1}: {run}"))  # type: ignore[type-var]
-            elif not _is_covered(candidate, chosen):
-                chosen = [each for each in chosen if not _contains(candidate, each)] + [candidate]
-    return tuple(chosen)
+                pushes.append(replace(candidate, run=f"{number + 1}: {run}"))  # type: ignore[type-var]
+            else:
+                place = place_of(candidate)
+                found[place] = min(candidate, found.get(place, candidate), key=_wider_first)
+    whole = [each for each in found.values() if not any(_contains(other, each) for other in found.values())]
+    return (*sorted(whole, key=lambda each: (each.effect, each.joints)), *pushes)
+
+
+def _wider_first(candidate: Candidate) -> tuple[int, str, tuple[float, ...]]:
+    """Of several forms of a law at a place, the one with the most coefficients."""
+    return -candidate.size, candidate.form, candidate.shape
 
 
 def _is_covered(candidate: Candidate, chosen: Sequence[Candidate]) -> bool:
