@@ -43,7 +43,7 @@ def recording(name: str, seed: int, viscous: tuple[float, ...] = VISCOUS, mass: 
 
 
 def test_the_laws_in_common_do_not_depend_on_the_order_of_the_recordings() -> None:
-    """A law at a place, the widest form of it, without those that it contains: so the way back mirrors the way there."""
+    """One law at a place, the widest form, without those that it contains: the way back mirrors the way there."""
     narrow = [CoulombFriction.at(ARM, 1), Slopes.at(ARM, 1), ViscousFriction.at(ARM, 2)]
     wide = [LevelsAndSlopes.at(ARM, 1)]
     models = [SimpleNamespace(structure=SimpleNamespace(components=own)) for own in (narrow, wide)]
