@@ -73,7 +73,7 @@ def _split_label(value: Any) -> Any:
     return {"label": value.get("label", value.get("preset", "problem")), "settings": settings}
 
 
-PositiveInt = Annotated[int, Field(ge=1)]
+PositiveInt = Annotated[int, Field(ge=1, le=10**9)]
 OneOrMany = Annotated[tuple[PositiveInt, ...], BeforeValidator(_to_tuple), Field(min_length=1)]
 
 

@@ -390,7 +390,7 @@ def _judge(kind: Kind, seed: int, words: list[str], result: Any, before: dict[st
         verdict = f"broken: wrote {min(changed)}"
     elif result.exit_code == 2 and not _is_one_line(lines):
         verdict = "broken: more than one line"
-    elif result.exit_code == 0 and not all(map(_is_free_of_nan, _new_files(folder, changed))):
+    elif result.exit_code == 0 and not all(_is_free_of_nan(each, kind) for each in _new_files(folder, changed)):
         verdict = "broken: NaN in a file"
     elif result.exit_code == 0 and "nan" not in words and TOLD_NAN.search(result.stdout):
         verdict = "broken: NaN on the terminal"
@@ -405,10 +405,12 @@ def _new_files(folder: Path, names: set[str]) -> Iterator[Path]:
     return (folder / name for name in names if (folder / name).is_file())
 
 
-def _is_free_of_nan(path: Path) -> bool:
+def _is_free_of_nan(path: Path, kind: Kind) -> bool:
+    """Whether all numbers of a file are finite; an infeasible end of a search counts as infinite."""
     if path.suffix not in (".yaml", ".json", ".csv", ".xml", ".mod"):
         return True
-    return not re.search(r"(?i)(^|[\s,:\[\"])[+-]?\.?(nan|inf|infinity)($|[\s,\]\"])", path.read_text(encoding="utf-8"))
+    wrong = "nan" if kind.command in OF_RESULTS and path.suffix == ".csv" else "nan|inf|infinity"
+    return not re.search(rf"(?i)(^|[\s,:\[\"])[+-]?\.?({wrong})($|[\s,\]\"])", path.read_text(encoding="utf-8"))
 
 
 def outcomes_of(kind: Kind, seeds: Iterable[int]) -> Iterator[Outcome]:

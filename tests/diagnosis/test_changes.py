@@ -95,7 +95,8 @@ def test_friction_that_fell_is_named_with_its_percent() -> None:
     assert change.old == pytest.approx(VISCOUS[1], abs=0.03)
     assert change.ratio is not None
     assert change.ratio[1] < LESS[1] / VISCOUS[1] < change.ratio[2]
-    assert "%" in comparison_sentences(found)[0]
+    assert "joint 2" in comparison_sentences(found)[0]
+    assert "%" in comparison_sentences(found)[1]
 
 
 def test_the_other_way_round_the_change_is_the_mirror_image() -> None:

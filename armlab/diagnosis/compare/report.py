@@ -55,6 +55,7 @@ from armlab.diagnosis.formats import (
 from armlab.diagnosis.report.content import origin_of
 from armlab.diagnosis.report.verdict import LINE_WIDTH
 from armlab.diagnosis.report.words import (
+    MAX_LENGTH_IN_MM,
     PARAMETER_DIGITS,
     effect_in_words,
     format_probability,
@@ -81,12 +82,14 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     seen = detectable_sentence(comparison)
     if comparison.status == "same":
         return f"Nothing changed between {names} that the recordings show.", seen
+    places = list(dict.fromkeys(_place_phrase(each) for each in comparison.named))
     phrases = [change_phrase(each) for each in comparison.named[:MAX_NAMED_CHANGES]]
     rest = len(comparison.named) - len(phrases)
     more = f", and {rest} more" if rest else ""
+    numbers = f"{join_words(phrases)}{more}."
     whole = " ".join(_whole_friction(comparison))
-    second = f"{whole} Nothing else changed. {seen}".strip()
-    return f"Between {names} this changed: {join_words(phrases)}{more}.", second
+    second = f"{numbers[0].upper()}{numbers[1:]} {whole} Nothing else changed. {seen}"
+    return f"Between {names} this changed: {join_words(places)}.", " ".join(second.split())
 
 
 def _whole_friction(comparison: Comparison) -> Iterator[str]:
@@ -99,27 +102,36 @@ def _whole_friction(comparison: Comparison) -> Iterator[str]:
 
 def change_phrase(named: NamedChange) -> str:
     """A change with its numbers: in percent where there is a level, else in units."""
-    where = f"{effect_in_words(named.effect)} {'of' if named.joint is None else 'at'} "
-    where += place_in_words(named.effect, named.joint, named.joints)
-    parts = [_amount(each) for each in named.changes]
+    where, parts = _place_phrase(named), [_amount(each) for each in named.changes]
     return f"{where} ({', '.join(parts)})" if parts else f"{where}: {named.equation}"
 
 
+def _place_phrase(named: NamedChange) -> str:
+    between = "of" if named.joint is None else "at"
+    return f"{effect_in_words(named.effect)} {between} {place_in_words(named.effect, named.joint, named.joints)}"
+
+
 def _amount(change: Change) -> str:
-    unit = format_unit(change.unit)
+    unit, scale = format_unit(change.unit), 1.0
+    if change.unit == "m" and abs(change.difference) < MAX_LENGTH_IN_MM:
+        unit, scale = "mm", 1e3
     if change.levels is not None:
-        levels = " to ".join(format_number(value) for value in (change.levels[0], change.levels[-1]))
+        levels = " to ".join(format_number(scale * value) for value in (change.levels[0], change.levels[-1]))
         percent = "" if change.ratio is None else f", {_percents(change.ratio)}"
         return f"{change.parameter} from {levels} {unit}".rstrip() + percent
     if change.ratio is not None:
         return f"{change.parameter} {_percents(change.ratio)}"
-    low, high = (format_number(value) for value in change.interval)
-    return f"{change.parameter} changes by {format_number(change.difference)} ({low} to {high}) {unit}".rstrip()
+    low, high = (format_number(scale * value) for value in change.interval)
+    return f"{change.parameter} changes by {format_number(scale * change.difference)} ({low} to {high}) {unit}".rstrip()
 
 
 def _percents(ratio: tuple[float, float, float]) -> str:
-    value, low, high = (100 * (each - 1) for each in ratio)
-    return f"{value:+.3g} % ({low:+.3g} to {high:+.3g} %)".replace("-", "−")
+    value, low, high = (_signed(100 * (each - 1)) for each in ratio)
+    return f"{value} % ({low} to {high} %)"
+
+
+def _signed(percent: float) -> str:
+    return f"{'+' if percent > 0 else ''}{format_number(percent, 2)}"
 
 
 def detectable_sentence(comparison: Comparison) -> str:
@@ -135,7 +147,7 @@ def detectable_sentence(comparison: Comparison) -> str:
         middle = sizes[len(sizes) // 2][1]
         share = detectable_share(middle)
         size = f"{format_number(middle.detectable, 2)} {format_unit(middle.unit)}"
-        parts.append(f"{effect_in_words(effect)} {size if share is None else f'{100 * share:.2g} %'}")
+        parts.append(f"{effect_in_words(effect)} {size if share is None else f'{format_number(100 * share, 2)} %'}")
     if not parts:
         return ""
     return f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."

@@ -69,6 +69,7 @@ def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None =
     names, units = _parse_header([cells for _, cells in rows[:first] if len(cells) == width], width)
     body, findings = drop_broken_last_row(body, width, text, str(path))
     values = np.array([_parse_cells(cells, layout) for _, cells in body]).reshape(len(body), width)
+    values[np.isinf(values)] = np.nan  # an infinite number is no measurement
     table = Table(path.name, names, values, np.array([line for line, _ in body], dtype=np.intp), findings)
     return TextTable(table, layout, units)
 
