@@ -24,7 +24,7 @@ from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.servo import NEUTRAL, Servos, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
-from armlab.diagnosis.motion.tuning import MotionTuning
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.windows import make_windows
 from armlab.diagnosis.motion.words import motion_lines
@@ -125,6 +125,24 @@ def test_replay_of_one_joint_agrees_with_mujoco(soft: Path) -> None:
     for windows in make_windows(recording.with_role("identify"), simulation):
         errors = replay_joint(windows, true)[0] - windows.position
         assert np.sqrt(np.mean(errors**2)) < 0.03 * np.std(windows.position)
+
+
+def test_a_limit_acts_on_the_command_before_and_after_its_change_within_a_step(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
+    runs = tuple(
+        replace(run, reference_position=np.where(run.time[:, None] % 0.2 < 0.1, 0.5, 0.0) + 0 * run.position)
+        for run in runs
+    )
+    true = NEUTRAL.copy()
+    true[[place("kp"), place("damping"), place("friction"), place("limit")]] = 8.0, 0.5, 0.1, 1.0
+    for delay in (0.0207, 0.0203):
+        true[place("delay")] = delay
+        paths = [
+            replay_joint(make_windows(runs, simulation, replace(DEFAULT, longest_step_s=step))[0], true)[0]
+            for step in (DEFAULT.longest_step_s, DEFAULT.longest_step_s / 20)
+        ]
+        assert np.sqrt(np.mean((paths[0] - paths[1]) ** 2)) < 0.002 * np.std(paths[1])
 
 
 def test_windows_that_are_replayed_together_do_not_touch_each_other(soft: Path) -> None:
