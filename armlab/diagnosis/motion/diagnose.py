@@ -494,13 +494,6 @@ def _command_error(windows: Windows) -> Array:
     return np.asarray(command - windows.position)
 
 
-def encoder_step(positions: Array) -> float:
-    """The smallest step of a recorded position, rad (m): 0 where it has none."""
-    steps = np.abs(np.diff(np.unique(positions)))
-    steps = steps[steps > 1e-6]
-    return float(steps.min()) if len(steps) else 0.0
-
-
 def _errors(
     number: int,
     simulation: ServoSimulation,
@@ -523,7 +516,7 @@ def _errors(
         replay_after=float(joint_rms(after)[number]),
         command=_rms(commands),
         spread=float(np.std(np.concatenate([run.position[:, number] for run in held_out]))),
-        floor=encoder_step(judged.position) / np.sqrt(12),
+        floor=judged.encoder_step / np.sqrt(12),
     )
 
 
