@@ -18,11 +18,13 @@ from armlab.diagnosis.motion.choose import learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
+from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.joint_replay import replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
-from armlab.diagnosis.motion.servo import NEUTRAL, Servos, place
+from armlab.diagnosis.motion.separate import confused_parameters
+from armlab.diagnosis.motion.servo import NEUTRAL, USUAL, Servos, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
@@ -143,6 +145,22 @@ def test_a_limit_acts_on_the_command_before_and_after_its_change_within_a_step(s
             for step in (DEFAULT.longest_step_s, DEFAULT.longest_step_s / 20)
         ]
         assert np.sqrt(np.mean((paths[0] - paths[1]) ** 2)) < 0.002 * np.std(paths[1])
+
+
+def test_a_mass_that_all_joints_tell_is_no_rival_at_one_joint(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    start = NEUTRAL.copy()
+    start[[place("kp"), place("damping"), place("friction"), place("delay")]] = 8.0, 0.5, 0.1, 0.0203
+    fit = fit_servo(windows, start, np.array(USUAL))
+    tuning = replace(DEFAULT, class_factor=1.01)
+    rivals = [
+        {each for own in confused_parameters(windows, fit, error, tuning).values() for each in own}
+        for error in (np.inf, 1e3, 1e-9)
+    ]
+    assert place("payload") in rivals[0]
+    assert rivals[1] == rivals[0]
+    assert rivals[2] == rivals[0] - {place("payload")}
 
 
 def test_windows_that_are_replayed_together_do_not_touch_each_other(soft: Path) -> None:

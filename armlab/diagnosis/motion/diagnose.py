@@ -240,8 +240,11 @@ def _conclude(
     """
     fit, payload = found
     simulation, chosen, learned = fit.simulation, fit.chosen, fit.windows
+    mass_error = np.inf if payload is None else payload.error
     named = [
-        [] if each is None else name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
+        []
+        if each is None
+        else name_differences(number, each, simulation, (learned[number], judged[number]), mass_error, tuning)
         for number, each in enumerate(chosen)
     ]
     if recording.controller is not None and recording.controller.rate_hz is not None:
@@ -344,17 +347,18 @@ def name_differences(
     chosen: ChosenServo,
     simulation: ServoSimulation,
     windows: tuple[Windows, Windows],
+    mass_error: float = np.inf,
     tuning: MotionTuning = DEFAULT,
 ) -> list[ServoFinding]:
     """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's.
 
     None raises the error on held-out windows above that with the simulation's number in its place.
-    windows: of the runs that identify, and of those that are held out.
+    windows: of the runs that identify, and of those that are held out. mass_error: of a payload that was found, kg.
     """
     learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
-    confused = confused_parameters(sound, fit, tuning)
+    confused = confused_parameters(sound, fit, mass_error, tuning)
     unknown_gain = bool(np.isnan(simulation.nominal.values[number, place("kp")]))
     scale: tuple[str, ...] = ("inertial_parameter_error",) if unknown_gain else ()
     if has_weak_load(sound, fit.values, tuning):
