@@ -18,13 +18,15 @@ from armlab.diagnosis.motion.choose import learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
+from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.joint_replay import replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
-from armlab.diagnosis.motion.servo import NEUTRAL, Servos, place
+from armlab.diagnosis.motion.separate import confused_parameters
+from armlab.diagnosis.motion.servo import NEUTRAL, USUAL, Servos, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
-from armlab.diagnosis.motion.tuning import MotionTuning
+from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.windows import make_windows
 from armlab.diagnosis.motion.words import motion_lines
@@ -125,6 +127,40 @@ def test_replay_of_one_joint_agrees_with_mujoco(soft: Path) -> None:
     for windows in make_windows(recording.with_role("identify"), simulation):
         errors = replay_joint(windows, true)[0] - windows.position
         assert np.sqrt(np.mean(errors**2)) < 0.03 * np.std(windows.position)
+
+
+def test_a_limit_acts_on_the_command_before_and_after_its_change_within_a_step(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
+    runs = tuple(
+        replace(run, reference_position=np.where(run.time[:, None] % 0.2 < 0.1, 0.5, 0.0) + 0 * run.position)
+        for run in runs
+    )
+    true = NEUTRAL.copy()
+    true[[place("kp"), place("damping"), place("friction"), place("limit")]] = 8.0, 0.5, 0.1, 1.0
+    for delay in (0.0207, 0.0203):
+        true[place("delay")] = delay
+        paths = [
+            replay_joint(make_windows(runs, simulation, replace(DEFAULT, longest_step_s=step))[0], true)[0]
+            for step in (DEFAULT.longest_step_s, DEFAULT.longest_step_s / 20)
+        ]
+        assert np.sqrt(np.mean((paths[0] - paths[1]) ** 2)) < 0.002 * np.std(paths[1])
+
+
+def test_a_mass_that_all_joints_tell_is_no_rival_at_one_joint(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    start = NEUTRAL.copy()
+    start[[place("kp"), place("damping"), place("friction"), place("delay")]] = 8.0, 0.5, 0.1, 0.0203
+    fit = fit_servo(windows, start, np.array(USUAL))
+    tuning = replace(DEFAULT, class_factor=1.01)
+    rivals = [
+        {each for own in confused_parameters(windows, fit, error, tuning).values() for each in own}
+        for error in (np.inf, 1e3, 1e-9)
+    ]
+    assert place("payload") in rivals[0]
+    assert rivals[1] == rivals[0]
+    assert rivals[2] == rivals[0] - {place("payload")}
 
 
 def test_windows_that_are_replayed_together_do_not_touch_each_other(soft: Path) -> None:

@@ -23,7 +23,7 @@ from armlab.diagnosis.motion.estimate import (
     unsaturated_limit,
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
-from armlab.diagnosis.motion.servo import OPTIONAL, SCALE, USUAL, place
+from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, SCALE, USUAL, place
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
@@ -96,13 +96,21 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
         best = max(gains, key=lambda number: gains[number].share)
         if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
             break
-        fit, judged = tried[best]
         waiting.remove(best)
+        if is_like_steps(best, float(tried[best][0].values[best] - base[best]), few):
+            continue
+        fit, judged = tried[best]
         if best == place("limit") and np.isnan(nominal[place("kp")]):
             fit, judged = _with_damping_inside(few, fit, judged, base, tuning)
     gains = {number: _gain_of(few, fit, number, (base, judged), tuning) for number in np.flatnonzero(fit.free).tolist()}
-    worth = {number: gain for number, gain in gains.items() if is_finding(gain, looks, tuning)}
-    return ChosenServo(nominal, fit_servo(sound, fit.values, fit.free, tuning.max_evaluations), worth, odd)
+    last = fit_servo(sound, fit.values, fit.free, tuning.max_evaluations)
+    worth = {
+        number: gain
+        for number, gain in gains.items()
+        if is_finding(gain, looks, tuning)
+        and not is_like_steps(number, float(last.values[number] - base[number]), sound)
+    }
+    return ChosenServo(nominal, last, worth, odd)
 
 
 def first_fit(windows: Windows, nominal: Array, tuning: MotionTuning = DEFAULT) -> ServoFit:
@@ -208,6 +216,14 @@ def _with_damping_inside(
             break
         fit, judged = other, errors
     return fit, judged
+
+
+def is_like_steps(number: int, difference: float, windows: Windows) -> bool:
+    """Whether a difference from the simulation is one that the steps of the encoder make as well, and below a step.
+
+    A drive that reads its position in counts does not act on an error within a count either.
+    """
+    return PARAMETERS[number].like_steps and abs(difference) < windows.encoder_step
 
 
 def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:

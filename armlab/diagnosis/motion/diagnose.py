@@ -240,8 +240,11 @@ def _conclude(
     """
     fit, payload = found
     simulation, chosen, learned = fit.simulation, fit.chosen, fit.windows
+    mass_error = np.inf if payload is None else payload.error
     named = [
-        [] if each is None else name_differences(number, each, simulation, (learned[number], judged[number]), tuning)
+        []
+        if each is None
+        else name_differences(number, each, simulation, (learned[number], judged[number]), mass_error, tuning)
         for number, each in enumerate(chosen)
     ]
     if recording.controller is not None and recording.controller.rate_hz is not None:
@@ -344,17 +347,18 @@ def name_differences(
     chosen: ChosenServo,
     simulation: ServoSimulation,
     windows: tuple[Windows, Windows],
+    mass_error: float = np.inf,
     tuning: MotionTuning = DEFAULT,
 ) -> list[ServoFinding]:
     """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's.
 
     None raises the error on held-out windows above that with the simulation's number in its place.
-    windows: of the runs that identify, and of those that are held out.
+    windows: of the runs that identify, and of those that are held out. mass_error: of a payload that was found, kg.
     """
     learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
-    confused = confused_parameters(sound, fit, tuning)
+    confused = confused_parameters(sound, fit, mass_error, tuning)
     unknown_gain = bool(np.isnan(simulation.nominal.values[number, place("kp")]))
     scale: tuple[str, ...] = ("inertial_parameter_error",) if unknown_gain else ()
     if has_weak_load(sound, fit.values, tuning):
@@ -494,13 +498,6 @@ def _command_error(windows: Windows) -> Array:
     return np.asarray(command - windows.position)
 
 
-def encoder_step(positions: Array) -> float:
-    """The smallest step of a recorded position, rad (m): 0 where it has none."""
-    steps = np.abs(np.diff(np.unique(positions)))
-    steps = steps[steps > 1e-6]
-    return float(steps.min()) if len(steps) else 0.0
-
-
 def _errors(
     number: int,
     simulation: ServoSimulation,
@@ -523,7 +520,7 @@ def _errors(
         replay_after=float(joint_rms(after)[number]),
         command=_rms(commands),
         spread=float(np.std(np.concatenate([run.position[:, number] for run in held_out]))),
-        floor=encoder_step(judged.position) / np.sqrt(12),
+        floor=judged.encoder_step / np.sqrt(12),
     )
 
 

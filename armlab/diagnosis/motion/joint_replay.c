@@ -96,6 +96,13 @@ INLINE Vector clip_each(Vector value, Vector bound) {
 
 INLINE Vector size_of(Vector value) { return choose(value < 0, -value, value); }
 
+/* What the drive asks of an error, its integral not counted: the dead band takes half its width, `band`. */
+INLINE Vector pull_of(const Servo *servo, Vector error, Vector band) {
+    return servo->kp * (servo->dead_band > 0 ? error - clip_each(error, band) : error);
+}
+
+INLINE int64_t column_at(int64_t column, int64_t last) { return column < 0 ? 0 : column < last ? column : last; }
+
 /* Column `step` of LANES rows of a table, each from its place on. */
 INLINE void take(const double *table, const int64_t from[LANES], int64_t step, Vector out[PARTS]) {
     EACH_PART {
@@ -106,14 +113,18 @@ INLINE void take(const double *table, const int64_t from[LANES], int64_t step, V
 }
 
 /* Positions at the beginning of each step, (steps + 1, LANES), of LANES windows at once, which are independent of each
- * other: a processor computes several in one instruction. */
+ * other: a processor computes several in one instruction.
+ *
+ * The torque limit acts on the command before its change within a step and on that after it, which are the means of the
+ * steps around it: a limit on the torque of the mean command would cut too little, and a fit would find it too low. */
 SEVERAL_PROCESSORS
 static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t steps, const Servo *servo,
     const double *integrals, double *path) {
     const double h = at->step, half = 0.5 * h, late = servo->delay / h, limit = servo->limit;
     const Vector none = {0}, full = none + 1.0, widest = none + limit, band = none + 0.5 * servo->dead_band;
     const Vector wound_up = none + servo->integral_limit;
-    Vector position[PARTS], velocity[PARTS], integral[PARTS], passed[PARTS];
+    const int64_t last = at->columns - 1;
+    Vector position[PARTS], velocity[PARTS], integral[PARTS], passed[PARTS], earlier[PARTS];
     int64_t from[LANES], commands[LANES], own[LANES];
     for (int lane = 0; lane < LANES; lane++) {
         from[lane] = window[lane] * at->steps;
@@ -124,14 +135,18 @@ static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t
     take(at->measured, from, 0, passed);
     take(at->first_velocity, own, 0, velocity);
     take(integrals, own, 0, integral);
+    take(at->command, commands, column_at((int64_t)floor((double)at->history - late) - 1, last), earlier);
     for (int64_t step = 0; step < steps; step++) {
         Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
-        Vector free[PARTS], slow[PARTS], torque[PARTS];
+        Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS];
         const double place = (double)(at->history + step) - late, whole = floor(place), share = place - whole;
-        const int64_t row = (int64_t)whole, last = at->columns - 1;
-        const int64_t first = row < 0 ? 0 : row < last ? row : last;
-        take(at->command, commands, first, before);
-        take(at->command, commands, row < 0 ? 0 : row < last ? row + 1 : last, after);
+        const int64_t row = (int64_t)whole;
+        take(at->command, commands, column_at(row, last), before);
+        take(at->command, commands, row < 0 ? 0 : column_at(row + 1, last), after);
+        if (share > 0)
+            take(at->command, commands, column_at(row + 2, last), later);
+        else
+            EACH_PART later[part] = after[part];
         take(at->inertia, from, step, mass);
         take(at->load, from, step, load);
         take(at->slope, from, step, slope);
@@ -157,25 +172,32 @@ static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t
             const Vector middle = position[part] + half * velocity[part];
             load[part] += slope[part] * (middle - 0.5 * (passed[part] + next[part]));
             passed[part] = next[part];
-            const Vector asked = before[part] + share * (after[part] - before[part]);
-            Vector error = asked + servo->offset - middle;
-            if (servo->dead_band > 0)
-                error -= clip_each(error, band);
-            Vector pull = servo->kp * error;
+            away[part] = servo->offset - middle;
+            asked[part] = before[part] + share * (after[part] - before[part]);
+            const Vector proportional = pull_of(servo, asked[part] + away[part], band);
+            Vector pull = proportional;
             if (servo->ki > 0) {
-                integral[part] = clip_each(integral[part] + h * servo->ki * error, wound_up);
+                integral[part] = clip_each(integral[part] + h * servo->ki / servo->kp * proportional, wound_up);
                 pull += integral[part];
             }
             slow[part] = half * (servo->damping + supply[part] * servo->kd);
             free[part] = (mass[part] - slow[part]) * velocity[part] + h * (supply[part] * pull - load[part]);
             free[part] /= mass[part] + slow[part];
             torque[part] = pull - 0.5 * servo->kd * (velocity[part] + free[part]);
-            beyond |= size_of(torque[part]) > widest;
+            beyond |= size_of(torque[part]) + servo->kp * size_of(later[part] - earlier[part]) > widest;
         }
         if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
             EACH_PART {
-                const Mask over = size_of(torque[part]) > widest;
-                const Vector held = supply[part] * clip_each(torque[part], widest);
+                const Vector done = (asked[part] - earlier[part]) / (later[part] - earlier[part]);
+                const Vector rest = torque[part] - pull_of(servo, asked[part] + away[part], band);
+                const Mask changes = (done > 0) & (done < 1);
+                const Vector old = choose(changes, earlier[part], asked[part]);
+                const Vector new = choose(changes, later[part], asked[part]);
+                const Vector first = rest + pull_of(servo, old + away[part], band);
+                const Vector second = rest + pull_of(servo, new + away[part], band);
+                const Mask over = (size_of(first) > widest) | (size_of(second) > widest);
+                const Vector begun = clip_each(first, widest), ended = clip_each(second, widest);
+                const Vector held = supply[part] * (begun + choose(changes, done, none) * (ended - begun));
                 const Vector outside = none + half * servo->damping;
                 const Vector pushed = (mass[part] - outside) * velocity[part] + h * (held - load[part]);
                 free[part] = choose(over, pushed / (mass[part] + outside), free[part]);
@@ -187,6 +209,7 @@ static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t
             memcpy(path + step * LANES + part * WIDTH, position + part, sizeof(Vector));
             velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
             position[part] = moved + half * velocity[part];
+            earlier[part] = before[part];
         }
     }
     memcpy(path + steps * LANES, position, sizeof position);

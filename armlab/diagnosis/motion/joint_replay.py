@@ -10,6 +10,9 @@ friction loss but without its slip at rest; it is of second order between events
     v'  = sgn(v*) max(|v*| - h (friction + load_friction |load|) / (m + h (damping + s kd) / 2), 0)
     q'  = q_m + h v' / 2
 
+Where the command changes within a step, the torque is the mean of the clipped torques before and after the change. The
+commands there are the means of the steps around it, and the share of each follows from the mean of the step.
+
 The integral at the first step of a window is that of its run there, along the measured motion.
 """
 

@@ -15,8 +15,14 @@ from armlab.diagnosis.motion.windows import Windows
 TORQUE_SCALED = ("kp", "kd", "damping", "friction", "limit", "armature")  # one factor for all, and for the inertia
 
 
-def confused_parameters(windows: Windows, fit: ServoFit, tuning: MotionTuning = DEFAULT) -> dict[int, tuple[int, ...]]:
-    """For each fitted parameter, the places of the parameters that these data do not separate from it."""
+def confused_parameters(
+    windows: Windows, fit: ServoFit, mass_error: float = np.inf, tuning: MotionTuning = DEFAULT
+) -> dict[int, tuple[int, ...]]:
+    """For each fitted parameter, the places of the parameters that these data do not separate from it.
+
+    mass_error: standard error of a payload that was found on all joints together, kg. What the other joints tell of it
+    counts as one measurement more.
+    """
     every = np.array(USUAL) | np.array(OPTIONAL) | np.array(SHARED)
     every[place("limit")] = fit.values[place("limit")] < INFINITE_LIMIT
     slopes = jacobian(windows, fit.values, every)
@@ -32,7 +38,12 @@ def confused_parameters(windows: Windows, fit: ServoFit, tuning: MotionTuning = 
     for other in set(columns) - set(fitted):
         if not np.any(columns[other]):
             continue
-        wider = _inverse([columns[number] for number in (*fitted, other)])
+        together = [columns[number] for number in (*fitted, other)]
+        wider = _inverse(together)
+        if other == place("payload") and np.isfinite(mass_error):
+            noise = len(windows.position) / windows.count * fit.rms**2
+            told = max(noise / mass_error**2 - 1 / float(wider[-1, -1]), 0.0)
+            wider = _inverse([*(np.append(each, 0.0) for each in together[:-1]), np.append(together[-1], told**0.5)])
         for position, number in enumerate(fitted):
             if wider[position, position] > tuning.class_factor**2 * alone[position, position] > 0:
                 found[number].append(other)

@@ -27,6 +27,7 @@ from problem.regressor import rigid_body_torque
 
 LOADS = ("inertia", "load", "slope", "unit_inertia", "unit_load", "unit_slope")
 SLOPE_STEP = 1e-3  # rad (m), of the central difference
+SAME_POSITION = 1e-6  # rad (m): rounding of one step of an encoder
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,13 @@ class Windows:
     def window(self) -> NDArray[np.intp]:
         """The window of each sample, (samples,)."""
         return np.repeat(np.arange(self.count), np.diff(self.begin))
+
+    @property
+    def encoder_step(self) -> float:
+        """The smallest step of the measured positions, rad (m): 0 where they have none."""
+        steps = np.diff(np.unique(self.position))
+        steps = steps[steps > SAME_POSITION]
+        return float(steps.min()) if len(steps) else 0.0
 
     def with_integral(self, integral: Array) -> "Windows":
         """The windows with other integrals of the drive at the start of each run, (runs,), N m."""
