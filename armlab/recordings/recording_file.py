@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import pandas as pd
 import yaml
-from annotated_types import Ge, Gt, Len
+from annotated_types import Ge, Gt, Le, Len
 from pydantic import ConfigDict, Field, model_validator
 
 from armlab.common.arrays import Array
@@ -20,10 +20,11 @@ from armlab.recordings.recording import Role
 
 FILE_NAME = "recording.yaml"
 Names = Annotated[tuple[str, ...], Len(min_length=1)]
-Matrix = tuple[tuple[float, ...], ...]
+Bounded = Annotated[float, Ge(-1e9), Le(1e9)]  # in SI units no arm has a larger number
+Matrix = tuple[tuple[Bounded, ...], ...]
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]
-PerJoint = Annotated[tuple[float | None, ...], Len(min_length=1)]
+PerJoint = Annotated[tuple[Bounded | None, ...], Len(min_length=1)]
 
 
 class Columns(Settings):
@@ -76,7 +77,7 @@ class TransmissionEntry(Settings):
     """Matrices from raw channels to joints: q = position @ raw + offset, tau = torque @ raw."""
 
     position: Matrix | None = None
-    offset: tuple[float, ...] | None = None
+    offset: tuple[Bounded, ...] | None = None
     torque: Matrix | None = None
 
 
@@ -163,7 +164,7 @@ class RecordingFile(Settings):
     columns: Columns
     units: dict[str, str | tuple[str, ...]]
     transmission: TransmissionEntry = TransmissionEntry()
-    gains: tuple[float, ...] | None = None
+    gains: tuple[Bounded, ...] | None = None
     controller: ControllerEntry | None = None
     joints: Names | None = None
     recorded: date | None = None

@@ -108,6 +108,7 @@ def test_runs_that_only_identify_get_a_note_that_blocks_will_be_held_out(tmp_pat
         ({"gains": [1.0, 2.0]}, "should hold 3 numbers"),
         ({"transmission": {"position": [[1, 0], [0, 1]]}}, "3 rows of 3 numbers"),
         ({"transmission": {"offset": [0]}}, "should hold 3 numbers"),
+        ({"transmission": {"offset": [0, 1e307, 0]}}, "less than or equal to 1000000000"),
         ({"columns": {"time": "t", "position": ["q1", "q2", "q3"]}}, "either torque or current"),
         ({"columns": {**SETTINGS["columns"], "torque": ["tau1", "tau2", "q1"]}}, "'q1' is named twice"),
         ({"columns": {**SETTINGS["columns"], "time": "time"}}, "no column 'time' (columns.time) in run.csv"),
