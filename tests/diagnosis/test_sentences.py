@@ -138,6 +138,13 @@ def test_other_findings_are_counted_and_what_is_unknown_is_told() -> None:
     )
 
 
+def test_one_effect_at_several_places_stands_in_one_sentence() -> None:
+    found = [claim("torque_offset", 3), claim("torque_offset", 1)]
+    assert findings_in_sentences(found, SIMULATION, 1) == (
+        "The torque of joints 1 and 3 has a constant part that the simulation does not have: 0.500 N m and 0.500 N m."
+    )
+
+
 def test_a_load_of_which_the_arm_feels_only_some_numbers_tells_these() -> None:
     numbers = (ParameterValue("hx", 0.1, (0.09, 0.11), "kg.m"),)
     felt = Claim("payload", 2, (2,), numbers, "", claim("payload").evidence, claim("payload").prediction)

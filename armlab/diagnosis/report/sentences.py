@@ -24,18 +24,39 @@ MILLI = 1e3  # mm in a m
 
 
 def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most: int) -> str:
-    """All that the model lacks, then the first `most` of what differs; the others are counted, and what is unknown is
-    told. Empty without findings.
+    """All that the model lacks, then the first `most` effects that differ; the others are counted, and what is unknown
+    is told. Empty without findings.
     """
     unknown = [claim for claim in claims if claim.effect == UNKNOWN.id]
     lacking = [claim for claim in claims if claim.effect != UNKNOWN.id and not _facts(claim).sentence]
-    differing = [claim for claim in claims if claim.effect != UNKNOWN.id and _facts(claim).sentence]
+    differing: dict[tuple[str, str], list[Claim]] = {}
+    for claim in claims:
+        if claim.effect != UNKNOWN.id and _facts(claim).sentence:
+            differing.setdefault((claim.effect, rivals_in_words(claim)), []).append(claim)
+    groups = list(differing.values())
     sentences = [_lacking_sentence(lacking, simulation)] if lacking else []
-    sentences += [finding_sentence(each, simulation) + _rivals_that_fit(each) for each in differing[:most]]
-    sentences += _count_sentence(len(differing) - most)
+    sentences += [_differing_sentence(own, simulation) for own in groups[:most]]
+    sentences += _count_sentence(sum(len(own) for own in groups[most:]))
     if unknown:
         sentences.append(UNKNOWN.sentence.format(place=_places(unknown)))
     return " ".join(f"{each}." for each in sentences)
+
+
+def _differing_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
+    """One effect where it was found, with its numbers; of several places without intervals."""
+    rivals = rivals_in_words(claims[0])
+    also = f"; {rivals} fits as well" if rivals else ""
+    if len(claims) == 1:
+        return finding_sentence(claims[0], simulation) + also
+    ordered = sorted(claims, key=lambda each: each.joint or 0)
+    facts = _facts(claims[0])
+    sentence = facts.sentence.format(model=model_in_words(simulation), place=_places(ordered))
+    numbers = [
+        _figures(facts, [replace(one, interval=None) for one in each.parameters], _frame(each, simulation))
+        for each in ordered
+    ]
+    shown = [each.removeprefix(": ") for each in numbers if each]
+    return _capitalise(sentence) + (f": {join_words(shown)}" if shown else "") + also
 
 
 def finding_sentence(claim: Claim, simulation: Simulation) -> str:
@@ -44,8 +65,11 @@ def finding_sentence(claim: Claim, simulation: Simulation) -> str:
     if not facts.sentence:
         return _capitalise(f"{model} lacks {facts.words} at {place}")
     sentence = facts.sentence.format(model=model, place=place)
-    frame = "" if claim.joint is None else simulation.arm.joints[claim.joint - 1].name
-    return _capitalise(sentence) + _figures(facts, claim.parameters, frame)
+    return _capitalise(sentence) + _figures(facts, claim.parameters, _frame(claim, simulation))
+
+
+def _frame(claim: Claim, simulation: Simulation) -> str:
+    return "" if claim.joint is None else simulation.arm.joints[claim.joint - 1].name
 
 
 def model_in_words(simulation: Simulation) -> str:
@@ -91,11 +115,6 @@ def rivals_in_words(claim: Claim) -> str:
     """Other effects that fit as well: `Stribeck friction or friction drift`; empty where there is none."""
     names = dict.fromkeys(effect_in_words(each.effect) for each in claim.rivals if each.effect != claim.effect)
     return join_words(list(names), "or") if names else ""
-
-
-def _rivals_that_fit(claim: Claim) -> str:
-    rivals = rivals_in_words(claim)
-    return f"; {rivals} fits as well" if rivals else ""
 
 
 def _count_sentence(number: int) -> Iterator[str]:
