@@ -110,7 +110,7 @@ def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
     first, *others = chapters
     most = 100 - max(round(100 * sum(each.share for each in others)), 1) if others else 100
     share = min(round(100 * first.share), most)
-    sentence = f"{share} % of the error comes from {_cause_in_words(first, joints)}"
+    sentence = f"{share or 'Less than 1'} % of the error comes from {_cause_in_words(first, joints)}"
     for each in others:
         longer = f"{sentence}, {100 * each.share:.0f} % from {_cause_in_words(each, joints)}"
         if each.share < MIN_TOLD_SHARE or len(longer.split()) > MAX_WORDS:

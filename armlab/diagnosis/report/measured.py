@@ -64,6 +64,8 @@ def _other_cell(claim: Claim) -> str:
     facts, words = effect_named(claim.effect), effect_in_words(claim.effect)
     if facts.where == "link":
         words = f"{words} of its link"
+    if facts.where == "coupling":
+        words = f"{words} from joint {claim.joints[1]}"
     scalars = [each for each in claim.parameters if np.ndim(each.value) == 0]
     numbers = [_together(format_measured(each)) for each in scalars if f"{{{each.name}}}" in facts.figures]
     if not numbers and scalars:

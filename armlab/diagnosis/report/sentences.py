@@ -95,11 +95,10 @@ def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
 
 def _size(claims: Sequence[Claim]) -> str:
     """` of 3.03 N m s/rad` of a single finding."""
-    facts = _facts(claims[0])
-    if len(claims) > 1 or not facts.figures:
+    if len(claims) > 1:
         return ""
-    values = {each.name: _format_value(replace(each, interval=None)) for each in claims[0].parameters}
-    return f" of {facts.figures.format(**values)}"
+    bare = [replace(each, interval=None) for each in claims[0].parameters]
+    return _figures(_facts(claims[0]), bare, "").replace(": ", " of ")
 
 
 def _places(claims: Sequence[Claim]) -> str:
@@ -137,8 +136,12 @@ def _figures(facts: Effect, parameters: Sequence[ParameterValue], frame: str) ->
 
 
 def number_in_words(name: str) -> str:
-    """The name of a number of a law in a sentence."""
-    return "mass" if name == "m" else name.replace("_", " ")
+    """The name of a number of a law in a sentence: m, mcx and Ixx are mass, first moment and inertia of a link."""
+    if name == "m":
+        return "mass"
+    if found := re.fullmatch(r"(mc|I)([xyz]{1,2})", name):
+        return f"{'first moment' if found[1] == 'mc' else 'inertia'} {found[2]}"
+    return name.replace("_", " ")
 
 
 def _format_value(parameter: ParameterValue) -> str:

@@ -63,7 +63,7 @@ def gain_sentence(diagnosis: Diagnosis) -> str:
     best, size = diagnosis.fit[joint], joint_unit(diagnosis.simulation.arm, joint)
     alone = "" if start is refit else f" (to {format_fixed(best.before)} by a refit of the rigid body alone)"
     white = data is None or is_white(data.final[:, joint], joint, data.observed)
-    rest = "" if white else " What is left there is not all noise."
+    rest = "" if white or best.after <= best.noise_floor else " What is left there is not all noise."
     with_it = "With it" if len(diagnosis.claims) == 1 else "With these"
     falls = "falls" if best.after < start[joint] else "does not fall, it goes"
     return (
