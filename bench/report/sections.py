@@ -141,7 +141,9 @@ def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
 def headline(cells: Sequence[Cell], found: CriticalDifference) -> tuple[str, str]:
     """Who has the best average rank, whom it beats and with whom it ties; then who of the others beats whom."""
     best, *others = found.ranks
-    first = f"{best} has the best average rank, {found.ranks[best]:.2f} of {len(found.ranks)}"
+    equal = [name for name in others if np.isclose(found.ranks[name], found.ranks[best])]
+    leads = f"{join_words([best, *equal])} share" if equal else f"{best} has"
+    first = f"{leads} the best average rank, {found.ranks[best]:.2f} of {len(found.ranks)}"
     if found.has_too_few_blocks:
         return f"{first}; {found.blocks} {_block_name(cells)} are too few to tell any pair apart.", ""
     beaten = _beaten_by(best, found)
@@ -151,7 +153,8 @@ def headline(cells: Sequence[Cell], found: CriticalDifference) -> tuple[str, str
     wins = [f"{name} beats {join_words(_beaten_by(name, found))}" for name in others if _beaten_by(name, found)]
     tied = sum(p > ERROR_RATE for p in found.p.values())
     rest = f" {tied} of {len(found.p)} pairs tie: no difference was shown." if tied else ""
-    return f"{first}: it {' and '.join(parts)}.", f"{'; '.join(wins)}.{rest}" if wins else rest.strip()
+    first = f"{first}: {best if equal else 'it'} {' and '.join(parts)}."
+    return first, f"{'; '.join(wins)}.{rest}" if wins else rest.strip()
 
 
 def _beaten_by(name: str, found: CriticalDifference) -> list[str]:

@@ -150,6 +150,16 @@ def test_the_headline_says_who_beats_whom_and_who_ties(cell: Cell) -> None:
     assert second == "1 of 3 pairs tie: no difference was shown."
 
 
+def test_the_headline_names_all_that_share_the_best_rank(cell: Cell) -> None:
+    base = np.arange(20.0)
+    turns = np.where(np.arange(20) % 2, 0.5, -0.5)
+    first, second = headline([cell], critical_difference(pd.DataFrame({"a": base, "b": base + turns, "c": base + 5})))
+    assert first == "a and b share the best average rank, 1.50 of 3: a beats c and ties with b."
+    assert second == "b beats c. 1 of 3 pairs tie: no difference was shown."
+    few, _ = headline([cell], critical_difference(pd.DataFrame({"a": [1.0, 2.0], "b": [2.0, 1.0]})))
+    assert few.startswith("a and b share the best average rank, 1.50 of 2; 2 ")
+
+
 def test_the_axis_of_many_ranks_numbers_as_many_as_there_is_room_for() -> None:
     names = [f"a{k}" for k in range(22)]
     found = critical_difference(pd.DataFrame(np.random.default_rng(0).normal(size=(3, 22)), columns=names))

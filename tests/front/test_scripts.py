@@ -165,6 +165,12 @@ def test_a_version_is_too_old_below_the_wanted_one(found, wanted, old):
     assert doctor.is_too_old(found, wanted) == old
 
 
+def test_an_unknown_command_is_refused_with_the_one_that_was_probably_meant(here):
+    status, out, err = told("diagnos", "rec")
+    assert (status, out) == (2, "")
+    assert "No such command 'diagnos'. Did you mean 'diagnose'?" in err
+
+
 def test_click_completes_commands_and_options_in_a_shell():
     words = {"_ARMLAB_COMPLETE": "bash_complete", "COMP_WORDS": "armlab diagnose --js", "COMP_CWORD": "2"}
     script = "from armlab.cli.main import main; main(prog_name='armlab')"

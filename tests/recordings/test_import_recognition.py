@@ -110,6 +110,17 @@ def test_joints_in_columns_are_matched_with_the_robot_whatever_their_order(tmp_p
     assert "the robot's order is base_joint" in refusal(import_files, [tmp_path / "log.csv"], tmp_path / "c", listed)
 
 
+def test_joints_between_topic_and_signal_are_matched_with_the_robot(tmp_path: Path) -> None:
+    table, order = frame().to_numpy(), [2, 0, 1]
+    names = [f"/joint_states/{JOINT_NAMES[joint]}/{kind}" for kind in ("position", "effort") for joint in order]
+    shuffled = np.column_stack([table[:, 0], table[:, 1:4][:, order], table[:, 4:][:, order]])
+    pd.DataFrame(shuffled, columns=["__time", *names]).to_csv(tmp_path / "log.csv", index=False)
+    import_files([tmp_path / "log.csv"], tmp_path / "new", {**NOTHING, "robot": write_robot(tmp_path)})
+    run = load_recording(tmp_path / "new").runs[0]
+    assert_allclose(run.position, frame()[POSITION])
+    assert_allclose(run.torque, frame()[TORQUE])
+
+
 def test_joints_that_the_robot_does_not_have_are_never_taken_in_the_order_of_the_file(tmp_path: Path) -> None:
     names = tuple(f"{kind}_{joint}" for kind in ("position", "effort") for joint in JOINT_NAMES)
     path = write_log(tmp_path / "log.csv", ("t", *names))

@@ -18,7 +18,7 @@ from problem.arm import Arm
 
 PICTURE_WIDTH, ROW_HEIGHT = 412.0, 17.0
 ARM_WIDTH = 168.0  # px: width of the arm itself; the names stand beside it
-MARKED_NAME_WIDTH = 66.0  # px: width of a guilty joint's name before its finding
+BOLD = 1.1  # width of bold letters over that of others, about
 ELEVATION = np.deg2rad(18)
 AXLE_SHARE = 0.045  # of the arm's size: half the length of a joint's axle
 MIN_LENGTH = 1e-9
@@ -172,7 +172,10 @@ def _draw_joint(centre: Array, axis: Array, mark: JointMark | None, size: float)
 
 
 def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height: float) -> str:
-    """One row a joint beside the arm, from the highest to the lowest, with a line to the joint."""
+    """One row a joint beside the arm, from the highest to the lowest, with a line to the joint.
+
+    The joint's name stands first and whole; what is said of it ends where the picture does.
+    """
     order = np.lexsort((np.arange(len(arm)), centres[:, 1]))
     rows = 30 + ROW_HEIGHT * np.arange(len(arm)) + max(0.0, (height - 46 - ROW_HEIGHT * len(arm)) / 2)
     out = ""
@@ -189,11 +192,9 @@ def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height
             stroke_width=1.2 if mark else 0.6,
             stroke_dasharray="none" if mark else "1 3",
         )
-        name = shorten_text(arm.joints[index].name, MARKED_NAME_WIDTH, 10.5) if mark else arm.joints[index].name
-        text = f"{index + 1}  {name}: {mark.text}" if mark else f"{index + 1}  {name}"
-        out += svg_text(
-            shorten_text(text, PICTURE_WIDTH - start - 2, 10.5), start, row, 10.5, fill=color, font_weight=weight
-        )
+        text = f"{index + 1}  {arm.joints[index].name}" + (f": {mark.text}" if mark else "")
+        room = (PICTURE_WIDTH - start - 2) / (BOLD if mark else 1.0)
+        out += svg_text(shorten_text(text, room, 10.5), start, row, 10.5, fill=color, font_weight=weight)
     return out
 
 

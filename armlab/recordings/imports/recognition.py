@@ -1,7 +1,7 @@
 """What the columns of a log are, from the names that robot drivers give them: signal, joint, unit.
 
 A column's name is a stem that tells the signal, a key that tells the joint (a number or a joint's name), and perhaps a
-unit: `actual_q_0`, `tau_J[3]`, `position_elbow_joint`, `timestamp_ns`.
+unit: `actual_q_0`, `tau_J[3]`, `position_elbow_joint`, `/joint_states/elbow_joint/position`, `timestamp_ns`.
 """
 
 import re
@@ -144,6 +144,9 @@ def split_name(name: str) -> Column:
     for stem in STEMS_BEFORE_JOINT_NAMES:
         if bare.stem.startswith(f"{stem}_"):
             return Column(name, stem, bare.stem[len(stem) + 1 :], bare.unit)
+    owner = name.strip().split("/")[:-1]
+    if bare.stem in STEMS_BEFORE_JOINT_NAMES and owner and owner[-1]:  # PlotJuggler: /topic/joint/position
+        return Column(name, bare.stem, owner[-1].lower(), bare.unit)
     return Column(name, bare.stem, "", bare.unit)
 
 
@@ -156,7 +159,7 @@ def _split_unit(name: str) -> Column:
 
 
 def order_by_joint(names: tuple[str, ...], joints: Sequence[str], signal: str) -> tuple[str, ...]:
-    """The columns in the order of the robot's joints, whose names or numbers they end with.
+    """The columns in the order of the robot's joints, whose names they carry or whose numbers they end with.
 
     Raises JointNamesError where they name other joints: their order in a file says nothing.
     """
@@ -186,9 +189,10 @@ def check_joint_order(names: tuple[str, ...], joints: Sequence[str], signal: str
 
 
 def _owners(names: tuple[str, ...], joints: Sequence[str]) -> list[str]:
-    """The joint that each column's name ends with, the longest of several; empty where it ends with none."""
-    return [max((joint for joint in joints if _ends_with(name, joint)), key=len, default="") for name in names]
+    """The joint that each column's name carries, the longest of several; empty where it carries none."""
+    return [max((joint for joint in joints if _carries(name, joint)), key=len, default="") for name in names]
 
 
-def _ends_with(name: str, joint: str) -> bool:
-    return name == joint or name.endswith((f"_{joint}", f"/{joint}", f".{joint}"))
+def _carries(name: str, joint: str) -> bool:
+    """Whether a column's name ends with a joint's, or has it before its last part: `/topic/joint/position`."""
+    return name.split("/")[-2:-1] == [joint] or name == joint or name.endswith((f"_{joint}", f"/{joint}", f".{joint}"))
