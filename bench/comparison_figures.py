@@ -1,6 +1,6 @@
 """Figures of a comparison: every end of one problem, the ranking over many, and the medians against the budget."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from armlab.common.arrays import Array
 from armlab.common.streams import named_generator
-from bench.figures import line_style, render_figure
+from bench.figures import FORMATS, line_style, render_figure
 from bench.printed import display_name
 from bench.statistics import is_feasible, quantile
 from bench.statistics.critical_difference import CriticalDifference, block_losses, critical_difference
@@ -24,7 +24,7 @@ _ROW_HEIGHT = 0.34  # inches
 _SPREAD = 0.28  # of the dots of one row about its middle, in rows
 
 
-def draw_ends(frame: pd.DataFrame, known: Mapping[str, float]) -> dict[str, bytes]:
+def draw_ends(frame: pd.DataFrame, known: Mapping[str, float], formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
     """Every end of each algorithm, with median, quartiles and the best known as a line; a panel a problem.
 
     frame: tidy, one swarm size and budget. known: best condition numbers by problem. PNG and SVG bytes.
@@ -42,7 +42,7 @@ def draw_ends(frame: pd.DataFrame, known: Mapping[str, float]) -> dict[str, byte
         handles, texts = panels[0].get_legend_handles_labels()
         figure.legend(handles, texts, loc="outside lower center", ncols=4)
 
-    return render_figure((1.6 + 4.6 * len(problems), 1.5 + _ROW_HEIGHT * len(labels)), fill)
+    return render_figure((1.6 + 4.6 * len(problems), 1.5 + _ROW_HEIGHT * len(labels)), fill, formats)
 
 
 def _draw_ends_panel(axes: Axes, frame: pd.DataFrame, labels: list[str], known: float | None) -> None:
@@ -90,7 +90,7 @@ def _set_plain_ticks(axes: Axes, values: Array) -> None:
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def draw_ranking(frame: pd.DataFrame) -> dict[str, bytes]:
+def draw_ranking(frame: pd.DataFrame, formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
     """Rank of each algorithm in every problem, its average, and the groups that no test tells apart.
 
     frame: tidy. The ranks are those of medians over problems, or of ends over the repetitions of a single problem. PNG
@@ -112,7 +112,7 @@ def draw_ranking(frame: pd.DataFrame) -> dict[str, bytes]:
         axes.invert_yaxis()
         figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
-    return render_figure((6.4, 1.5 + _ROW_HEIGHT * count), fill)
+    return render_figure((6.4, 1.5 + _ROW_HEIGHT * count), fill, formats)
 
 
 def _block_name(frame: pd.DataFrame) -> str:
@@ -143,8 +143,8 @@ def _draw_groups(axes: Axes, found: CriticalDifference) -> None:
         axes.plot([x, x], [rows[group[0]] - 0.3, rows[group[-1]] + 0.3], color="black", linewidth=2.5, label=text)
 
 
-def draw_budgets(frame: pd.DataFrame, known: Mapping[str, float]) -> dict[str, bytes]:
-    """Median and quartiles against the budget, a panel a problem, each with its own scale; PNG and SVG bytes.
+def draw_budgets(frame: pd.DataFrame, known: Mapping[str, float], formats: Sequence[str] = FORMATS) -> dict[str, bytes]:
+    """Median and quartiles against the budget, a panel a problem, each with its own scale.
 
     known: best condition numbers by problem, drawn as a line.
     """
@@ -166,7 +166,7 @@ def draw_budgets(frame: pd.DataFrame, known: Mapping[str, float]) -> dict[str, b
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4 * len(problems))
 
-    return render_figure((2 + 4.2 * len(problems), 4.6), fill)
+    return render_figure((2 + 4.2 * len(problems), 4.6), fill, formats)
 
 
 def _draw_budget_panel(axes: Axes, frame: pd.DataFrame) -> None:

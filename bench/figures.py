@@ -59,13 +59,18 @@ def render_panels(panels: int, draw: DrawPanels) -> dict[str, bytes]:
     return render_figure((2 + 3.6 * panels, 3.8), fill)
 
 
-def render_figure(size: tuple[float, float], fill: Callable[[Figure], None]) -> dict[str, bytes]:
-    """PNG and SVG bytes of a figure of that size, inches, which `fill` fills."""
+FORMATS = ("png", "svg")
+
+
+def render_figure(
+    size: tuple[float, float], fill: Callable[[Figure], None], formats: Sequence[str] = FORMATS
+) -> dict[str, bytes]:
+    """Bytes, by format (png, svg, pdf), of a figure of that size, inches, which `fill` fills."""
     with matplotlib.rc_context():
         _set_style()
         figure = Figure(figsize=size, layout="constrained")
         fill(figure)
-        return {suffix: _image_bytes(figure, suffix) for suffix in ("png", "svg")}
+        return {suffix: _image_bytes(figure, suffix) for suffix in formats}
 
 
 def _set_style() -> None:
@@ -81,7 +86,8 @@ def _set_style() -> None:
 
 def _image_bytes(figure: Figure, suffix: str) -> bytes:
     buffer = BytesIO()
-    unsigned = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None}}[suffix]
+    names = {"png": ["Software"], "svg": ["Date", "Creator"], "pdf": ["CreationDate", "Creator", "Producer"]}[suffix]
+    unsigned: dict[str, None] = dict.fromkeys(names)
     figure.savefig(buffer, format=suffix, metadata=unsigned)
     return buffer.getvalue()
 

@@ -291,16 +291,25 @@ def share(results: Path, store: Path, form: str, out: Path) -> ResultLines:
     show_default=True,
     help="File of the best known trajectories.",
 )
+@click.option(
+    "--as",
+    "formats",
+    type=click.Choice(["png", "svg", "pdf"]),
+    multiple=True,
+    default=("png", "svg"),
+    show_default=True,
+    help="Repeatable.",
+)
 @prints_result
-def draw(results: Path, store: Path, out: Path, records: Path) -> ResultLines:
+def draw(results: Path, store: Path, out: Path, records: Path, formats: tuple[str, ...]) -> ResultLines:
     """Draw RESULTS: ends, ranking, budgets.
 
-    Writes PNG and SVG: every end with median and best known, the ranks over problems, and the medians against the
+    Writes every end with median and best known, the ranks over problems, and the medians against the
     budget, as they fit. RESULTS: a configuration file whose trials were run, or a folder that `share` wrote.
     """
     from bench.result_sets.draw import draw_results
 
-    return written_files(draw_results(results, store, records, out))
+    return written_files(draw_results(results, store, records, out, formats))
 
 
 @click.command()

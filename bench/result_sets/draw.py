@@ -1,5 +1,6 @@
-"""`armlab draw`: the figures that fit a result set, as PNG and SVG."""
+"""`armlab draw`: the figures that fit a result set."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from armlab.common.files import write_whole
@@ -12,21 +13,22 @@ from problem.registry import parse_problem
 MAX_PANELS = 3  # problems whose ends are drawn side by side
 
 
-def draw_results(where: Path, store: Path, records: Path, folder: Path) -> list[Path]:
+def draw_results(where: Path, store: Path, records: Path, folder: Path, formats: Sequence[str]) -> list[Path]:
     """Draw a result set into a folder; returns the files.
 
     NAME_ends: every end, for up to three problems of one swarm size and budget. NAME_ranking: ranks over the problems,
     or over the repetitions of a single one. NAME_budgets: medians against the budget, where there are several. records:
-    the best known trajectories. Raises InputError, in one line, if there are no results.
+    the best known trajectories. formats: png, svg, pdf. Raises InputError, in one line, if there are no results.
     """
     results = read_results(where, store)
     make_folder(folder)
     frame = results.trials
     several = frame["budget"].nunique() > 1
-    figures = {"ranking": draw_ranking(frame)}
+    figures = {"ranking": draw_ranking(frame, formats)}
     if frame["problem"].nunique() <= MAX_PANELS and frame["swarm_size"].nunique() == 1:
         known = _known_values(results, records)
-        figures["budgets" if several else "ends"] = draw_budgets(frame, known) if several else draw_ends(frame, known)
+        name, draw = ("budgets", draw_budgets) if several else ("ends", draw_ends)
+        figures[name] = draw(frame, known, formats)
     paths = []
     for name, images in figures.items():
         for suffix, image in images.items():

@@ -38,6 +38,11 @@ def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run
     done = shell.invoke(draw, ["tables", "--out", "pictures", "--records", "none.json"], catch_exceptions=False)
     assert "pictures/small_ranking.png" in done.output
     assert not (tmp_path / ".armlab").exists()
+    done = shell.invoke(draw, ["tables", "--out", "printed", "--records", "none.json", "--as", "pdf"])
+    assert done.exit_code == 0
+    files = sorted(Path("printed").iterdir())
+    assert files
+    assert all(path.suffix == ".pdf" and path.read_bytes().startswith(b"%PDF") for path in files)
 
 
 def test_convergence_of_populations_that_shrink_or_restart_is_averaged_at_equal_evaluations(small_run: Ran) -> None:
