@@ -4,6 +4,7 @@ import os
 import pty
 import re
 import select
+import signal
 import sys
 import time
 from pathlib import Path
@@ -24,6 +25,9 @@ class TerminalSession:
         self._process, self._terminal = pty.fork()
         if self._process == 0:
             os.chdir(folder)
+            signal.signal(
+                signal.SIGINT, signal.SIG_DFL
+            )  # a job in the background ignores it, and so would its children
             environment = {**os.environ, "PYTHONPATH": path, "TERM": "dumb", "COLUMNS": "80"}
             os.execve(sys.executable, [sys.executable, "-c", CODE, *words], environment)
 
