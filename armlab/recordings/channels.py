@@ -217,7 +217,7 @@ def read_late(run: Run, delay: Array) -> Run:
 
 
 SLOWEST_HZ = 5.0  # no drive is recorded more slowly
-FASTEST_HZ = 1e5  # nor faster
+FASTEST_HZ = 1e6  # nor faster
 RATE_TOLERANCE = 0.02  # relative: clocks that are off by so little are one clock
 
 
