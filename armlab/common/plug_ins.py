@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from datetime import date
 from functools import cache
@@ -36,9 +36,9 @@ class BrokenPlugInError(Exception):
 def load_plug_in(entry: EntryPoint) -> Any:
     """What an entry point names.
 
-    A module of another package is imported in a process of its own first, for IMPORT_LIMIT_S at most; on the same day
-    not again while the files of its package stay as they are. Its import here prints nothing, and leaves the variables
-    of the environment, the working folder, and what numpy does about errors as they were.
+    A module of another package is imported in a process of its own first, for IMPORT_LIMIT_S at most. Where that works,
+    it is not repeated on the same day while the files of its package stay as they are. Its import here prints nothing,
+    and leaves the variables of the environment, the working folder, and what numpy does about errors as they were.
     Raises BrokenPlugInError, with the error of the import as its cause if it was raised here.
     """
     if is_own(entry) or entry.module in sys.modules:
@@ -101,11 +101,11 @@ def _without_traces() -> Iterator[None]:
 
 @cache
 def _try_import(name: str, value: str, limit_s: float) -> str:
-    """Why the import of VALUE fails; empty where it does not."""
+    """Why the import of VALUE fails; empty where it does not. A failure is tried again: its reason may have gone."""
     key = _key_of(value)
-    known = _read_tries()
+    known = _read_tried()
     if key in known:
-        return known[key]
+        return ""
     command = [sys.executable, "-m", __spec__.name, name, value]
     surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     try:
@@ -119,19 +119,15 @@ def _try_import(name: str, value: str, limit_s: float) -> str:
             check=False,
         )
     except subprocess.TimeoutExpired:
-        reason = f"its import takes longer than {limit_s:g} s"
-    else:
-        try:
-            reason = json.loads(done.stdout)
-        except ValueError:
-            end = f"status {done.returncode}" if done.returncode >= 0 else f"signal {-done.returncode}"
-            reason = f"its import ends the process ({end})"
-        else:
-            if reason:
-                return str(reason)  # what it lacks may be installed: it is tried again
-    if key is not None:
-        _write_tries({**known, key: reason})
-    return str(reason)
+        return f"its import takes longer than {limit_s:g} s"
+    try:
+        reason = str(json.loads(done.stdout))
+    except ValueError:
+        end = f"status {done.returncode}" if done.returncode >= 0 else f"signal {-done.returncode}"
+        return f"its import ends the process ({end})"
+    if key is not None and not reason:
+        _write_tried([*known, key])
+    return reason
 
 
 def _key_of(value: str) -> str | None:
@@ -149,24 +145,24 @@ def _key_of(value: str) -> str | None:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
-def _tries_file() -> Path:
+def _tried_file() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "armlab" / "plug-ins.json"
 
 
-def _read_tries() -> dict[str, str]:
-    """Reasons by key, of this day."""
+def _read_tried() -> list[str]:
+    """Keys of this day whose import works."""
     try:
-        content = json.loads(_tries_file().read_text(encoding="utf-8"))
-        return dict(content["tries"]) if content["day"] == date.today().isoformat() else {}
+        content = json.loads(_tried_file().read_text(encoding="utf-8"))
+        return list(content["keys"]) if content["day"] == date.today().isoformat() else []
     except (OSError, ValueError, KeyError, TypeError):  # none yet, or not written by this version
-        return {}
+        return []
 
 
-def _write_tries(tries: Mapping[str, str]) -> None:
-    content = {"day": date.today().isoformat(), "tries": dict(tries)}
+def _write_tried(keys: Sequence[str]) -> None:
+    content = {"day": date.today().isoformat(), "keys": list(keys)}
     try:
-        _tries_file().parent.mkdir(parents=True, exist_ok=True)
-        write_whole(_tries_file(), json.dumps(content))
+        _tried_file().parent.mkdir(parents=True, exist_ok=True)
+        write_whole(_tried_file(), json.dumps(content))
     except (OSError, InputError):
         return  # without it, the next command tries again
 

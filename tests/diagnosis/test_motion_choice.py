@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armlab.diagnosis.motion.choose import ChosenServo, Gain, chance_of_gain, first_guesses, is_like_steps
+from armlab.diagnosis.motion.choose import ChosenServo, Gain, chance_of_gain, first_guesses, is_hidden_by_encoder_steps
 from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows
@@ -68,11 +68,11 @@ def test_windows_at_rest_do_not_make_a_gain_less_sure() -> None:
 def test_a_dead_band_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(still: Windows) -> None:
     counted = replace(still, position=0.0015 * np.array([0.0, 1.0, 2.0, 7.0]) + 1e-9 * np.arange(4))
     assert counted.encoder_step == pytest.approx(0.0015, rel=1e-5)
-    assert is_like_steps(place("dead_band"), 0.001, counted)
-    assert is_like_steps(place("dead_band"), -0.001, counted)
-    assert not is_like_steps(place("dead_band"), 0.002, counted)
-    assert not is_like_steps(place("offset"), 0.001, counted)
-    assert not is_like_steps(place("dead_band"), 1e-4, still)
+    assert is_hidden_by_encoder_steps(place("dead_band"), 0.001, counted)
+    assert is_hidden_by_encoder_steps(place("dead_band"), -0.001, counted)
+    assert not is_hidden_by_encoder_steps(place("dead_band"), 0.002, counted)
+    assert not is_hidden_by_encoder_steps(place("offset"), 0.001, counted)
+    assert not is_hidden_by_encoder_steps(place("dead_band"), 1e-4, still)
 
 
 @pytest.fixture

@@ -97,7 +97,7 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
         if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
             break
         waiting.remove(best)
-        if is_like_steps(best, float(tried[best][0].values[best] - base[best]), few):
+        if is_hidden_by_encoder_steps(best, float(tried[best][0].values[best] - base[best]), few):
             continue
         fit, judged = tried[best]
         if best == place("limit") and np.isnan(nominal[place("kp")]):
@@ -108,7 +108,7 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
         number: gain
         for number, gain in gains.items()
         if is_finding(gain, looks, tuning)
-        and not is_like_steps(number, float(last.values[number] - base[number]), sound)
+        and not is_hidden_by_encoder_steps(number, float(last.values[number] - base[number]), sound)
     }
     return ChosenServo(nominal, last, worth, odd)
 
@@ -218,12 +218,12 @@ def _with_damping_inside(
     return fit, judged
 
 
-def is_like_steps(number: int, difference: float, windows: Windows) -> bool:
+def is_hidden_by_encoder_steps(number: int, difference: float, windows: Windows) -> bool:
     """Whether a difference from the simulation is one that the steps of the encoder make as well, and below a step.
 
     A drive that reads its position in counts does not act on an error within a count either.
     """
-    return PARAMETERS[number].like_steps and abs(difference) < windows.encoder_step
+    return PARAMETERS[number].hidden_by_encoder_steps and abs(difference) < windows.encoder_step
 
 
 def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:

@@ -26,7 +26,8 @@ class ServoParameter:
 
     lowest, highest: bounds of a fit; scale: a step that matters. role: a `usual` one is part of every fit, an
     `optional` one has to earn its place, a `shared` one is that of all joints, a `given` one is never fitted.
-    like_steps: whether the steps of an encoder do the same as a small one: a difference below a step is none.
+    hidden_by_encoder_steps: whether the steps of an encoder do the same as a small one, so that a difference below a
+    step is none.
     equation: for the verdict, with {value} and {joint}. rivals: effects that fit these data as well, or nearly. mjcf:
     the field of MJCF that holds it.
     """
@@ -44,7 +45,7 @@ class ServoParameter:
     rivals: tuple[str, ...] = ()
     mjcf: str = ""
     experiment: str = ""
-    like_steps: bool = False
+    hidden_by_encoder_steps: bool = False
 
 
 INFINITE_LIMIT = 1e3  # N m: no servo of this law has more
@@ -181,7 +182,7 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         ("coulomb_friction", "backlash"),
         "",
         "record slow ramps in both directions with two gains",
-        like_steps=True,
+        hidden_by_encoder_steps=True,
     ),
     ServoParameter(
         "load_friction",

@@ -55,7 +55,7 @@ def _differing_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
         _figures(facts, [replace(one, interval=None) for one in each.parameters], _frame(each, simulation))
         for each in ordered
     ]
-    shown = [each.removeprefix(": ") for each in numbers if each]
+    shown = [each for each in numbers if each]
     return _capitalise(sentence) + (f": {join_words(shown)}" if shown else "") + also
 
 
@@ -65,7 +65,8 @@ def finding_sentence(claim: Claim, simulation: Simulation) -> str:
     if not facts.sentence:
         return _capitalise(f"{model} lacks {facts.words} at {place}")
     sentence = facts.sentence.format(model=model, place=place)
-    return _capitalise(sentence) + _figures(facts, claim.parameters, _frame(claim, simulation))
+    figures = _figures(facts, claim.parameters, _frame(claim, simulation))
+    return _capitalise(sentence) + (f": {figures}" if figures else "")
 
 
 def _frame(claim: Claim, simulation: Simulation) -> str:
@@ -98,7 +99,8 @@ def _size(claims: Sequence[Claim]) -> str:
     if len(claims) > 1:
         return ""
     bare = [replace(each, interval=None) for each in claims[0].parameters]
-    return _figures(_facts(claims[0]), bare, "").replace(": ", " of ")
+    figures = _figures(_facts(claims[0]), bare, "")
+    return f" of {figures}" if figures else ""
 
 
 def _places(claims: Sequence[Claim]) -> str:
@@ -122,17 +124,17 @@ def _count_sentence(number: int) -> Iterator[str]:
 
 
 def _figures(facts: Effect, parameters: Sequence[ParameterValue], frame: str) -> str:
-    """`: 2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of wrist_3`; where a law has other numbers, these by name."""
+    """`2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of wrist_3`; where a law has other numbers, these by name."""
     values = {each.name: _format_value(each) for each in parameters}
     if not facts.figures:
         first = next((each for each in parameters if np.ndim(each.value) == 0), None)
-        return "" if first is None else f": {number_in_words(first.name)} {values[first.name]}"
+        return "" if first is None else f"{number_in_words(first.name)} {values[first.name]}"
     if not values:
         return ""
     try:
-        return f": {facts.figures.format(frame=frame, **values)}"
+        return facts.figures.format(frame=frame, **values)
     except KeyError:  # as of a body of which this arm feels only some numbers
-        return f": {', '.join(f'{number_in_words(name)} {value}' for name, value in values.items())}"
+        return ", ".join(f"{number_in_words(name)} {value}" for name, value in values.items())
 
 
 def number_in_words(name: str) -> str:
