@@ -10,6 +10,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, Joint, Limits, Link
+from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, translation, turn_z_to
 
@@ -58,8 +59,9 @@ def written_mjcf(spec: Any, source: Path) -> str:
 def read_mjcf(path: Path) -> Arm:
     """The arm of an MJCF file: a chain of hinges and slides on a fixed base.
 
-    Raises InputError, in one line, for a branch, a free or ball joint, two joints on a body, and a file that MuJoCo
-    refuses. Actuators, damping and friction are no part of an arm.
+    Raises InputError, in one line, for a free or ball joint, two joints on a body, and a file that MuJoCo refuses; for
+    a branch or an equality constraint an UndecidedError with the bodies where an arm may end, if there are any.
+    Actuators, damping and friction are no part of an arm.
     """
     return arm_of(compile_mjcf(path), path)
 
@@ -69,18 +71,56 @@ def arm_of(model: Any, path: Path) -> Arm:
     if model.njnt == 0:
         raise InputError(f"{path} has no joint")
     if model.neq:
-        raise InputError(f"{path}: equality constraints (closed chains, mimic joints) are not supported; remove them")
+        raise mjcf_tree(model, path).refuse(
+            f"{path}: equality constraints (closed chains, mimic joints) are not supported"
+        )
     joints: list[Joint] = []
     for body, carrier, pose in _walk_bodies(model):
         if model.body_jntnum[body]:
             if carrier != len(joints):
                 name = model.joint(int(model.body_jntadr[body])).name
-                raise InputError(f"{path}, joint '{name}': a second branch of moving joints; cut the file to one arm")
+                raise mjcf_tree(model, path).refuse(f"{path}, joint '{name}': a second branch of moving joints")
             joints.append(_joint(model, body, pose, path))
     links = [link_from_pseudo_inertia(np.sum([each.seen for each in own], axis=0)) for own in carried_bodies(model)]
     gravity = tuple(model.opt.gravity.tolist())
     rotors = tuple(float(model.dof_armature[joint]) for joint in range(model.njnt))
     return Arm(path.stem, tuple(joints), tuple(links), gravity, rotors)
+
+
+def mjcf_tree(model: Any, path: Path) -> KinematicTree:
+    """All joints and fixed bodies of a mujoco.MjModel, also of one that is no chain; path: for messages."""
+    joints: list[TreeJoint] = []
+    for body in range(1, model.nbody):
+        name, link = model.body(body).name, model.body(int(model.body_parentid[body])).name
+        own = range(int(model.body_jntadr[body]), int(model.body_jntadr[body]) + int(model.body_jntnum[body]))
+        for joint in own:
+            child = name if joint == own[-1] else f"{name}, joint {joint}"
+            joints.append(_tree_joint(model, joint, link, child))
+            link = child
+        if not own:
+            joints.append(TreeJoint(name, link, name, moves=False))
+    return KinematicTree(str(path), tuple(joints))
+
+
+def _tree_joint(model: Any, joint: int, parent: str, child: str) -> TreeJoint:
+    """A joint of the tree; one whose kind no arm has can only be locked at zero."""
+    kind = int(model.jnt_type[joint])
+    low, high = model.jnt_range[joint].tolist() if model.jnt_limited[joint] else (-np.inf, np.inf)
+    limits = (float(low), float(high)) if kind in MOVING_KINDS else (0.0, 0.0)
+    return TreeJoint(model.joint(joint).name, parent, child, True, limits, _follower(model, joint))
+
+
+def _follower(model: Any, joint: int) -> Follower | None:
+    """What a joint follows by an equality constraint that is a straight line."""
+    kind = import_mujoco().mjtEq.mjEQ_JOINT
+    for equality in range(model.neq):
+        straight = not model.eq_data[equality, 2:5].any()
+        leader = int(model.eq_obj2id[equality])
+        if model.eq_type[equality] == kind and model.eq_obj1id[equality] == joint and leader >= 0 and straight:
+            start, slope = model.eq_data[equality, :2].tolist()
+            zero, leader_zero = (float(model.qpos0[model.jnt_qposadr[each]]) for each in (joint, leader))
+            return Follower(model.joint(leader).name, slope, zero + start - slope * leader_zero)
+    return None
 
 
 def _walk_bodies(model: Any) -> Iterator[tuple[int, int, Array]]:

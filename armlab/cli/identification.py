@@ -167,3 +167,30 @@ def gains(
     from armlab.identification.payload import PayloadSetting, Place, gains_lines
 
     return gains_lines(loaded, without, mass, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz))
+
+
+@click.command("lock-joints")
+@click.argument("robot", type=click.Path(path_type=Path))
+@click.argument("out", type=OutputPath())
+@click.option("--tip", metavar="LINK", help="Link where the arm ends; what moves beside it is locked.")
+@click.option("--lock", multiple=True, metavar="JOINT=VALUE", help="Joint to lock at a position in rad or m.")
+@prints_result
+def lock_joints(robot: Path, out: Path, tip: str | None, lock: tuple[str, ...]) -> ResultLines:
+    """Make one arm of ROBOT and write it to OUT.
+
+    ROBOT: a URDF or MJCF file with a gripper, mimic fingers or several arms.
+    OUT: a new file of the same kind. The links of locked joints stay, with mass.
+    """
+    from armlab.common.errors import InputError
+    from armlab.common.files import write_whole
+    from problem.locked_joints import lock_joints as lock_in_file
+    from problem.locked_joints import parse_locks
+
+    if out.suffix != robot.suffix:
+        raise InputError(f"{out}: the file should end in {robot.suffix}, as {robot} does")
+    if out.exists():
+        raise InputError(f"{out} is there already: choose a new file")
+    locked = lock_in_file(robot, tip, parse_locks(lock), out.parent)
+    write_whole(out, locked.text)
+    yield f"{out}: {locked.words}"
+    return {"files": [out], "joints": [joint.name for joint in locked.arm.joints], "locked": locked.positions}

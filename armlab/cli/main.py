@@ -36,6 +36,7 @@ _GROUPS = {
         "payload": "armlab.cli.identification:payload",
         "gains": "armlab.cli.identification:gains",
         "export-model": "armlab.cli.diagnosis:export_model",
+        "lock-joints": "armlab.cli.identification:lock_joints",
         "base": "armlab.cli.harness:base",
     },
     "Harness": {

@@ -5,7 +5,6 @@ after the joint takes what is new, the others keep what they have. Where that wo
 the others lose their inertia.
 """
 
-import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -27,6 +26,7 @@ from armlab.identification.export import (
 )
 from problem.mjcf import carried_bodies, compile_mjcf, import_mujoco, written_mjcf
 from problem.urdf import read_urdf_chain
+from problem.urdf_document import move_urdf, urdf_text
 
 
 @dataclass(frozen=True)
@@ -71,16 +71,11 @@ def patched_urdf(simulated: SimulatorModel, source: Path, folder: Path) -> Patch
             dynamics = ElementTree.SubElement(joint, "dynamics")
         for key, field in (("damping", "damping"), ("friction", "frictionloss")):
             dynamics.set(key, repr(float(simulated.field(field)[number])))
-    for node in chain.root.iter():
-        name = node.get("filename") if isinstance(node.tag, str) else None
-        if name and "://" not in name and not os.path.isabs(name):
-            node.set("filename", Path(os.path.relpath(source.parent / name, folder)).as_posix())
+    move_urdf(chain.root, source, folder)
     gravity = np.asarray(simulated.model.arm.gravity)
     if not np.allclose(gravity, chain.arm.gravity):
         notes.append(f"set gravity to {np.round(gravity, 4).tolist()} m/s2 in your simulator: URDF has no place for it")
-    ElementTree.indent(chain.root)
-    text = '<?xml version="1.0"?>\n' + ElementTree.tostring(chain.root, encoding="unicode") + "\n"
-    return Patched(text, tuple(notes))
+    return Patched(urdf_text(chain.root), tuple(notes))
 
 
 def patched_mjcf(simulated: SimulatorModel, source: Path) -> Patched:

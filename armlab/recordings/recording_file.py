@@ -244,7 +244,7 @@ def check_new_folder(folder: Path) -> None:
         raise InputError(f"{folder} is there already and not empty: choose a new folder")
 
 
-def write_recording(draft: Draft, folder: Path, beside: Mapping[str, str] = MappingProxyType({})) -> Path:
+def write_recording(draft: Draft, folder: Path, beside: Mapping[str, str | bytes] = MappingProxyType({})) -> Path:
     """Writes a draft into a new folder and returns its path. beside: further files by name, such as the robot.
 
     Raises InputError for a folder that holds something already and for a draft that is no valid recording.

@@ -1,9 +1,11 @@
 """Other formats: what is in them arrives unchanged, under names that a person can choose from."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from gripper_robots import GRIPPER_URDF
 from joint_state_bags import write_bag
 from numpy.testing import assert_allclose, assert_array_equal
 from recording_folders import POSITION, TORQUE, frame
@@ -175,3 +177,30 @@ def test_a_folder_that_holds_something_is_never_written_over(tmp_path: Path) -> 
 def test_a_file_of_no_known_format_is_refused(tmp_path: Path, name: str) -> None:
     (tmp_path / "log.xlsx").write_text("x")
     assert name in refusal(import_files, [tmp_path / name], tmp_path / "new", OPTIONS)
+
+
+def test_a_recording_of_a_robot_with_a_gripper_holds_a_robot_file_of_its_arm(tmp_path: Path) -> None:
+    (tmp_path / "toy.urdf").write_text(GRIPPER_URDF)
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    options = {**OPTIONS, "robot": str(tmp_path / "toy.urdf")}
+    assert "--tip hand (3 joints)" in refusal(import_files, [path], tmp_path / "recording", options)
+    imported = import_files([path], tmp_path / "recording", {**options, "tip": "hand", "lock": ("finger1=0.02",)})
+    assert any("locked: finger1 at 0.02, finger2 at 0.4" in line for line in imported.lines)
+    shutil.move(tmp_path / "recording", tmp_path / "elsewhere")
+    (tmp_path / "toy.urdf").unlink()
+    assert [joint.name for joint in load_recording(tmp_path / "elsewhere").arm.joints] == ["joint1", "joint2", "joint3"]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"robot": "irb120-arm", "tip": "hand"}, "irb120-arm is built in, as one chain of joints"),
+        ({"robot": None, "lock": ("finger1=0",)}, "--tip and --lock belong to a robot file"),
+        ({"robot": "arm.yaml", "tip": "hand"}, "only joints of a URDF or MJCF (.xml) file can be locked"),
+    ],
+)
+def test_a_tip_needs_a_robot_file_with_links(tmp_path: Path, given: dict[str, object], message: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    assert message in refusal(import_files, [path], tmp_path / "recording", {**OPTIONS, **given})

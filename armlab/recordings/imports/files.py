@@ -55,7 +55,7 @@ class ImportedRecording:
 def import_files(files: Sequence[Path], out: Path, options: Options) -> ImportedRecording:
     """Writes the recording, and tells how each file was read and what each signal was taken from.
 
-    options: robot, the columns of each signal, units, gains, joints, validate, separator, decimal, topic and
+    options: robot, tip, lock, the columns of each signal, units, gains, joints, validate, separator, decimal, topic and
     command_topic; None if not given. Raises InputError for a wrong option, and for all missing ones together.
     """
     return write_plan(plan_import(files, {**options, "out": out}))
@@ -77,16 +77,17 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
         **({"joints": list(plan.joints)} if plan.joints else {}),
     }
     note = tuple(f"{run.file}: imported from {Path(path).name}" for path, run in zip(plan.sources, runs, strict=True))
-    draft = Draft(plan.robot, columns, dict(plan.units), tuple(runs), others, note)
+    draft = Draft(plan.robot.name, columns, dict(plan.units), tuple(runs), others, note)
     folder = Path(plan.options["out"])
-    write_recording(draft, folder)
+    write_recording(draft, folder, plan.robot.copies(folder))
     return ImportedRecording(folder, plan, draft)
 
 
 def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
     """How each file was read, and what each signal was taken from, as far as that is known: names and texts."""
     rows = [(path, _describe_source(source)) for path, source in plan.sources.items()]
-    rows += [("robot", plan.robot)] if plan.robot else []
+    if plan.robot:
+        rows.append(("robot", "; ".join(filter(None, (plan.robot.source, plan.robot.locked)))))
     rows += [(signal, f"{', '.join(names)} [{_describe_unit(plan, signal)}]") for signal, names in plan.columns.items()]
     if plan.joints:
         rows.append(("joints", f"{', '.join(plan.joints)}; the others of the robot are held at zero"))

@@ -12,10 +12,11 @@ from armlab.common.settings import suggest_name
 from armlab.recordings.imports.columns import Log, choose_columns, choose_commands
 from armlab.recordings.imports.proposals import propose_robot
 from armlab.recordings.imports.questions import Options, Question
+from armlab.recordings.imports.robots import ImportedRobot, read_robot
 from armlab.recordings.imports.scales import choose_gains, choose_units
 from armlab.recordings.imports.sources import ReadOptions, Source, read_sources
 from armlab.recordings.recording_file import check_new_folder
-from problem.robot_file import built_in_arms, load_arm
+from problem.robot_file import built_in_arms
 
 SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semicolon": ";"}
 ReadSources = Callable[[Path, ReadOptions], Mapping[str, Source]]
@@ -25,13 +26,13 @@ ReadSources = Callable[[Path, ReadOptions], Mapping[str, Source]]
 class ImportPlan:
     """A recording to be written once no question is open.
 
-    options: as they were given. robot: as the recording names it. sources: by the path of the run. columns: names by
-    the signal. units: of each signal, one for all its columns or one a column. gains: of the torque, where it is in A
+    options: as they were given. robot: None while it is open. sources: by the path of the run. columns: names by the
+    signal. units: of each signal, one for all its columns or one a column. gains: of the torque, where it is in A
     or V. joints: of the robot, in the order of the columns, where the recording has only some of them.
     """
 
     options: Options
-    robot: str | None
+    robot: ImportedRobot | None
     sources: Mapping[str, Source] = field(default_factory=dict)
     columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     units: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
@@ -43,22 +44,21 @@ class ImportPlan:
 def plan_import(files: Sequence[Path], options: Options, read: ReadSources = read_sources) -> ImportPlan:
     """What is known of an import, and the questions that are open.
 
-    options: out, robot, the columns of each signal, units, gains, joints, validate, separator, decimal, topic,
-    command_topic. read: reads a file; a form that plans after each answer gives one that keeps what it read.
+    options: out, robot, tip, lock, the columns of each signal, units, gains, joints, validate, separator, decimal,
+    topic, command_topic. read: reads a file; a form that plans after each answer gives one that keeps what it read.
     Raises InputError for an option that cannot be right, whatever the answers to the questions are.
     """
-    robot = options.get("robot")
-    arm = None if robot is None else load_arm(robot)
+    robot, undecided = _read_robot(options)
+    arm = robot.arm if robot else None
     whole = tuple(joint.name for joint in arm.joints) if arm else ()
     chosen = _choose_joints(options.get("joints"), whole)
     if options.get("out") is not None:
         check_new_folder(Path(options["out"]))
-    place = robot if robot is None or robot in built_in_arms() else str(Path(robot).resolve())
     try:
         sources = _read_files(files, options, chosen or whole, read)
     except UndecidedError as error:
-        robots = () if robot else (_ask_robot(files[0], None, ()),)
-        return ImportPlan(options, place, questions=(*robots, _ask_choice(error), *_ask_out(files, options)))
+        robots = () if robot else (undecided or _ask_robot(files[0], None, ()),)
+        return ImportPlan(options, robot, questions=(*robots, _ask_choice(error), *_ask_out(files, options)))
     _check_validate(options["validate"], sources)
     log = Log(next(iter(sources.values())), options, arm, chosen or whole)
     log, commands, unmatched = choose_commands(log)
@@ -67,10 +67,10 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     units, unmeasured = choose_units(log, columns)
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
     count = len(columns["position"]) if "position" in columns else None
-    robots = () if robot else (_ask_robot(files[0], count, log.joints),)
+    robots = () if robot else (undecided or _ask_robot(files[0], count, log.joints),)
     return ImportPlan(
         options=options,
-        robot=place,
+        robot=robot,
         sources=sources,
         columns=columns,
         units=units,
@@ -78,6 +78,14 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
         questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *_ask_out(files, options)),
     )
+
+
+def _read_robot(options: Options) -> tuple[ImportedRobot | None, Question | None]:
+    """The robot, or the question where its arm ends."""
+    try:
+        return read_robot(options), None
+    except UndecidedError as error:
+        return None, _ask_choice(error)
 
 
 def _choose_joints(given: str | None, whole: tuple[str, ...]) -> tuple[str, ...]:

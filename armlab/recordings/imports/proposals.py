@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
+from armlab.common.errors import InputError, UndecidedError
 from armlab.recordings.imports.recognition import split_name, time_unit
 from armlab.recordings.units import SIGNAL_QUANTITIES
 from problem.robot_file import load_arm
@@ -39,6 +39,8 @@ def propose_robot(log: Path, count: int | None, joints: Sequence[str]) -> str | 
 def _fits(path: Path, count: int | None, joints: Sequence[str]) -> bool:
     try:
         arm = load_arm(str(path))
+    except UndecidedError:  # a robot with a gripper, or with several arms
+        return count is None
     except InputError:
         return False
     names = {joint.name for joint in arm.joints}

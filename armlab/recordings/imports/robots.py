@@ -1,0 +1,56 @@
+"""The robot of an import: a built-in one by its name, or a robot file, of which the recording gets a copy."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.recordings.imports.questions import Options
+from armlab.recordings.recording_file import FILE_NAME
+from problem.arm import Arm
+from problem.locked_joints import LockedRobot, lock_joints, parse_locks
+from problem.robot_file import built_in_arms, load_arm
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedRobot:
+    """The arm of a recording. source: a built-in name or a robot file. locked: its joints that are locked, in words."""
+
+    arm: Arm
+    source: str
+    tip: str | None
+    locks: Mapping[str, float]
+    locked: str
+
+    @property
+    def name(self) -> str:
+        """As the recording names it: a built-in name, or that of the copy beside `recording.yaml`."""
+        name = Path(self.source).name
+        return f"robot{Path(name).suffix}" if name == FILE_NAME else name
+
+    def copies(self, folder: Path) -> dict[str, str | bytes]:
+        """Content of the robot file for a folder, by its name; none of a built-in robot."""
+        path = Path(self.source)
+        if self.source in built_in_arms():
+            return {}
+        if path.suffix in (".urdf", ".xml"):
+            return {self.name: lock_joints(path, self.tip, self.locks, folder).text}
+        return {self.name: path.read_bytes()}
+
+
+def read_robot(options: Options) -> ImportedRobot | None:
+    """The robot that the options robot, tip and lock name; None where none is named.
+
+    Raises InputError, and UndecidedError for the option tip where a file has several branches of moving joints.
+    """
+    source, tip, locks = options.get("robot"), options.get("tip"), parse_locks(options.get("lock") or ())
+    if source is None:
+        if tip or locks:
+            raise InputError("--tip and --lock belong to a robot file: give it with --robot")
+        return None
+    if not tip and not locks:
+        return ImportedRobot(load_arm(source), source, None, {}, "")
+    if source in built_in_arms():
+        raise InputError(f"--tip and --lock need a URDF or MJCF file; {source} is built in, as one chain of joints")
+    robot: LockedRobot = lock_joints(Path(source), tip, locks, Path(source).parent)
+    return ImportedRobot(robot.arm, source, tip, locks, robot.words)

@@ -1,0 +1,152 @@
+"""The tree of joints of a robot file, before it is an arm: where arms end, and what to lock so that one is left."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from armlab.common.errors import InputError, UndecidedError
+from armlab.common.settings import suggest_name
+
+
+@dataclass(frozen=True)
+class Follower:
+    """A joint that moves with another one: position = multiplier * that of the leader + offset."""
+
+    leader: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class TreeJoint:
+    """A joint between two links. moves: false for a fixed one. limits: of its position, rad or m."""
+
+    name: str
+    parent: str
+    child: str
+    moves: bool = True
+    limits: tuple[float, float] = (-np.inf, np.inf)
+    follows: Follower | None = None
+
+    @property
+    def free(self) -> bool:
+        """Whether it moves on its own."""
+        return self.moves and self.follows is None
+
+
+@dataclass(frozen=True)
+class KinematicTree:
+    """All joints of a robot file; where: the file, for messages."""
+
+    where: str
+    joints: tuple[TreeJoint, ...]
+
+    def locked_positions(self, tip: str | None, given: Mapping[str, float]) -> dict[str, float]:
+        """The joints to lock, each with its position, rad or m.
+
+        tip: the link where the arm ends: all moving joints that are not on the way from the base to it are locked, at
+        zero or at the limit next to it where nothing else is given. given: positions of joints to lock by name. A joint
+        that follows a locked one is locked with it, and one that leads it stands where it has to. Raises InputError for
+        unknown names and for positions out of limits.
+        """
+        positions = {name: self._checked(name, position) for name, position in given.items()}
+        if tip is not None:
+            way = self._way_to(tip)
+            beside = {joint.name: joint for joint in self.joints if joint.moves and joint not in way}
+            for joint in beside.values():
+                if (
+                    joint.follows
+                    and joint.name in given
+                    and joint.follows.leader in beside
+                    and joint.follows.multiplier
+                ):
+                    leader = (given[joint.name] - joint.follows.offset) / joint.follows.multiplier
+                    positions.setdefault(joint.follows.leader, leader)
+            for joint in beside.values():
+                if joint.free:
+                    positions.setdefault(joint.name, float(np.clip(0.0, *joint.limits)))
+        waiting = [joint for joint in self.joints if joint.follows is not None and joint.name not in positions]
+        while waiting:
+            ready = [joint for joint in waiting if joint.follows and joint.follows.leader in positions]
+            for joint in ready:
+                assert joint.follows is not None
+                leader = positions[joint.follows.leader]
+                positions[joint.name] = joint.follows.multiplier * leader + joint.follows.offset
+            waiting = [joint for joint in waiting if joint not in ready]
+            if not ready:
+                break
+        return positions
+
+    @cached_property
+    def ends(self) -> dict[str, int]:
+        """Links where an arm may end, each with its number of moving joints, most joints first.
+
+        An arm ends where several branches move, unless more joints come behind that place than before it. A joint that
+        follows another one is never a part of it.
+        """
+        children = {joint.child for joint in self.joints}
+        roots = dict.fromkeys(joint.parent for joint in self.joints if joint.parent not in children)
+        found = [end for root in roots for end in self._ends_behind(root, 0)]
+        return dict(sorted(found, key=lambda end: -end[1]))
+
+    def refuse(self, message: str) -> InputError:
+        """The error for a tree that is no single chain, with the links that --tip may name."""
+        if not self.ends:
+            return InputError(message)
+        ends = ", ".join(f"{link} ({count} joint{'s' * (count > 1)})" for link, count in self.ends.items())
+        return UndecidedError(
+            f"{message}; `armlab lock-joints` and `armlab recording import` take one arm of it: --tip {ends}",
+            "tip",
+            tuple(self.ends),
+        )
+
+    def _checked(self, name: str, position: float) -> float:
+        known = {joint.name: joint for joint in self.joints if joint.moves}
+        if name not in known:
+            raise InputError(f"--lock: {self.where} has no moving joint '{name}': {suggest_name(name, tuple(known))}")
+        low, high = known[name].limits
+        if not low <= position <= high:
+            raise InputError(f"--lock {name}={position:g} should lie within the joint's limits, {low:g} to {high:g}")
+        return position
+
+    def _way_to(self, tip: str) -> tuple[TreeJoint, ...]:
+        """The joints from the base to a link."""
+        before = {joint.child: joint for joint in self.joints}
+        links = (*dict.fromkeys(joint.parent for joint in self.joints), *before)
+        if tip not in links:
+            raise InputError(
+                f"--tip: {self.where} has no link '{tip}': {suggest_name(tip, tuple(dict.fromkeys(links)))}"
+            )
+        way: list[TreeJoint] = []
+        link = tip
+        while link in before and before[link] not in way:
+            way.append(before[link])
+            link = before[link].parent
+        if not any(joint.moves for joint in way):
+            raise InputError(f"--tip {tip}: no moving joint of {self.where} lies before this link")
+        return tuple(reversed(way))
+
+    def _ends_behind(self, link: str, before: int) -> list[tuple[str, int]]:
+        """Ends of arms behind a link that has some moving joints before it."""
+        behind = {joint: self._longest_from(joint) for joint in self.joints if joint.parent == link}
+        moving = [joint for joint in behind if any(each.moves for each in self._joints_from(joint))]
+        free = [joint for joint in moving if behind[joint]]
+        if not free or (len(moving) > 1 and before >= max(behind.values())):
+            return [(link, before)] if before else []
+        return [end for joint in free for end in self._ends_behind(joint.child, before + joint.free)]
+
+    def _longest_from(self, joint: TreeJoint, seen: Sequence[TreeJoint] = ()) -> int:
+        """The most free joints in one chain from a joint on, itself included; none behind one that follows another."""
+        if joint.follows is not None or joint in seen:
+            return 0
+        lengths = [self._longest_from(each, (*seen, joint)) for each in self.joints if each.parent == joint.child]
+        return joint.free + max(lengths, default=0)
+
+    def _joints_from(self, joint: TreeJoint) -> list[TreeJoint]:
+        """A joint and all behind it."""
+        found = [joint]
+        for each in found:
+            found += [other for other in self.joints if other.parent == each.child and other not in found]
+        return found
