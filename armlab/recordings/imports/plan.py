@@ -10,6 +10,7 @@ from pathlib import Path
 from armlab.common.errors import InputError, UndecidedError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.columns import Log, choose_columns, choose_commands
+from armlab.recordings.imports.impossible import ask_impossible_units
 from armlab.recordings.imports.proposals import propose_robot
 from armlab.recordings.imports.questions import Options, Question
 from armlab.recordings.imports.scales import choose_gains, choose_units
@@ -66,6 +67,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     _check_sources(sources, columns)
     units, unmeasured = choose_units(log, columns)
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
+    impossible = ask_impossible_units(log, sources, columns, units, gains)
     count = len(columns["position"]) if "position" in columns else None
     robots = () if robot else (_ask_robot(files[0], count, log.joints),)
     return ImportPlan(
@@ -76,7 +78,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         units=units,
         gains=gains,
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
-        questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *_ask_out(files, options)),
+        questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
     )
 
 
