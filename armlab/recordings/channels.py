@@ -9,6 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
+from armlab.recordings.possible import FASTEST_HZ, SLOWEST_HZ
 from armlab.recordings.recording import AnyRun, Finding, MotionRun, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, TimingEntry
 from armlab.recordings.table import Table
@@ -216,8 +217,6 @@ def read_late(run: Run, delay: Array) -> Run:
     return replace(run, torque=np.column_stack(shifted)).rows(kept)
 
 
-SLOWEST_HZ = 5.0  # no drive is recorded more slowly
-FASTEST_HZ = 1e6  # nor faster
 RATE_TOLERANCE = 0.02  # relative: clocks that are off by so little are one clock
 
 

@@ -18,6 +18,7 @@ from armlab.recordings.motion import (
     with_motion_runs,
 )
 from armlab.recordings.motion_check import check_answers
+from armlab.recordings.possible import LIMIT_TOLERANCE_FACTOR, has_usual_position
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.signs import compare_standstill
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -27,7 +28,6 @@ from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
-LIMIT_TOLERANCE_FACTOR = 1.05  # times a limit: calibration and rounding aside
 MIN_SLOPE_CORRELATION = 0.9  # correlation of a velocity channel with the slope of its position
 
 
@@ -93,9 +93,8 @@ def _longest_repetition(values: Array) -> tuple[int, int]:
 def _find_limit_violations(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     limits = arm.joints[joint].limits
     low, high = run.position[:, joint].min(), run.position[:, joint].max()
-    slack = (LIMIT_TOLERANCE_FACTOR - 1) * (limits.position[1] - limits.position[0])
     found = []
-    if np.isfinite(slack) and (low < limits.position[0] - slack or high > limits.position[1] + slack):
+    if not has_usual_position(arm.joints[joint], low, high):
         text = (
             f"position of joint {joint + 1} runs from {low:.4g} to {high:.4g}, its limits are "
             f"{limits.position[0]:.4g} and {limits.position[1]:.4g}: another unit, zero or robot?"

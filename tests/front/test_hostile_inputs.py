@@ -18,6 +18,7 @@ from algorithms.driver import minimise
 from algorithms.random_search import RandomSearch
 from armlab.cli.main import main
 from armlab.common.files import write_texts
+from armlab.effects.example import write_example
 
 
 def run_refused(folder: Path, *words: object) -> str:
@@ -142,6 +143,24 @@ def test_a_separator_of_several_characters_is_refused(tmp_path: Path) -> None:
     (tmp_path / "run.csv").write_text("1,2\n3,4\n")
     words = ("recording", "import", tmp_path / "run.csv", "--separator", "banana", "--out", tmp_path / "new")
     assert "'banana' should be one character" in run_refused(tmp_path, *words)
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        (("time=s",), "--unit time=ns?"),
+        (("time=ms",), "--unit time=ns?"),
+        (("time=us",), "--unit time=ns?"),
+        (("torque=A", "--gains", "1e6,1e6,1e6"), "--unit torque=mA?"),
+    ],
+)
+def test_an_import_in_units_that_cannot_be_right_is_refused(
+    tmp_path: Path, units: tuple[str, ...], message: str
+) -> None:
+    write_example(tmp_path / "log")
+    files = tmp_path / "log" / "run-1.csv", "--robot", tmp_path / "log" / "robot.yaml"
+    given = [word for each in units for word in (("--unit", each) if "=" in each else (each,))]
+    assert message in run_refused(tmp_path, "recording", "import", *files, "--out", tmp_path / "new", *given)
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,42 @@ def bracketed(stem: str) -> tuple[str, ...]:
 
 
 @pytest.mark.parametrize(
+    ("names", "change", "columns", "units"),
+    [
+        (
+            ("timestamp_ns", *(f"actual_q_{n}" for n in range(3)), *bracketed("x")),
+            {"torque": "x*", "units": ("torque=Nm",)},
+            {"time": "a usual name of stamps", "position": "named as in UR's RTDE", "torque": "given with --torque"},
+            {"time": "the column's name ends in _ns", "position": "as in UR's RTDE", "torque": "given with --unit"},
+        ),
+        (
+            ("t", *(f"position_{n}" for n in JOINT_NAMES), *(f"effort_{n} [N.m]" for n in JOINT_NAMES)),
+            {},
+            {
+                "time": "a usual name of stamps",
+                "position": "named as in ROS joint states, joints matched by name",
+                "torque": "named as in ROS joint states, joints matched by name",
+            },
+            {
+                "time": "the steps make 200 Hz, a usual rate",
+                "position": "as in ROS joint states",
+                "torque": "the header names it",
+            },
+        ),
+    ],
+)
+def test_what_was_recognised_has_a_reason_each(
+    tmp_path: Path, names: tuple[str, ...], change: dict, columns: dict[str, str], units: dict[str, str]
+) -> None:
+    stamps = frame()["t"].to_numpy() * (1e9 if names[0].endswith("_ns") else 1.0)
+    path = write_log(tmp_path / "log.csv", names, stamps)
+    imported = import_files([path], tmp_path / "new", {**NOTHING, "robot": write_robot(tmp_path), **change})
+    assert imported.document["reasons"] == {"columns": columns, "units": units}
+    assert f"position columns: {columns['position']}" in imported.lines
+    assert f"time unit: {imported.plan.units['time']}: {units['time']}" in imported.lines
+
+
+@pytest.mark.parametrize(
     ("names", "gains"),
     [
         (("timestamp", *(f"actual_q_{n}" for n in range(3)), *(f"actual_current_{n}" for n in range(3))), "1,1,1"),

@@ -159,7 +159,7 @@ def _changed(found: Comparison) -> list[Change]:
 
 
 def own_model_explains(recording: Recording, desk: Desk) -> tuple[bool | None, str]:
-    """The found model, handed back as the simulation, leaves nothing to name."""
+    """The found model, handed back as the simulation, leaves nothing to name but what the verdict left open itself."""
     found = desk.diagnose(recording)
     if found.model is None:
         return None, found.summary
@@ -167,8 +167,10 @@ def own_model_explains(recording: Recording, desk: Desk) -> tuple[bool | None, s
         path = Path(folder) / "model.yaml"
         path.write_text(model_text(model_found(found), Path(folder)), encoding="utf-8")
         again = diagnose(replace(recording, simulation=path), "nominal")
-    names = _names(again)
-    return not names, ", ".join(names) or f"status {again.status}"
+    named = {name for name in _names(found) if name.startswith("unknown@")}
+    left_open = named | {f"unknown@{each.joint}" for each in found.unexplained}
+    new = [name for name in _names(again) if name not in left_open]
+    return not new, ", ".join(new) or f"left open in both: {', '.join(_names(again)) or 'nothing'}"
 
 
 def same_however_written(recording: Recording, desk: Desk) -> tuple[bool | None, str]:

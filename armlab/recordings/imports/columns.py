@@ -10,6 +10,7 @@ from armlab.recordings.imports.proposals import match_joints, propose_columns, p
 from armlab.recordings.imports.questions import NO_TORQUE, Options, Question
 from armlab.recordings.imports.recognition import (
     JointNamesError,
+    Known,
     check_joint_order,
     order_by_joint,
     recognise_signal,
@@ -84,12 +85,12 @@ def _column_text(signal: str, joints: Sequence[str]) -> str:
 
 def choose_columns(
     log: Log, commands: Mapping[str, tuple[str, ...]], unmatched: Sequence[Question]
-) -> tuple[dict[str, tuple[str, ...]], tuple[Question, ...]]:
+) -> tuple[dict[str, Known], tuple[Question, ...]]:
     """Columns of each signal as given, else as recognised; a question for each that is missing.
 
     commands, unmatched: columns and questions of a log whose format tells its commands.
     """
-    columns: dict[str, tuple[str, ...]] = {}
+    columns: dict[str, Known] = {}
     questions: list[Question] = []
     motion = bool(commands or unmatched or log.options.get("reference_position") is not None)
     settled = {question.option for question in unmatched if question.option not in commands}
@@ -97,10 +98,11 @@ def choose_columns(
     for signal in SIGNAL_QUANTITIES:
         given = log.options.get(signal)
         if given is None and signal in commands:
-            columns[signal] = commands[signal]
+            columns[signal] = Known(commands[signal], "the format tells it, joints matched by name")
         elif given or (given is not None and signal != "reference_position"):
             try:
-                columns[signal] = _expand_names(given, names, signal, log.joints, motion)
+                expanded = _expand_names(given, names, signal, log.joints, motion)
+                columns[signal] = Known(expanded, f"given with --{signal.replace('_', '-')}")
             except JointNamesError as error:
                 questions.append(_ask_columns(log, signal, columns, str(error)))
         elif given is not None or (signal in ASKED_SIGNALS and not (signal == "torque" and motion)):
@@ -118,16 +120,12 @@ def choose_columns(
     return columns, tuple(questions)
 
 
-def _recognise(log: Log, signal: str) -> tuple[str, ...] | None:
-    table = log.source.table
-    if signal == "time":
-        found = recognise_time(table.names, table.values)
-    else:
-        found = recognise_signal(table.names, signal, log.joints)
-    return found.names if found else None
+def _recognise(log: Log, signal: str) -> Known | None:
+    names = log.source.table.names
+    return recognise_time(names) if signal == "time" else recognise_signal(names, signal, log.joints)
 
 
-def _ask_columns(log: Log, signal: str, columns: Mapping[str, Sequence[str]], reason: str | None) -> Question:
+def _ask_columns(log: Log, signal: str, columns: Mapping[str, Known], reason: str | None) -> Question:
     names, values = log.source.table.names, log.source.table.values
     shown = ", ".join(names[:SHOWN_COLUMNS]) + (", ..." if len(names) > SHOWN_COLUMNS else "")
     other = ", or --reference-position of a position servo" if signal == "torque" else ""
@@ -138,7 +136,8 @@ def _ask_columns(log: Log, signal: str, columns: Mapping[str, Sequence[str]], re
         text += f", or '{NO_TORQUE}' for a log of commands and positions"
     if signal == "time":
         return Question(signal, missing, text, propose_time(names, values))
-    proposal = ",".join(propose_columns(names, signal, log.joints, columns))
+    chosen = {name: known.value for name, known in columns.items()}
+    proposal = ",".join(propose_columns(names, signal, log.joints, chosen))
     return Question(signal, missing, text, proposal or None)
 
 

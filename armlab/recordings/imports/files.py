@@ -49,6 +49,7 @@ class ImportedRecording:
             ],
             "columns": self.plan.columns,
             "units": self.plan.units,
+            "reasons": {"columns": self.plan.column_reasons, "units": self.plan.unit_reasons},
         }
 
 
@@ -84,11 +85,15 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
 
 
 def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
-    """How each file was read, and what each signal was taken from, as far as that is known: names and texts."""
+    """How each file was read, what each signal was taken from, and why, as far as that is known: names and texts."""
     rows = [(path, _describe_source(source)) for path, source in plan.sources.items()]
     if plan.robot:
         rows.append(("robot", "; ".join(filter(None, (plan.robot.source, plan.robot.locked)))))
-    rows += [(signal, f"{', '.join(names)} [{_describe_unit(plan, signal)}]") for signal, names in plan.columns.items()]
+    for signal, names in plan.columns.items():
+        rows.append((signal, f"{', '.join(names)} [{_describe_unit(plan, signal)}]"))
+        rows.append((f"{signal} columns", plan.column_reasons[signal]))
+        if signal in plan.units:
+            rows.append((f"{signal} unit", f"{_describe_unit(plan, signal)}: {plan.unit_reasons[signal]}"))
     if plan.joints:
         rows.append(("joints", f"{', '.join(plan.joints)}; the others of the robot are held at zero"))
     return rows

@@ -10,6 +10,7 @@ from pathlib import Path
 from armlab.common.errors import InputError, UndecidedError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.columns import Log, choose_columns, choose_commands
+from armlab.recordings.imports.impossible import ask_impossible_units
 from armlab.recordings.imports.proposals import propose_robot
 from armlab.recordings.imports.questions import Options, Question
 from armlab.recordings.imports.robots import ImportedRobot, read_robot
@@ -27,8 +28,9 @@ class ImportPlan:
     """A recording to be written once no question is open.
 
     options: as they were given. robot: None while it is open. sources: by the path of the run. columns: names by the
-    signal. units: of each signal, one for all its columns or one a column. gains: of the torque, where it is in A
-    or V. joints: of the robot, in the order of the columns, where the recording has only some of them.
+    signal. units: of each signal, one for all its columns or one a column. column_reasons, unit_reasons: why these, by
+    the signal. gains: of the torque, where it is in A or V. joints: of the robot, in the order of the columns, where
+    the recording has only some of them.
     """
 
     options: Options
@@ -36,6 +38,8 @@ class ImportPlan:
     sources: Mapping[str, Source] = field(default_factory=dict)
     columns: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     units: Mapping[str, str | tuple[str, ...]] = field(default_factory=dict)
+    column_reasons: Mapping[str, str] = field(default_factory=dict)
+    unit_reasons: Mapping[str, str] = field(default_factory=dict)
     gains: tuple[float, ...] | None = None
     joints: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
@@ -62,10 +66,13 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     _check_validate(options["validate"], sources)
     log = Log(next(iter(sources.values())), options, arm, chosen or whole)
     log, commands, unmatched = choose_commands(log)
-    columns, unnamed = choose_columns(log, commands, unmatched)
+    chosen_columns, unnamed = choose_columns(log, commands, unmatched)
+    columns = {signal: known.value for signal, known in chosen_columns.items()}
     _check_sources(sources, columns)
-    units, unmeasured = choose_units(log, columns)
+    chosen_units, unmeasured = choose_units(log, columns)
+    units = {name: known.value[0] if len(known.value) == 1 else known.value for name, known in chosen_units.items()}
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
+    impossible = ask_impossible_units(log, sources, columns, units, gains)
     count = len(columns["position"]) if "position" in columns else None
     robots = () if robot else (undecided or _ask_robot(files[0], count, log.joints),)
     return ImportPlan(
@@ -74,9 +81,11 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         sources=sources,
         columns=columns,
         units=units,
+        column_reasons={signal: known.reason for signal, known in chosen_columns.items()},
+        unit_reasons={signal: known.reason for signal, known in chosen_units.items()},
         gains=gains,
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
-        questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *_ask_out(files, options)),
+        questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
     )
 
 

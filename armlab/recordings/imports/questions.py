@@ -26,7 +26,8 @@ class Question:
         """The options with an answer in its place."""
         given = answer.strip()
         if self.option == "units":
-            return {**options, "units": (*options["units"], f"{self.signal}={given}")}
+            others = [each for each in options["units"] if each.partition("=")[0] != self.signal]
+            return {**options, "units": (*others, f"{self.signal}={given}")}
         if self.option == "torque" and given.lower() == NO_TORQUE:
             return {**options, "reference_position": ""}
         return {**options, self.option: given}

@@ -15,30 +15,42 @@ from armlab.common.errors import InputError
 from armlab.recordings.units import TIME_UNITS
 
 TIME_NAMES = ("__time", "time", "timestamp", "timestamps", "stamp", "t", "robot_time", "header_stamp")
-STEMS: Mapping[str, tuple[str, str | None]] = {
-    "tau_j": ("torque", "N.m"),  # Franka
-    "effort": ("torque", "N.m"),  # ROS joint states
-    "measured_torque": ("torque", "N.m"),  # KUKA FRI
-    "geartorque.a": ("torque", "N.m"),  # KUKA RSI: torque on the side of the gear's output
-    "macur.a": ("torque", None),  # KUKA RSI: motor current
-    "actual_joint_torque": ("torque", "N.m"),
-    "joint_torque": ("torque", None),
-    "torque": ("torque", None),
-    "tau": ("torque", None),
-    "trq": ("torque", None),
-    "actual_current": ("torque", "A"),  # UR RTDE
-    "joint_current": ("torque", None),
-    "motor_current": ("torque", None),
-    "current": ("torque", None),
-    "actual_q": ("position", "rad"),  # UR RTDE
-    "measured_joint_position": ("position", "rad"),  # KUKA FRI
-    "aipos.a": ("position", "deg"),  # KUKA RSI
-    "position": ("position", "rad"),  # ROS joint states
-    "joint_position": ("position", None),
-    "joint_pos": ("position", None),
-    "joint_angle": ("position", None),
-    "q": ("position", None),
-    "pos": ("position", None),
+
+
+@dataclass(frozen=True)
+class Stem:
+    """What the columns with a stem hold; unit: None where the stem does not tell it. writer: whose logs have it."""
+
+    signal: str
+    unit: str | None = None
+    writer: str | None = None
+
+
+UR, FRANKA, ROS = "UR's RTDE", "Franka's library", "ROS joint states"
+STEMS: Mapping[str, Stem] = {
+    "tau_j": Stem("torque", "N.m", FRANKA),
+    "effort": Stem("torque", "N.m", ROS),
+    "measured_torque": Stem("torque", "N.m", "KUKA's FRI"),
+    "geartorque.a": Stem("torque", "N.m", "KUKA's RSI"),  # on the side of the gear's output
+    "macur.a": Stem("torque", None, "KUKA's RSI"),  # motor current
+    "actual_joint_torque": Stem("torque", "N.m"),
+    "joint_torque": Stem("torque"),
+    "torque": Stem("torque"),
+    "tau": Stem("torque"),
+    "trq": Stem("torque"),
+    "actual_current": Stem("torque", "A", UR),
+    "joint_current": Stem("torque"),
+    "motor_current": Stem("torque"),
+    "current": Stem("torque"),
+    "actual_q": Stem("position", "rad", UR),
+    "measured_joint_position": Stem("position", "rad", "KUKA's FRI"),
+    "aipos.a": Stem("position", "deg", "KUKA's RSI"),
+    "position": Stem("position", "rad", ROS),
+    "joint_position": Stem("position"),
+    "joint_pos": Stem("position"),
+    "joint_angle": Stem("position"),
+    "q": Stem("position"),
+    "pos": Stem("position"),
 }
 STEMS_BEFORE_JOINT_NAMES = ("position", "effort", "torque", "joint_position", "joint_torque")
 FRANKA_STEM, FRANKA_UNITS = "tau_j", {"q": "rad"}
@@ -73,36 +85,36 @@ class Column:
 
 
 @dataclass(frozen=True)
-class Found:
-    """Columns of a signal in the order of the robot's joints; unit: None where it is not known."""
+class Known:
+    """What is known of a signal, the names of its columns or its unit, and the reason."""
 
-    names: tuple[str, ...]
-    unit: str | None
-
-
-def recognise_time(names: Sequence[str], values: Array) -> Found | None:
-    """The time column, by its name, and its unit. values: (samples, columns)."""
-    for place, name in enumerate(names):
-        if _split_unit(name).stem in TIME_NAMES:
-            return Found((name,), time_unit(name, values[:, place]))
-    return None
+    value: tuple[str, ...]
+    reason: str
 
 
-def time_unit(name: str, stamps: Array) -> str | None:
+def recognise_time(names: Sequence[str]) -> Known | None:
+    """The time column, by its name."""
+    found = next((name for name in names if _split_unit(name).stem in TIME_NAMES), None)
+    return Known((found,), "a usual name of stamps") if found is not None else None
+
+
+def time_unit(name: str, stamps: Array) -> Known | None:
     """The unit of a time column: by its name, else by its steps, of which at most one unit makes a usual rate."""
     named = _split_unit(name).unit
     if named in TIME_UNITS:
-        return named
+        return Known((named,), _reason_of_suffix((name,)))
     steps = np.diff(stamps[np.isfinite(stamps)])
     steps = steps[steps > 0]
     if not len(steps):
         return None
     rate = 1 / float(np.median(steps))
     fitting = [name for name, unit in TIME_UNITS.items() if RATES_HZ[0] <= rate / unit.factor <= RATES_HZ[1]]
-    return fitting[0] if fitting else None
+    if not fitting:
+        return None
+    return Known((fitting[0],), f"the steps make {rate / TIME_UNITS[fitting[0]].factor:.4g} Hz, a usual rate")
 
 
-def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -> Found | None:
+def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -> Known | None:
     """The columns of a signal, one a joint, or None.
 
     joints: names, in the robot's order; empty while the robot is unknown, and then any number of columns will do.
@@ -111,28 +123,39 @@ def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -
     name other joints.
     """
     columns = [split_name(name) for name in names]
-    for stem, (meaning, _) in STEMS.items():
+    for stem, meaning in STEMS.items():
         group = tuple(column.name for column in columns if column.stem == stem and column.key)
-        if meaning != signal or not group:
+        if meaning.signal != signal or not group:
             continue
+        reason = f"named as in {meaning.writer}" if meaning.writer else f"usual names of {signal}"
         if not joints:
-            return Found(group, unit_by_name(group, names))
+            return Known(group, reason)
         own = tuple(name for name, owner in zip(group, _owners(group, joints), strict=True) if owner)
         if len(own) == len(joints) or len(group) == len(joints):
             chosen = order_by_joint(own if len(own) == len(joints) else group, joints, signal)
-            return Found(chosen, unit_by_name(chosen, names))
+            return Known(chosen, reason + (", joints matched by name" if set(chosen) == set(own) else ""))
     return None
 
 
-def unit_by_name(chosen: Sequence[str], names: Sequence[str]) -> str | None:
+def unit_by_name(chosen: Sequence[str], names: Sequence[str]) -> Known | None:
     """The unit that the names of a signal's columns tell, or their driver; names: of all columns of the file."""
     columns = [split_name(name) for name in chosen]
     stems, units = {column.stem for column in columns}, {column.unit for column in columns}
     if len(stems) > 1 or len(units) > 1:
         return None
-    stem = stems.pop()
+    stem, suffix = stems.pop(), units.pop()
+    if suffix is not None:
+        return Known((suffix,), _reason_of_suffix(chosen))
+    known = STEMS.get(stem)
+    if known is not None and known.unit is not None:
+        return Known((known.unit,), f"as in {known.writer}" if known.writer else "the name tells it")
     franka = FRANKA_UNITS.get(stem) if any(split_name(name).stem == FRANKA_STEM for name in names) else None
-    return units.pop() or STEMS.get(stem, ("", None))[1] or franka
+    return Known((franka,), f"as in {FRANKA}") if franka else None
+
+
+def _reason_of_suffix(names: Sequence[str]) -> str:
+    whose = "the column's name ends" if len(names) == 1 else "the columns' names end"
+    return f"{whose} in _{names[0].rpartition('_')[2]}"
 
 
 def split_name(name: str) -> Column:

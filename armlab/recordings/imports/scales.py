@@ -8,7 +8,7 @@ from armlab.recordings.channels import MAX_GAIN
 from armlab.recordings.imports.columns import Log
 from armlab.recordings.imports.proposals import propose_unit
 from armlab.recordings.imports.questions import Question
-from armlab.recordings.imports.recognition import time_unit, unit_by_name
+from armlab.recordings.imports.recognition import Known, time_unit, unit_by_name
 from armlab.recordings.imports.sources import Source
 from armlab.recordings.units import DRIVE_UNITS, SENSOR_SIGNALS, SIGNAL_QUANTITIES
 
@@ -29,28 +29,30 @@ UNIT_ALIASES = {
 }
 
 
-def choose_units(
-    log: Log, columns: Mapping[str, tuple[str, ...]]
-) -> tuple[dict[str, str | tuple[str, ...]], tuple[Question, ...]]:
-    """Units of each signal as given, else as the file or the names tell; a question for each that is missing."""
+def choose_units(log: Log, columns: Mapping[str, tuple[str, ...]]) -> tuple[dict[str, Known], tuple[Question, ...]]:
+    """Units of each signal as given, else as the file or the names tell; a question for each that is missing.
+
+    One unit for all columns of a signal, or one a column where they differ.
+    """
     given = dict(_parse_unit_option(text) for text in log.options["units"])
     source = log.source
-    units: dict[str, str | tuple[str, ...]] = {}
+    units: dict[str, Known] = {}
     questions: list[Question] = []
     for signal, names in columns.items():
         known = [_parse_unit(signal, source.units[name]) if name in source.units else None for name in names]
-        one = given.get(signal) or (None if all(known) else _unit_by_name(source, signal, names))
+        own = Known((given[signal],), "given with --unit") if signal in given else None
+        one = own or (None if all(known) else _unit_by_name(source, signal, names))
         if one is None and source.same_units.get(signal) in columns and not any(known):
             same = source.same_units[signal]
             if same in units:
-                units[signal] = units[same]
+                units[signal] = Known(units[same].value, f"that of {same} in this format")
             continue
         if one is not None:
-            _check_unit(signal, one, log)
+            _check_unit(signal, one.value[0], log)
             units[signal] = one
         elif all(known):
             listed = tuple(unit for unit in known if unit)
-            units[signal] = listed[0] if len(set(listed)) == 1 else listed
+            units[signal] = Known(listed[:1] if len(set(listed)) == 1 else listed, source.reason)
         else:
             values = source.table.columns(names, signal)
             proposal = propose_unit(signal, names, values, log.sliding)
@@ -71,11 +73,11 @@ def _check_unit(signal: str, unit: str, log: Log) -> None:
         raise InputError(f"--unit {signal}={unit} does not fit joints that are {kinds.pop()}: give one of {known}")
 
 
-def _unit_by_name(source: Source, signal: str, names: tuple[str, ...]) -> str | None:
+def _unit_by_name(source: Source, signal: str, names: tuple[str, ...]) -> Known | None:
     if signal == "time":
         return time_unit(names[0], source.table.columns(names, signal)[:, 0])
     unit = unit_by_name(names, source.table.names)
-    return unit if unit in SIGNAL_QUANTITIES[signal].units else None
+    return unit if unit is not None and unit.value[0] in SIGNAL_QUANTITIES[signal].units else None
 
 
 def _missing_unit(signal: str, proposal: str) -> str:
