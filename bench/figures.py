@@ -82,6 +82,7 @@ def _set_style() -> None:
     matplotlib.rc("grid", alpha=0.3)
     matplotlib.rc("legend", frameon=False)
     matplotlib.rc("svg", hashsalt="armlab")  # else every SVG has random ids
+    matplotlib.rc("pdf", fonttype=42)  # publishers refuse fonts of type 3
 
 
 def _image_bytes(figure: Figure, suffix: str) -> bytes:

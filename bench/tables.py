@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 
 from armlab.common.arrays import Array
-from armlab.common.markdown import latex_table, markdown_page, markdown_table
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.report.page import Table
 from bench.config import Experiment
 from bench.execute import Curves
 from bench.plan import Entry
@@ -172,11 +173,12 @@ def summary_page(table: pd.DataFrame, experiment: Experiment) -> str:
     return markdown_page(experiment.name, _settings_line(experiment), markdown_table(headings, rows), *notes)
 
 
-def summary_latex(table: pd.DataFrame) -> str:
-    """A summary table as a table of LaTeX."""
+def summary_for_print(table: pd.DataFrame) -> Table:
+    """A summary table as the cells that a paper prints."""
     names = [name for name in table.columns if name not in _SUMMARY_HEADINGS]
     rows = [_summary_cells(row, names, beside=False) for row in table.to_dict("records")]
-    return latex_table([*names, *_SUMMARY_HEADINGS.values()], rows)
+    texts = [place for place, name in enumerate(names) if name != "swarm_size"]
+    return Table([*names, *_SUMMARY_HEADINGS.values()], rows, texts)
 
 
 def _settings_line(experiment: Experiment) -> str:

@@ -157,6 +157,14 @@ def shared_results() -> dict[str, str]:
         return {path.name: path.read_text() for path in sorted((folder / "shared").iterdir())}
 
 
+@cache
+def exported_record() -> tuple[dict[str, Any], dict[str, Any]]:
+    """The problem of the exported record, and a file of records that has this one alone."""
+    content = json.loads((Path(__file__).parents[1] / "results" / "best_known.json").read_text(encoding="utf-8"))
+    record = content["problems"][RECORD]
+    return record["settings"], content | {"problems": {RECORD: record}}
+
+
 def mutate(content: Any, rng: random.Random) -> Any:
     """The content with one key or entry replaced, removed or added."""
     if isinstance(content, dict) and content and rng.random() < 0.8:
@@ -224,6 +232,14 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
     (folder / "arm.yaml").write_text(yaml.safe_dump(arm | {"joints": limited}))
     verdict = mutate(VERDICT, rng) if damaged == "verdict" else VERDICT
     (folder / "verdict.json").write_text(json.dumps(verdict))
+    (folder / "earlier").mkdir()
+    (folder / "earlier" / "next.json").write_text(json.dumps(verdict))
+    (folder / "records").mkdir()
+    problem, records = exported_record()
+    for name, content in (("problem.yaml", problem), ("records/best_known.json", records)):
+        whole = mutate(content, rng) if Path(name).stem == damaged else content
+        text = yaml.safe_dump(whole) if name.endswith(".yaml") else json.dumps(whole)
+        (folder / name).write_text(text)
     (folder / "servo").mkdir()
     servo = mutate(SERVO_RECORDING, rng) if damaged == "servo" else SERVO_RECORDING
     (folder / "servo" / "recording.yaml").write_text(yaml.safe_dump(servo))
@@ -242,6 +258,8 @@ def _write_results(folder: Path, rng: random.Random, damaged: str) -> None:
         (folder / "shared" / name).write_text(text)
 
 
+RECORD = "joint-fourier-rest-250hz"
+EXPORT = f"export problem.yaml --record {RECORD} --results records --format ros2 --rate 250"
 NEXT = "next verdict.json --robot arm.yaml --evaluations 50 --duration 2 --rate 100 --harmonics 3 --out next"
 COMMANDS = {
     "base": "base robot.yaml",
@@ -264,7 +282,17 @@ COMMANDS = {
     "draw": "draw shared --out drawn",
     "share": "share shared --as latex --out tables",
     "compare": "compare shared shared --out compared",
+    "export": f"{EXPORT} --out motion.yaml",
+    "export-over-problem": f"{EXPORT} --out problem.yaml",
+    "export-over-records": f"{EXPORT} --out records/best_known.json",
+    "export-into-folder": f"{EXPORT} --out records",
+    "export-into-device": f"{EXPORT} --out /proc/none/motion.yaml",
+    "export-safe": f"{EXPORT} --floor -0.3 --keep-out 0.7,0.7,0.7,0.8,0.8,0.8 --out motion.yaml",
+    "export-recording": f"{EXPORT} --recording rec --out motion.yaml",
     "next": NEXT,
+    "next-robot": NEXT.replace("arm.yaml", "robot.yaml"),
+    "next-over-verdict": NEXT.replace("verdict.json", "earlier/next.json").replace("--out next", "--out earlier"),
+    "next-into-file": NEXT.replace("--out next", "--out verdict.json"),
     "next-safe": f"{NEXT} --floor -0.3 --keep-out 0.7,0.7,0.7,0.8,0.8,0.8 --near 0,0,0 --range -1:1,-1:1,-1:1 "
     "--clearance 0.01 --radius 0.05",
     "next-safety": f"{NEXT} --safety safety.yaml",
@@ -275,7 +303,10 @@ OF_RESULTS = ("report", "duels", "draw", "share", "compare")
 
 @dataclass(frozen=True)
 class Kind:
-    """What is damaged for a command, and how many seeds the list has. damaged: a file, or `words` of the command."""
+    """What is damaged for a command, and how many seeds the list has.
+
+    damaged: a file, `words` of the command, or `nothing`.
+    """
 
     command: str
     damaged: str
@@ -307,6 +338,18 @@ KINDS = (
     Kind("next", "words", 4),
     Kind("next-safe", "words", 12),
     Kind("next-safety", "safety", 12),
+    Kind("next-robot", "nothing", 1),
+    Kind("next-over-verdict", "nothing", 1),
+    Kind("next-into-file", "nothing", 1),
+    Kind("export", "problem", 40),
+    Kind("export", "best_known", 40),
+    Kind("export", "words", 60),
+    Kind("export-safe", "words", 30),
+    Kind("export-recording", "recording", 10),
+    Kind("export-over-problem", "nothing", 1),
+    Kind("export-over-records", "nothing", 1),
+    Kind("export-into-folder", "nothing", 1),
+    Kind("export-into-device", "nothing", 1),
     Kind("run", "words", 4),
     Kind("diagnose", "recording", 2),
     Kind("diagnose", "table", 2),

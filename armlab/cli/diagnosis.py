@@ -84,6 +84,13 @@ def next_experiment(
 @click.option("--as-read", is_flag=True, help="Do not look for mistakes of signs, columns, units, zeros.")
 @click.option("--only-setup", is_flag=True, help="Look for these mistakes alone, not for physics.")
 @click.option("--mcap", is_flag=True, help="Write signals.mcap for Foxglove, PlotJuggler, ros2 bag, too.")
+@click.option(
+    "--table",
+    "tables",
+    type=click.Choice(["latex", "pdf", "svg"]),
+    multiple=True,
+    help="Write the table of joints for a paper, too: joints.tex, .pdf, .svg; repeatable.",
+)
 @prints_result
 def diagnose(
     recordings: tuple[Path, ...],
@@ -97,6 +104,7 @@ def diagnose(
     as_read: bool,
     only_setup: bool,
     mcap: bool,
+    tables: tuple[str, ...],
 ) -> ResultLines:
     """Find the physics that the simulation of RECORDING lacks.
 
@@ -115,11 +123,13 @@ def diagnose(
         raise InputError("--as-read and --only-setup: give one of them")
     if old is not None and mcap:
         raise InputError("--mcap: a comparison has no predicted signals, leave out --mcap or --compare")
+    if old is not None and tables:
+        raise InputError("--table: a comparison has no table of joints, leave out --table or --compare")
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     motion_only = is_motion_only(recordings[0])
     if motion_only and (baseline or without or as_read or only_setup):
-        raise InputError("a recording of motion only takes --out, --set, --mcap, --compare: leave out the others")
+        raise InputError("a recording of motion only takes --out, --set, --mcap, --table, --compare: leave out others")
     if any(change.startswith("motion.") != motion_only for change in changes):
         raise InputError("--set: numbers of motion.* are for recordings of motion only, and these take no others")
     if old is not None and is_motion_only(old) != motion_only:
@@ -127,7 +137,7 @@ def diagnose(
     if motion_only and old is None:
         from armlab.diagnosis.motion.write import diagnose_motion_recording
 
-        return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap)
+        return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap, tables)
     if motion_only and old is not None:
         from armlab.diagnosis.motion.compare_write import compare_motion_recordings
 
@@ -135,7 +145,7 @@ def diagnose(
     if old is not None:
         return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
     return diagnose_recording(
-        recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap
+        recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap, tables
     )
 
 

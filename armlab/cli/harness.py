@@ -266,13 +266,19 @@ def compare(first: Path, second: Path, store: Path, out: Path | None) -> ResultL
 @click.command()
 @click.argument("results", type=_PATH)
 @_STORE_OPTION
-@click.option("--as", "form", type=click.Choice(["csv", "parquet", "ioh", "latex"]), default="csv", show_default=True)
+@click.option(
+    "--as",
+    "form",
+    type=click.Choice(["csv", "parquet", "ioh", "latex", "pdf", "svg"]),
+    default="csv",
+    show_default=True,
+)
 @click.option("--out", type=OutputPath(), required=True, help="Folder to write into.")
 @prints_result
 def share(results: Path, store: Path, form: str, out: Path) -> ResultLines:
     """Write RESULTS as tables or in IOHprofiler's format.
 
-    csv, parquet: tidy tables. ioh: the format of IOHprofiler. latex: the summary as a table of LaTeX (booktabs).
+    csv, parquet: tidy tables. ioh: the format of IOHprofiler. latex (booktabs), pdf, svg: the summary as a table.
     RESULTS: a configuration file whose trials were run, or a folder that `share` wrote.
     """
     from bench.result_sets.formats import share_results

@@ -14,12 +14,14 @@ from typing import Any
 
 import click
 
+from armlab.cli.output import json_option, quiet_option
 from armlab.common.documents import FailedResultError
 from armlab.common.errors import DataError, InputError, PlugInWarning
 from bench.errors import StoppedError, TrialsFailedError
 
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _SHOWN_CHARACTERS = 40  # of a name that is too long
+_FLAGS = {"--json": "as_json", "--quiet": "quiet"}  # that may stand before the command, with their names in click
 _GROUPS = {
     "Recordings": {
         "recording": "armlab.cli.recordings:recording",
@@ -107,13 +109,19 @@ class _CommandGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that the words name; the refusal of an unknown one says which was probably meant."""
+        """The command that the words name, told the options that stand before it.
+
+        The refusal of an unknown command says which was probably meant.
+        """
         try:
-            return super().resolve_command(ctx, args)
+            name, command, rest = super().resolve_command(ctx, args)
         except click.UsageError as error:
             close = get_close_matches(args[0], _COMMANDS, n=1)
             hint = f" Did you mean '{close[0]}'?" if close else ""
             raise click.UsageError(f"{error.message}{hint}", ctx) from None
+        place = 1 if isinstance(command, click.Group) and rest and not rest[0].startswith("-") else 0
+        given = [flag for flag, parameter in _FLAGS.items() if ctx.params.get(parameter)]
+        return name, command, [*rest[:place], *given, *rest[place:]]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands with their help lines, group by group."""
@@ -166,8 +174,10 @@ def _show_warning(usual: Callable[..., None], message: Warning, category: type[W
 
 
 @click.group(cls=_CommandGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@json_option
+@quiet_option
 @click.version_option(package_name="armlab")
-def main() -> None:
+def main(**_flags: bool) -> None:
     """Excitation trajectories, identification and diagnosis of robot arms."""
 
 

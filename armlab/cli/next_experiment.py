@@ -9,7 +9,7 @@ from typing import get_args
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
-from armlab.common.files import write_texts
+from armlab.common.files import refuse_inputs, write_texts
 from armlab.diagnosis.next.card import card_content, card_lines, draw_card
 from armlab.diagnosis.next.experiment import Experiment, design_experiment
 from armlab.diagnosis.next.motion import Budget
@@ -17,6 +17,7 @@ from armlab.diagnosis.next.prepare import LinkKnowledge
 from bench.trajectory_files import TRAJECTORY_FORMATS, sample_trajectory
 from problem.safe_motion import SafetySettings
 
+CARD, PICTURE = "next.json", "next.png"
 MOTION_FILES = {"csv": "next.csv", "ros2": "next.ros2.yaml", "rapid": "next.mod"}
 
 
@@ -35,11 +36,14 @@ def write_next_experiment(
 
     Raises InputError for a file or an option that cannot be used.
     """
+    refuse_inputs(
+        (verdict, Path(robot)), (out / name for name in (CARD, PICTURE, *MOTION_FILES.values())), "the motion"
+    )
     known_links: LinkKnowledge | None = next((each for each in get_args(LinkKnowledge) if each == links), None)
     experiment = design_experiment(verdict, robot, recording, rivals, budget, known_links, safety)
     yield from card_lines(experiment)
     card = card_content(experiment)
-    files: dict[str, str | bytes] = {"next.json": json.dumps(card, indent=1, allow_nan=False) + "\n"}
+    files: dict[str, str | bytes] = {CARD: json.dumps(card, indent=1, allow_nan=False) + "\n"}
     motion, left_out = _motion_files(experiment, rate_hz)
     written = write_texts(files | motion, out)
     yield from (f"wrote {path}" for path in written)
@@ -58,4 +62,4 @@ def _motion_files(experiment: Experiment, rate_hz: float) -> tuple[dict[str, str
             files[name] = TRAJECTORY_FORMATS[form](trajectory)
         except InputError as error:
             left_out[name] = str(error)
-    return {**files, "next.png": draw_card(experiment)}, left_out
+    return {**files, PICTURE: draw_card(experiment)}, left_out

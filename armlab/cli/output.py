@@ -19,8 +19,8 @@ _PROGRESS = "armlab.progress"  # key of the running command's progress in click'
 _SILENT = "armlab.silent"  # key in click's context: whether the command was told to print no lines
 
 _STANDARD_OUTPUT, _STANDARD_ERROR = 1, 2  # file descriptors, which processes of plug-ins inherit
-_quiet_option = click.option("--quiet", is_flag=True, help="Print no lines and no progress, only errors.")
-_json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON document.")
+quiet_option = click.option("--quiet", is_flag=True, help="Print no lines and no progress, only errors.")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON document.")
 
 
 class Progress:
@@ -75,7 +75,7 @@ def prints_lines(command: Callable[..., Iterable[str]]) -> Callable[..., None]:
         finally:
             progress.clear()
 
-    return _quiet_option(run)
+    return quiet_option(run)
 
 
 def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
@@ -95,7 +95,7 @@ def prints_result(command: Callable[..., ResultLines]) -> Callable[..., None]:
             progress.clear()
         _print_document(document, as_json)
 
-    return _json_option(_quiet_option(run))
+    return json_option(quiet_option(run))
 
 
 @contextmanager

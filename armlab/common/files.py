@@ -27,6 +27,17 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
         draft.unlink(missing_ok=True)
 
 
+def refuse_inputs(inputs: Iterable[Path], outputs: Iterable[Path], made: str) -> None:
+    """Raises InputError where an output would replace an input. made: what the inputs are made into, like `the model`.
+
+    A file that does not exist yet is no input.
+    """
+    known = [each for each in inputs if each.exists()]
+    for place in outputs:
+        if place.exists() and any(place.samefile(each) for each in known):
+            raise InputError(f"{place} is a file that {made} is made from: choose another name")
+
+
 def write_texts(texts: Mapping[str, str | bytes], folder: Path) -> tuple[Path, ...]:
     """Write all texts (or bytes) under their names into a folder, or none of them; returns their paths.
 

@@ -1,11 +1,10 @@
 """`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
 
-from collections.abc import Iterable
 from pathlib import Path
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
-from armlab.common.files import write_texts
+from armlab.common.files import refuse_inputs, write_texts
 from armlab.identification.export import (
     SimulatorModel,
     build_simulator_model,
@@ -40,7 +39,7 @@ def export_model(path: Path, out: Path) -> ResultLines:
             notes.append(
                 "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
             )
-    _refuse_input_files((path, source), texts, out)
+    refuse_inputs((path, source), (out.parent / name for name in texts), "the model")
     written = write_texts(texts, out.parent)
     yield from map(str, written)
     yield from notes
@@ -58,10 +57,3 @@ def _document(simulated: SimulatorModel, source: Path, out: Path) -> Patched:
         return Patched(text, (keeps,) if source.suffix in FORMATS else ())
     made = patched_urdf(simulated, source, out.parent) if out.suffix == ".urdf" else patched_mjcf(simulated, source)
     return Patched(made.text, (f"{source.name} with other numbers: its names, frames and meshes stay", *made.notes))
-
-
-def _refuse_input_files(inputs: Iterable[Path], names: Iterable[str], out: Path) -> None:
-    for name in names:
-        place = out.parent / name
-        if place.exists() and any(each.exists() and place.samefile(each) for each in inputs):
-            raise InputError(f"{place} is a file that the model is made from: choose another name")

@@ -9,6 +9,7 @@ stored: that row has the largest double too.
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
@@ -21,6 +22,7 @@ import yaml
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import write_whole
+from armlab.common.report.printed_table import TABLE_FORMS
 from bench.config import NAME_PATTERN
 from bench.result_sets.result_set import (
     CELL_COLUMNS,
@@ -31,7 +33,7 @@ from bench.result_sets.result_set import (
     runs_by_algorithm,
 )
 from bench.statistics.performance import Run
-from bench.tables import summary_latex, summary_table
+from bench.tables import summary_for_print, summary_table
 
 SETTINGS, ORIGINS, TABLES = "settings.yaml", "origins.json", ("trials", "curves")
 _README_TEXT = """\
@@ -196,11 +198,12 @@ _WRITERS: dict[str, Callable[[Iterator[pd.DataFrame]], Any]] = {"csv": _to_csv, 
 _READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": pd.read_csv, "parquet": pd.read_parquet}
 
 
-def write_latex(results: ResultSet, folder: Path) -> list[Path]:
-    """Write the summary of a result set into a folder as a table of LaTeX; returns the file."""
-    path = folder / f"{results.name}.tex"
+def write_summary(results: ResultSet, folder: Path, form: str) -> list[Path]:
+    """Write the summary of a result set into a folder as a table, `latex`, `pdf` or `svg`; returns the file."""
+    suffix, write = TABLE_FORMS[form]
+    path = folder / f"{results.name}.{suffix}"
     make_folder(folder)
-    write_whole(path, summary_latex(summary_table(results.trials)))
+    write_whole(path, write(summary_for_print(summary_table(results.trials))))
     return [path]
 
 
@@ -270,7 +273,7 @@ SHARED_FORMATS: Mapping[str, Callable[[ResultSet, Path], list[Path]]] = MappingP
         "csv": lambda results, folder: write_tidy(results, folder, "csv"),
         "parquet": lambda results, folder: write_tidy(results, folder, "parquet"),
         "ioh": write_iohprofiler,
-        "latex": write_latex,
+        **{form: partial(write_summary, form=form) for form in TABLE_FORMS},
     }
 )
 

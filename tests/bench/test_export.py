@@ -164,6 +164,16 @@ def test_the_best_known_trajectory_from_rest_to_rest_is_exported_at_250_hz(tmp_p
     assert np.abs(motion.acceleration).max() <= 40.0
 
 
+@pytest.mark.parametrize("name", ["problem", "records"])
+def test_an_export_never_replaces_what_it_is_made_from(tmp_path: Path, name: str) -> None:
+    path, records = write(tmp_path), tmp_path / RECORDS_FILE
+    out = {"problem": path, "records": records}[name]
+    before = out.read_bytes()
+    told = refusal(export_record, path, "gentle", "csv", out, records, 50.0)
+    assert "is a file that the trajectory is made from" in told
+    assert out.read_bytes() == before
+
+
 def test_an_export_says_what_was_checked_and_refuses_what_leaves_its_room(tmp_path: Path) -> None:
     path, records, out = write(tmp_path), tmp_path / RECORDS_FILE, tmp_path / "out"
     report = export_record(path, "gentle", "csv", out, records, safety=SafetySettings(floor=0.0)).safety

@@ -43,6 +43,10 @@ def test_share_then_report_and_compare_need_no_store(shell: CliRunner, small_run
     files = sorted(Path("printed").iterdir())
     assert files
     assert all(path.suffix == ".pdf" and path.read_bytes().startswith(b"%PDF") for path in files)
+    assert not any(b"/Type3" in path.read_bytes() for path in files)
+    done = shell.invoke(share, ["tables", "--as", "pdf", "--out", "printed"], catch_exceptions=False)
+    assert done.output == "printed/small.pdf\n"
+    assert Path("printed/small.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_convergence_of_populations_that_shrink_or_restart_is_averaged_at_equal_evaluations(small_run: Ran) -> None:

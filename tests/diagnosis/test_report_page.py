@@ -25,6 +25,7 @@ from armlab.common.report.charts import (
     REFITTED_LOOK,
 )
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.report import write
 from armlab.diagnosis.report.content import finding_details
 from armlab.diagnosis.report.gallery import draw_gallery
 from armlab.diagnosis.report.measured import body_sentences, joint_table
@@ -210,6 +211,23 @@ def test_the_first_screen_has_a_row_a_joint_with_its_friction_units_and_interval
     cell = table.rows[guilty.index(claim.joint or 0)][1]
     assert cell.startswith(format_measured(level).replace(" ", "\N{NO-BREAK SPACE}"))
     assert re.match(r"\d[\d.]*\sN\sm\s\([\d.]+\sto\s[\d.]+\)", cell)
+
+
+def test_the_table_of_joints_is_written_for_a_paper(
+    found: Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(write, "load_recording", lambda folder: found.recording)
+    monkeypatch.setattr(write, "diagnose", lambda *options: found)
+    lines = list(write.diagnose_recording(Path("r"), tmp_path / "out", None, 0, tables=("latex", "pdf")))
+    assert any("joints.tex, joints.pdf" in line for line in lines)
+    heading = (tmp_path / "out" / "joints.tex").read_text().splitlines()[2]
+    assert heading.startswith("joint & Coulomb friction & Viscous friction")
+    assert (tmp_path / "out" / "joints.pdf").read_bytes().startswith(b"%PDF")
+    assert "--table latex --table pdf" in (tmp_path / "out" / "report.html").read_text()
+    monkeypatch.setattr(write, "diagnose", lambda *options: replace(found, claims=(), status="none"))
+    lines = list(write.diagnose_recording(Path("r"), tmp_path / "none", None, 0, tables=("svg",)))
+    assert "no table of joints: nothing was found" in lines
+    assert not (tmp_path / "none" / "joints.svg").exists()
 
 
 @pytest.mark.parametrize(

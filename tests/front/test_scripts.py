@@ -83,6 +83,21 @@ def test_a_failed_result_prints_its_document_and_then_fails():
     assert isinstance(result.exception, FailedResultError)
 
 
+def test_json_and_quiet_may_stand_before_the_command(folder):
+    after = told("recording", "check", folder, "--json")
+    assert told("--json", "recording", "check", folder) == after
+    assert json.loads(after[1])["refused"] == []
+    assert told("--quiet", "list") == (0, "", "")
+    assert told("--json", "--quiet", "list") == told("list", "--json")
+
+
+def test_a_command_without_a_document_refuses_json_before_its_name_too():
+    status, out, err = told("--json", "prove")
+    assert (status, out) == (2, "")
+    assert "Usage: main prove" in err
+    assert "No such option" in err
+
+
 def test_a_mistake_leaves_the_standard_output_empty_and_its_line_on_the_error_output(here):
     status, out, err = told("identify", "nowhere", "--json")
     assert (status, out) == (2, "")

@@ -26,7 +26,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         status=diagnosis.status,
         verdict=(first.removesuffix(".") + ".", rest),
         known=known,
-        joints=_joint_table(diagnosis) if known else None,
+        joints=joint_table(diagnosis) if known else None,
         steps=_next_recordings(diagnosis),
         errors=_error_table(diagnosis) if known else None,
         tool=_tool_text(diagnosis),
@@ -38,7 +38,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
     )
 
 
-def _joint_table(diagnosis: MotionDiagnosis) -> Table:
+def joint_table(diagnosis: MotionDiagnosis) -> Table:
     """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
     rows = []
     for each in diagnosis.errors:

@@ -7,8 +7,9 @@ from pathlib import Path
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
+from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.motion.diagnose import diagnose_motion
-from armlab.diagnosis.motion.report import motion_page
+from armlab.diagnosis.motion.report import joint_table, motion_page
 from armlab.diagnosis.motion.signals import motion_tracks
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.words import motion_lines
@@ -23,11 +24,13 @@ def diagnose_motion_recording(
     progress: Callable[[str], None] = lambda message: None,
     changes: Sequence[str] = (),
     with_signals: bool = False,
+    tables: Sequence[str] = (),
 ) -> ResultLines:
     """Diagnoses the recording in `folder`, writes all files into `out` or none, and yields lines to print.
 
-    changes: tuning numbers like `motion.min_gain=0.05`. with_signals: whether `signals.mcap` is written. Raises
-    InputError, in one line, for a recording or a number that cannot be used.
+    changes: tuning numbers like `motion.min_gain=0.05`. with_signals: whether `signals.mcap` is written. tables: forms
+    in which the table of joints is written, too (`TABLE_FORMS`). Raises InputError, in one line, for a recording or a
+    number that cannot be used.
     """
     tuning = Tuning()
     for change in changes:
@@ -39,8 +42,11 @@ def diagnose_motion_recording(
         raise InputError(f"--out {out} is a file: give a folder")
     diagnosis = diagnose_motion(recording, progress, tuning.motion)
     settings = [part for change in changes for part in ("--set", change)] + ["--mcap"] * with_signals
+    settings += [part for form in dict.fromkeys(tables) for part in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *settings])
     texts: dict[str, str | bytes] = {**motion_texts(diagnosis, out), "report.html": motion_page(diagnosis, command)}
+    if diagnosis.servos is not None:
+        texts |= table_files("joints", joint_table(diagnosis), tables)
     moved = None
     if with_signals:
         joints = [joint.name for joint in recording.recorded_arm.joints]
@@ -48,6 +54,8 @@ def diagnose_motion_recording(
     written = write_texts(texts, out)
     yield from motion_lines(diagnosis)
     yield f"wrote {out}: {', '.join(texts)}"
+    if tables and diagnosis.servos is None:
+        yield "no table of joints: no servo was identified"
     if moved is not None:
         yield moved
     if diagnosis.seconds:

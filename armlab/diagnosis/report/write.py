@@ -3,7 +3,7 @@
 import resource
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -11,6 +11,7 @@ from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
 from armlab.common.report.page import render_page
+from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report import content, measured
 from armlab.diagnosis.report.gallery import Gallery, draw_gallery
@@ -95,6 +96,7 @@ def diagnose_recording(
     only_setup: bool = False,
     progress: Callable[[str], None] = lambda message: None,
     with_signals: bool = False,
+    tables: Sequence[str] = (),
 ) -> ResultLines:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
@@ -103,8 +105,8 @@ def diagnose_recording(
     out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
     numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted.
     only_setup: nothing but the reading is asked. progress: called with the name of each step. with_signals: whether
-    `signals.mcap` is written. Raises InputError, in one line, for a recording that cannot be used, an unknown guard or
-    an unknown tuning number.
+    `signals.mcap` is written. tables: forms in which the table of joints is written, too (`TABLE_FORMS`). Raises
+    InputError, in one line, for a recording that cannot be used, an unknown guard or an unknown tuning number.
     """
     if with_signals:
         check_signals_writer()
@@ -123,9 +125,12 @@ def diagnose_recording(
     options += [word for guard in without for word in ("--without", guard)]
     options += [word for change in changes for word in ("--set", change)]
     options += ["--as-read"] * as_read + ["--only-setup"] * only_setup + ["--mcap"] * with_signals
+    options += [word for form in dict.fromkeys(tables) for word in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
     texts: dict[str, str | bytes] = {**pages, **predicted_texts(diagnosis)}
+    if diagnosis.claims:
+        texts |= table_files("joints", measured.joint_table(diagnosis), tables)
     moved = None
     if with_signals:
         joints = [joint.name for joint in diagnosis.recording.arm.joints]
@@ -139,6 +144,8 @@ def diagnose_recording(
         f", predicted torque in {PREDICTED_FOLDER}" if any(name.startswith(PREDICTED_FOLDER) for name in texts) else ""
     )
     yield f"wrote {out}: {files}{more}"
+    if tables and not diagnosis.claims:
+        yield "no table of joints: nothing was found"
     if moved is not None:
         yield moved
     if diagnosis.setup is not None and diagnosis.setup.findings:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from armlab.common.errors import InputError
-from armlab.common.files import write_whole
+from armlab.common.files import refuse_inputs, write_whole
 from armlab.common.settings import read_yaml, suggest_name
 from bench.execute import canonical
 from bench.studies.best_known.records import Record, build_excitation, read_records
@@ -53,6 +53,7 @@ def export_record(
     the record, its trajectory may not. recorded: where the motion has to stay, unless `safety` says it. Raises
     InputError, in one line, for every other case.
     """
+    refuse_inputs((problem, records), (out,), "the trajectory")
     settings = parse_problem(read_yaml(problem), str(problem))
     found = _find_record(records, record)
     _check_same_trajectory(settings, found, problem, record)
