@@ -15,5 +15,5 @@ def test_a_guilty_joint_stands_with_its_whole_name() -> None:
     named = replace(arm, joints=tuple(replace(one, name=name) for one, name in zip(arm.joints, names, strict=True)))
     marks = {number: JointMark("Coulomb friction, 2 more") for number in (1, 2, 3)}
     texts = re.findall(r"<text[^>]*>([^<]*)</text>", str(draw_arm(named, np.zeros(3), marks)))
-    assert sorted(text.split(": ")[0] for text in texts) == [f"{number}  {names[number - 1]}" for number in (1, 2, 3)]
+    assert sorted(text.split(": ")[0] for text in texts) == sorted(names)
     assert all(": C" in text for text in texts)

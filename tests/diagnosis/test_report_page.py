@@ -170,8 +170,8 @@ def test_every_finding_has_its_equation_numbers_and_evidence(found: Diagnosis, t
 @pytest.mark.parametrize(
     ("axis", "label"),
     [
-        ("position", "position of joint 2, rad"),
-        ("velocity", "velocity of joint 2, rad/s"),
+        ("position", "position of j1, rad"),
+        ("velocity", "velocity of j1, rad/s"),
         ("time", "time from the start of the run, s"),
         ("", "torque that it predicts, N m"),
     ],
@@ -264,8 +264,8 @@ def test_rivals_say_why_they_cannot_be_told_and_what_would_tell_them(found: Diag
     rivals = (Rival("rotor_inertia", 1, (1,), identical=True), Rival("cable_stiffness", 2, (2,), deficit=0.7))
     claim = replace(found.claims[0], rivals=rivals, next_experiment="weigh the link")
     page = re.sub(r"</?a\b[^>]*>", "", report_texts(replace(found, claims=(claim,)))["report.html"])
-    assert "rotor inertia, joint 1: no motion of that joint alone can tell the two apart" in page
-    assert "cable stiffness, joint 2: on this very motion it fits as well (0.7 units" in page
+    assert "rotor inertia at j0: no motion of that joint alone can tell the two apart" in page
+    assert "cable stiffness at j1: on this very motion it fits as well (0.7 units" in page
     assert "To tell: weigh the link." in page
 
 

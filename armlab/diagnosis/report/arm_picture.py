@@ -15,6 +15,7 @@ from armlab.common.report.charts import (
     svg_text,
 )
 from problem.arm import Arm
+from problem.joint_words import joint_in_words
 
 PICTURE_WIDTH, ROW_HEIGHT = 412.0, 17.0
 ARM_WIDTH = 168.0  # px: width of the arm itself; the names stand beside it
@@ -83,7 +84,8 @@ def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: S
         for index in reversed(range(len(arm)))
     )
     content += _draw_names(arm, flat.centres * scale + shift, marks, height) + _draw_whole_robot(whole, height)
-    guilty = ", ".join(f"joint {joint}: {mark.text}" for joint, mark in sorted(marks.items())) or "no joint is marked"
+    named = [f"{joint_in_words(arm, joint)}: {mark.text}" for joint, mark in sorted(marks.items())]
+    guilty = ", ".join(named) or "no joint is marked"
     return svg_picture(content, PICTURE_WIDTH, height, f"The arm {arm.name} as a line drawing; {guilty}")
 
 
@@ -192,7 +194,7 @@ def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height
             stroke_width=1.2 if mark else 0.6,
             stroke_dasharray="none" if mark else "1 3",
         )
-        text = f"{index + 1}  {arm.joints[index].name}" + (f": {mark.text}" if mark else "")
+        text = joint_in_words(arm, int(index) + 1) + (f": {mark.text}" if mark else "")
         room = (PICTURE_WIDTH - start - 2) / (BOLD if mark else 1.0)
         out += svg_text(shorten_text(text, room, 10.5), start, row, 10.5, fill=color, font_weight=weight)
     return out
