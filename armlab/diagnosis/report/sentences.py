@@ -113,15 +113,16 @@ def _facts(claim: Claim) -> Effect:
 
 
 def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
-    """What the model lacks, one effect at several joints together where its rivals are the same."""
+    """What the model lacks, with one place for all effects that have it, and their rivals, in common."""
     groups: dict[tuple[bool, str, str], list[Claim]] = {}
     for claim in sorted(claims, key=lambda each: each.joint or 0):
         groups.setdefault((is_doubtful(claim), claim.effect, rivals_in_words(claim)), []).append(claim)
-    lacking = [
-        f"{'perhaps ' if doubtful else ''}{effect_in_words(effect)}{_size(own)} at {_places(simulation.arm, own)}"
-        f"{f' (or {rivals})' if rivals else ''}"
-        for (doubtful, effect, rivals), own in sorted(groups.items(), key=lambda group: group[0][0])
-    ]
+    names_by_place: dict[str, list[str]] = {}
+    for (doubtful, effect, rivals), own in sorted(groups.items(), key=lambda group: group[0][0]):
+        place = f"{_places(simulation.arm, own)}{f' (or {rivals})' if rivals else ''}"
+        name = f"{'perhaps ' if doubtful else ''}{effect_in_words(effect)}{_size(own)}"
+        names_by_place.setdefault(place, []).append(name)
+    lacking = [f"{join_words(names)} at {place}" for place, names in names_by_place.items()]
     return _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
 
 

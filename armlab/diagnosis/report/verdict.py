@@ -55,7 +55,7 @@ def _largest_error_text(worst: JointFit, arm: Arm) -> str:
 
 
 def gain_sentence(diagnosis: Diagnosis) -> str:
-    """How far the held-out error falls at the joint of a finding that gains most, and what noise and a refit reach."""
+    """How far the held-out error falls at the joint of a finding that gains most, and what noise is there."""
     arm = diagnosis.simulation.arm
     largest, _ = claims_by_share(diagnosis)[0]
     if largest.effect == UNKNOWN.id:
@@ -67,14 +67,13 @@ def gain_sentence(diagnosis: Diagnosis) -> str:
     joints = sorted({claim.evidence.joint for claim in diagnosis.claims})
     joint = joints[int(np.argmax(start[joints] / np.maximum(after[joints], 1e-300)))]
     best, size = diagnosis.fit[joint], joint_unit(arm, joint)
-    alone = "" if start is refit else f" (to {format_fixed(best.before)} by a refit of the rigid body alone)"
     white = data is None or is_white(data.final[:, joint], joint, data.observed)
     rest = "" if white or best.after <= best.noise_floor else " What is left there is not all noise."
     with_it = "With it" if len(diagnosis.claims) == 1 else "With these"
     falls = "falls" if best.after < start[joint] else "does not fall, it goes"
     return (
         f"{with_it} the error of {joint_in_words(arm, best.joint)} on held-out data {falls} "
-        f"from {format_fixed(float(start[joint]))} to {format_fixed(best.after)} {size}{alone}; "
+        f"from {format_fixed(float(start[joint]))} to {format_fixed(best.after)} {size}; "
         f"its noise is {format_fixed(best.noise_floor)} {size}.{rest}"
     )
 
