@@ -78,7 +78,7 @@ def _draw_growths(diagnosis: Diagnosis, resimulation: Resimulation) -> list[Mark
         ends = [float(each.y[-1]) for each in lines]
         floor = max(min(ends) / MAX_ERROR_RATIO, 1e-12)
         y = fit_axis(f"rms error, {size} (log)", *(np.maximum(each.y, floor) for each in lines), log=True)
-        title = f"{joint_at_start(diagnosis.simulation.arm, joint + 1)}: growth of the position error"
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: growth of the position error"
         about = (
             f"{title}; after {format_number(float(time[-1]))} s: "
             f"{join_words([format_number(end) for end in ends])} {size}"
@@ -103,7 +103,7 @@ def _draw_windows(diagnosis: Diagnosis, resimulation: Resimulation) -> list[Mark
             f"position, {_position_unit(diagnosis, joint)}", *(each.y for each in lines if isinstance(each, Line))
         )
         x = Axis(f"time in {shorten_name(resimulation.run)}, s", float(time[0]), float(time[-1]))
-        title = f"{joint_at_start(diagnosis.simulation.arm, joint + 1)}: measured and simulated motion"
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: simulated motion"
         out.append(draw_chart(title, x, y, lines, height=MOTION_HEIGHT))
     return out
 
@@ -133,7 +133,7 @@ def draw_motion_differences(diagnosis: Diagnosis) -> tuple[list[Markup], str]:
             f"difference, {size}", *(MILLI_PER_UNIT * difference[:, joint] for _, difference in differences), zero=True
         )
         x = Axis(f"time in {shorten_name(chosen.name)}, s", float(time[0]), float(time[-1]))
-        title = f"{joint_at_start(arm, joint + 1)}: difference of motion"
+        title = f"{shorten_name(joint_at_start(arm, joint + 1))}: difference of motion"
         pictures.append(draw_chart(title, x, y, lines, height=DIFFERENCE_HEIGHT))
     for look, difference in differences:
         sizes = [

@@ -57,7 +57,7 @@ def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> Markup:
     floors = np.array([each.noise_floor for each in diagnosis.fit])
     kinds = {joint_unit(arm, joint) for joint in range(len(floors))}
     axis = fit_axis(f"rms error, {' or '.join(sorted(kinds))}", *(each for _, each in series), floors, log=True)
-    names = [joint_in_words(arm, joint + 1) for joint in range(len(floors))]
+    names = [shorten_name(joint_in_words(arm, joint + 1)) for joint in range(len(floors))]
     left = float(np.clip(max(map(text_width, names)) + 12, LEFT_MARGIN, MAX_NAMES_WIDTH))
     top = 62.0
     height = top + JOINT_ROW_HEIGHT * len(floors) + 42
@@ -136,7 +136,7 @@ def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
         values = [each.y for each in lines if isinstance(each, Line)]
         y = fit_axis(f"{'torque' if size == 'N m' else 'force'}, {size}", *values)
         x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
-        title = f"{joint_at_start(diagnosis.simulation.arm, joint + 1)}: measured and predicted"
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: measured and predicted"
         out.append(draw_chart(title, x, y, lines))
     return out
 
@@ -156,7 +156,7 @@ def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
         lines += [Level(sign * fit.noise_floor, FLOOR_LOOK) for sign in (1, -1)]
         y = fit_axis(f"measured − predicted, {size}", *(left[rows, joint] for _, left in models), zero=True)
         x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
-        title = f"{joint_at_start(diagnosis.simulation.arm, joint + 1)}: error"
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: error"
         out.append(draw_chart(title, x, y, lines, f"{title} over {run}, measured less predicted, with the noise floor"))
     return out
 
@@ -182,7 +182,7 @@ def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> M
     size = joint_unit(diagnosis.simulation.arm, joint)
     y = fit_axis(f"left without it, {size}", np.quantile(left[used], [0.002, 0.998]), law[used])
     name = claim_name(claim)
-    title = f"{name[0].upper()}{name[1:]}, {joint_in_words(diagnosis.simulation.arm, joint + 1)}"
+    title = f"{name[0].upper()}{name[1:]}, {shorten_name(joint_in_words(diagnosis.simulation.arm, joint + 1))}"
     return draw_chart(
         title, fit_axis(label, x[used]), y, layers, f"{title}: torque left without it against {label}, and its law"
     )
@@ -212,14 +212,14 @@ def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) 
 def _motion_variable(diagnosis: Diagnosis, data: ShownResiduals, kind: str, joint: int) -> tuple[str, Array]:
     units, arm = MOTION_UNITS[kind], diagnosis.simulation.arm
     unit = units[0] if arm.joints[joint].kind == "revolute" else units[1]
-    return f"{kind} of {joint_in_words(arm, joint + 1)}, {unit}", data.observed.kept(kind)[:, joint]
+    return f"{kind} of {shorten_name(joint_in_words(arm, joint + 1))}, {unit}", data.observed.kept(kind)[:, joint]
 
 
 def _load_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
     """Torque of the model without the finding."""
     torque = data.observed.torque[:, joint] - data.final[:, joint] - claim.prediction[:, joint]
     arm = diagnosis.simulation.arm
-    return f"torque of the model at {joint_in_words(arm, joint + 1)}, {joint_unit(arm, joint)}", torque
+    return f"torque of the model at {shorten_name(joint_in_words(arm, joint + 1))}, {joint_unit(arm, joint)}", torque
 
 
 def _cycle_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
@@ -227,7 +227,7 @@ def _cycle_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, jo
     order = next((each.value for each in claim.parameters if each.name == "order"), 1.0)
     waves = float(order) if isinstance(order, float) and order else 1.0
     position = data.observed.kept("position")[:, joint]
-    where = joint_in_words(diagnosis.simulation.arm, joint + 1)
+    where = shorten_name(joint_in_words(diagnosis.simulation.arm, joint + 1))
     return f"position of {where} within a wave of 1/{waves:.4g} turn, share", (position * waves / FULL_TURN) % 1.0
 
 
@@ -267,5 +267,5 @@ def _draw_error_against(
     floor = diagnosis.fit[joint].noise_floor
     size = joint_unit(diagnosis.simulation.arm, joint)
     y = fit_axis(f"rms error, {size}", *(layer.y for layer in layers), np.array([floor]), zero=True)
-    title = f"{joint_at_start(diagnosis.simulation.arm, joint + 1)}: error by {quantity}"
+    title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: error by {quantity}"
     return draw_chart(title, fit_axis(label, x[used]), y, [*layers, Level(floor, FLOOR_LOOK)], height=LOCATED_HEIGHT)

@@ -17,6 +17,7 @@ from armlab.diagnosis.report.words import (
     format_share,
     joint_unit,
     rival_in_words,
+    shorten_name,
     variable_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit
@@ -115,7 +116,7 @@ def _error_lines(fits: Sequence[JointFit], arm: Arm) -> Iterator[str]:
     """The table of held-out errors, with the number of each joint that the equations have."""
     if not fits:
         return
-    names = [joint_in_table(arm, fit.joint).replace("\N{NO-BREAK SPACE}", " ") for fit in fits]
+    names = [shorten_name(joint_in_table(arm, fit.joint).replace("\N{NO-BREAK SPACE}", " ")) for fit in fits]
     width = max(len("joint"), *map(len, names))
     yield f"  {'joint':<{width}}   refitted      found      noise   gap closed   (rms on held-out data)"
     for name, fit in zip(names, fits, strict=True):
@@ -145,9 +146,9 @@ def _claim_lines(number: int, claim: Claim, share: float, simulation: Simulation
     yield from (f"     {line}" for line in lines[1:])
     unit, where = joint_unit(arm, evidence.joint), joint_in_words(arm, evidence.joint + 1)
     error = f"{format_number(evidence.rms_before)} to {format_number(evidence.rms_after)} {unit}"
-    yield f"     {format_share(share)} of the error; held-out error of {where}: {error}; p " + (
-        format_probability(evidence.corrected)
-    )
+    probability = format_probability(evidence.corrected)
+    gain = f"{format_share(share)} of the error; held-out error of {where}: {error}; p {probability}"
+    yield from (f"     {line}" for line in wrap(gain, LINE_WIDTH - 5))
     rivals = ", ".join(rival_in_words(arm, each) for each in claim.rivals)
     if rivals:
         yield from (f"     {line}" for line in wrap(f"fits as well: {rivals}", LINE_WIDTH - 5))
