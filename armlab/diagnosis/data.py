@@ -16,6 +16,7 @@ from armlab.recordings.differentiate import Signals, differentiate, resample_at,
 from armlab.recordings.filters import Butterworth, LowPass
 from armlab.recordings.recording import Role, Run
 from problem.arm import Arm
+from problem.joint_words import joint_in_words
 from problem.motion import Motion
 from problem.regressor import inertia_column
 
@@ -190,14 +191,13 @@ class Observed:
         moving = self.moving[:, joint]
         return tuple(part for each in own for part in split_segment(each, moving, self.min_segment_rows))
 
-    @property
-    def reason_too_short(self) -> str | None:
+    def reason_too_short(self, arm: Arm) -> str | None:
         """Why nothing can be said of a joint: it is never in motion for long enough; None where all are."""
         short = [joint + 1 for joint in range(self.joints) if not self.used(joint)]
         if not short:
             return None
         least = self.min_segment_rows / self.rate_hz
-        return f"joint {short[0]} is never in motion for {least:.2g} s on end: record longer runs"
+        return f"{joint_in_words(arm, short[0])} is never in motion for {least:.2g} s on end: record longer runs"
 
     def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
         """Rows of a role near a standstill or a reversal of a joint (from 0)."""

@@ -131,7 +131,9 @@ def prepare(
         return Diagnosis(recording, simulation, "inconclusive", reason)
     progress("filtering")
     observed = observe(in_fixed_order(recording.runs), simulation.arm, simulation.inertial, settings)
-    reason = observed.reason_too_short or reason_misread(observed, simulation, settings.tuning.soundness)
+    reason = observed.reason_too_short(simulation.arm) or reason_misread(
+        observed, simulation, settings.tuning.soundness
+    )
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason, observed)
     base = base_parameters(simulation.arm)

@@ -15,6 +15,7 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
+from problem.joint_words import joints_in_words
 from problem.regressor import rigid_body_torque
 
 
@@ -92,7 +93,7 @@ def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None
         return "No joint moves in any run: there is nothing that the torques could be compared with."
     silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
     if silent:
-        return f"The torque of joint {', '.join(map(str, silent))} never changes: is the right column named?"
+        return f"The torque of {joints_in_words(recording.arm, silent)} never changes: is the right column named?"
     return None
 
 

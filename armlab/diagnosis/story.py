@@ -15,9 +15,12 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import rows_in
-from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.report.words import claim_name, is_doubtful
+from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.contract import Cause
 from armlab.effects.library import effect_named
+from problem.arm import Arm
+from problem.joint_words import joints_in_words, links_in_words
 
 K = TypeVar("K")
 MAX_WORDS = 30  # of the sentence that tells a story
@@ -26,13 +29,17 @@ MIN_TOLD_SHARE = 0.01  # of the gap: less is not in that sentence
 
 @dataclass(frozen=True)
 class Chapter:
-    """Findings with one cause. findings: their places among the claims, from 0. share: of the gap. effects: theirs."""
+    """Findings with one cause. findings: their places among the claims, from 0. share: of the gap. names: theirs.
+
+    doubtful: whether each of the findings may be nothing.
+    """
 
     cause: Cause
     joints: tuple[int, ...]
     share: float
     findings: tuple[int, ...]
-    effects: tuple[str, ...]
+    names: tuple[str, ...]
+    doubtful: bool = False
 
 
 def with_story(diagnosis: Diagnosis) -> Diagnosis:
@@ -40,7 +47,7 @@ def with_story(diagnosis: Diagnosis) -> Diagnosis:
     chapters = tell_story(diagnosis)
     if not chapters:
         return diagnosis
-    sentence = story_sentence(chapters, len(diagnosis.simulation.arm))
+    sentence = story_sentence(chapters, diagnosis.simulation.arm)
     return replace(diagnosis, summary=f"{sentence} {diagnosis.summary}")
 
 
@@ -53,7 +60,8 @@ def tell_story(diagnosis: Diagnosis) -> tuple[Chapter, ...]:
             tuple(sorted({joint for place in own for joint in _joints(diagnosis, place)})),
             float(sum(shares[place] for place in own)),
             own,
-            tuple(dict.fromkeys(diagnosis.claims[place].effect for place in own)),
+            tuple(dict.fromkeys(claim_name(diagnosis.claims[place]) for place in own)),
+            all(is_doubtful(diagnosis.claims[place]) for place in own),
         )
         for cause, own in _places_by_cause(diagnosis).items()
     ]
@@ -105,41 +113,40 @@ def add_in_order(start: Array, torques: Mapping[K, Array]) -> dict[K, float]:
     return out
 
 
-def story_sentence(chapters: Sequence[Chapter], joints: int) -> str:
+def claims_by_share(diagnosis: Diagnosis) -> list[tuple[Claim, float]]:
+    """The findings with the share of the error that each explains, the largest first."""
+    shares = [share or 0.0 for share in finding_shares(diagnosis)]
+    return sorted(zip(diagnosis.claims, shares, strict=True), key=lambda each: -each[1])
+
+
+def story_sentence(chapters: Sequence[Chapter], arm: Arm) -> str:
     """The causes with their shares in one sentence of at most MAX_WORDS words; a share of several is never 100 %."""
     first, *others = chapters
     most = 100 - max(round(100 * sum(each.share for each in others)), 1) if others else 100
     share = min(round(100 * first.share), most)
-    sentence = f"{share or 'Less than 1'} % of the error comes from {_cause_in_words(first, joints)}"
+    sentence = f"{share or 'Less than 1'} % of the error comes from {_cause_in_words(first, arm)}"
     for each in others:
-        longer = f"{sentence}, {100 * each.share:.0f} % from {_cause_in_words(each, joints)}"
+        longer = f"{sentence}, {100 * each.share:.0f} % from {_cause_in_words(each, arm)}"
         if each.share < MIN_TOLD_SHARE or len(longer.split()) > MAX_WORDS:
             break
         sentence = longer
     return f"{sentence}."
 
 
-def _cause_in_words(each: Chapter, joints: int) -> str:
+def _cause_in_words(each: Chapter, arm: Arm) -> str:
     """The effect itself where there is only one, else what they have in common."""
     if each.cause == "unknown":
         name = "something without a name"
-    elif len(each.effects) == 1:
-        name = effect_named(each.effects[0]).words
+    elif len(each.names) == 1:
+        name = each.names[0]
     else:
         name = {"links": "masses and inertias", "drive": "the drive"}.get(each.cause, each.cause)
+    name = f"perhaps {name}" if each.doubtful else name
     if not each.joints:
         return name
-    where = "of {}link" if each.cause == "links" else "at {}joint"
-    if len(each.joints) == joints > 1:
-        return f"{name} {where.format(f'all {joints} ')}s"
-    plural = "s" if len(each.joints) > 1 else ""
-    return f"{name} {where.format('')}{plural} {_join_numbers(each.joints)}"
-
-
-def _join_numbers(numbers: Sequence[int]) -> str:
-    """`1, 2 and 4` of numbers."""
-    *others, last = [str(each) for each in numbers]
-    return f"{', '.join(others)} and {last}" if others else last
+    links = each.cause == "links"
+    where = links_in_words(arm, each.joints) if links else joints_in_words(arm, each.joints)
+    return f"{name} {'of' if links and len(each.names) > 1 else 'at'} {where}"
 
 
 def _places_by_cause(diagnosis: Diagnosis) -> dict[Cause, tuple[int, ...]]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from markupsafe import escape
 from told_recordings import frame, recording_in
 
 from armlab.common.errors import InputError
@@ -32,7 +33,7 @@ from armlab.diagnosis.report.measured import body_sentences, joint_table
 from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
 from armlab.diagnosis.report.torque_pictures import evidence_variable
 from armlab.diagnosis.report.verdict import verdict_lines
-from armlab.diagnosis.report.words import format_gap, format_measured
+from armlab.diagnosis.report.words import format_gap, format_measured, shorten_name
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts
@@ -171,8 +172,8 @@ def test_every_finding_has_its_equation_numbers_and_evidence(found: Diagnosis, t
 @pytest.mark.parametrize(
     ("axis", "label"),
     [
-        ("position", "position of joint 2, rad"),
-        ("velocity", "velocity of joint 2, rad/s"),
+        ("position", f"position of {shorten_name(f'j1{HOSTILE}')}, rad"),
+        ("velocity", f"velocity of {shorten_name(f'j1{HOSTILE}')}, rad/s"),
         ("time", "time from the start of the run, s"),
         ("", "torque that it predicts, N m"),
     ],
@@ -282,8 +283,8 @@ def test_rivals_say_why_they_cannot_be_told_and_what_would_tell_them(found: Diag
     rivals = (Rival("rotor_inertia", 1, (1,), identical=True), Rival("cable_stiffness", 2, (2,), deficit=0.7))
     claim = replace(found.claims[0], rivals=rivals, next_experiment="weigh the link")
     page = re.sub(r"</?a\b[^>]*>", "", report_texts(replace(found, claims=(claim,)))["report.html"])
-    assert "rotor inertia, joint 1: no motion of that joint alone can tell the two apart" in page
-    assert "cable stiffness, joint 2: on this very motion it fits as well (0.7 units" in page
+    assert f"rotor inertia at {escape(f'j0{HOSTILE}')}: no motion of that joint alone can tell the two apart" in page
+    assert f"cable stiffness at {escape(f'j1{HOSTILE}')}: on this very motion it fits as well (0.7 units" in page
     assert "To tell: weigh the link." in page
 
 
@@ -362,5 +363,5 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     assert "surrogate" in texts["figures/finding1_unknown.svg"]
     assert "time from the start of the run, s" in texts["figures/finding1_unknown.svg"]
     assert palette.PURPLE in texts["figures/arm.svg"]
-    assert "Something that no known effect explains acts at joint 2." in texts["report.html"]
+    assert f"Something that no known effect explains acts at {escape(f'j1{HOSTILE}')}." in texts["report.html"]
     assert "40 % of the held-out error variance depends on time" in texts["report.html"]

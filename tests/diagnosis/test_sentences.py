@@ -1,10 +1,12 @@
 """Every effect of the library says in a plain sentence that it was found."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from armlab.diagnosis.report.sentences import finding_sentence, findings_in_sentences
+from armlab.diagnosis.report.words import finding_in_words
 from armlab.diagnosis.result import Claim, Rival
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import ANGLE, Effect, Parameter
@@ -44,7 +46,7 @@ SENTENCES = {
     "stiffness 0.500 N m/rad (0.4 to 0.6)",
     "cable_stiffness": "The simulation lacks cable stiffness at joint 2",
     "payload": (
-        "The arm carries a load that the simulation does not have: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint2"
+        "The arm carries a load that the simulation does not have: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint 2"
     ),
     "inertial_parameter_error": (
         "The mass, centre of mass or inertia of link 2 differs from that in the simulation: mass 0.500 kg (0.4 to 0.6)"
@@ -149,6 +151,63 @@ def test_a_load_of_which_the_arm_feels_only_some_numbers_tells_these() -> None:
     numbers = (ParameterValue("hx", 0.1, (0.09, 0.11), "kg.m"),)
     felt = Claim("payload", 2, (2,), numbers, "", claim("payload").evidence, claim("payload").prediction)
     assert finding_sentence(felt, SIMULATION).endswith("does not have: hx 0.100 kg m (0.09 to 0.11)")
+
+
+def with_numbers(effect: str, **numbers: tuple[float, tuple[float, float]]) -> Claim:
+    """A finding at joint or link 2 whose numbers of these names have another value and interval."""
+    found = claim(effect)
+    return replace(
+        found,
+        parameters=tuple(
+            replace(each, value=numbers[each.name][0], interval=numbers[each.name][1]) if each.name in numbers else each
+            for each in found.parameters
+        ),
+    )
+
+
+def test_a_size_whose_interval_reaches_zero_is_told_as_perhaps() -> None:
+    load = with_numbers("payload", mass=(0.1, (-0.05, 0.25)))
+    assert finding_sentence(load, SIMULATION).startswith(
+        "Perhaps the arm carries a load that the simulation does not have: 0.100 kg (−0.1 to 0.2)"
+    )
+    assert finding_in_words(ARM, load) == "perhaps payload at link 2"
+    friction = with_numbers("viscous_friction", coefficient=(0.01, (0.0, 0.02)))
+    assert findings_in_sentences([friction, claim("coulomb_friction", 3)], SIMULATION, 3) == (
+        "The simulation of irb120-arm lacks Coulomb friction of 0.500 N m at joint 3 and perhaps viscous friction of "
+        "0.0100 N m s/rad at joint 2."
+    )
+
+
+def test_a_load_of_negative_mass_is_called_less_mass() -> None:
+    load = with_numbers("payload", mass=(-0.5, (-0.6, -0.4)))
+    assert finding_sentence(load, SIMULATION) == (
+        "The arm has less mass than the simulation: 0.500 kg (0.4 to 0.6) at (0, 20, 60) mm of joint 2"
+    )
+    assert finding_in_words(ARM, load) == "less mass than modelled at link 2"
+
+
+def test_a_link_that_is_off_stays_certain_where_its_mass_may_be_right() -> None:
+    for mass, interval, figures in (
+        (0.1, (-0.05, 0.25), "mass perhaps 0.100 kg (−0.1 to 0.2)"),
+        (-0.5, (-0.6, -0.4), "0.500 kg (0.4 to 0.6) less mass"),
+    ):
+        link = with_numbers("inertial_parameter_error", mass=(mass, interval))
+        assert finding_sentence(link, SIMULATION) == (
+            f"The mass, centre of mass or inertia of link 2 differs from that in the simulation: {figures}"
+        )
+
+
+def test_joints_and_links_are_named_as_the_robot_file_does() -> None:
+    names = ("shoulder_pan", "shoulder_lift", "elbow")
+    arm = replace(ARM, joints=tuple(replace(one, name=name) for one, name in zip(ARM.joints, names, strict=True)))
+    named = Simulation("nominal", arm, None)
+    found = [claim("viscous_friction", 1), claim("viscous_friction", 3), claim("joint_coupling", 2)]
+    assert findings_in_sentences(found, named, 3) == (
+        "The simulation of irb120-arm lacks viscous friction at shoulder_pan and elbow and joint coupling of "
+        "coefficient 0.500 N m s/rad at shoulder_lift from shoulder_pan."
+    )
+    assert finding_sentence(claim("payload"), named).endswith("at (0, 20, 60) mm of shoulder_lift")
+    assert "of the link of shoulder_lift differs" in finding_sentence(claim("inertial_parameter_error"), named)
 
 
 def test_a_sentence_with_a_field_that_nothing_fills_is_refused() -> None:

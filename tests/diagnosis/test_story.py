@@ -1,11 +1,16 @@
 """The story of a verdict: causes, their order, and shares that sum to at most one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from armlab.diagnosis.story import MAX_WORDS, Chapter, add_in_order, story_sentence
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named
+from problem.presets import load_arm
+
+ARM = load_arm("irb120-arm")
 
 
 def test_the_largest_cause_is_added_first_and_falls_sum_to_the_whole_fall() -> None:
@@ -23,11 +28,11 @@ def test_torques_that_explain_the_same_error_do_not_count_it_twice() -> None:
 
 def test_the_sentence_names_the_causes_and_has_at_most_thirty_words() -> None:
     chapters = [
-        Chapter("friction", (1, 2, 3, 4, 5, 6), 0.85, (0, 1), ("coulomb_friction", "viscous_friction")),
-        Chapter("gravity and springs", (2,), 0.05, (2,), ("cable_stiffness",)),
+        Chapter("friction", (1, 2, 3, 4, 5, 6), 0.85, (0, 1), ("Coulomb friction", "viscous friction")),
+        Chapter("gravity and springs", (2,), 0.05, (2,), ("cable stiffness",)),
         *(Chapter("transmission", (joint,), 0.01, (2 + joint,), ("backlash",)) for joint in range(1, 7)),
     ]
-    sentence = story_sentence(chapters, 6)
+    sentence = story_sentence(chapters, load_arm("irb120"))
     assert sentence.startswith(
         "85 % of the error comes from friction at all 6 joints, 5 % from cable stiffness at joint 2"
     )
@@ -35,9 +40,25 @@ def test_the_sentence_names_the_causes_and_has_at_most_thirty_words() -> None:
 
 
 def test_one_of_several_causes_never_explains_all() -> None:
-    chapters = [Chapter("links", (2,), 0.998, (0,), ("payload",)), Chapter("unknown", (1,), 0.02, (1,), ("unknown",))]
-    assert story_sentence(chapters, 3) == (
-        "98 % of the error comes from payload of link 2, 2 % from something without a name at joint 1."
+    chapters = [
+        Chapter("links", (2,), 0.998, (0,), ("payload",)),
+        Chapter("unknown", (1,), 0.02, (1,), ("something unknown",)),
+    ]
+    assert story_sentence(chapters, ARM) == (
+        "98 % of the error comes from payload at link 2, 2 % from something without a name at joint 1."
+    )
+
+
+def test_the_sentence_names_joints_as_the_robot_file_does_and_doubts_what_may_be_nothing() -> None:
+    names = ("shoulder_pan", "shoulder_lift", "elbow")
+    arm = replace(ARM, joints=tuple(replace(one, name=name) for one, name in zip(ARM.joints, names, strict=True)))
+    chapters = [
+        Chapter("friction", (1, 2), 0.9, (0,), ("viscous friction",)),
+        Chapter("links", (3,), 0.06, (1,), ("less mass than modelled",), doubtful=True),
+    ]
+    assert story_sentence(chapters, arm) == (
+        "90 % of the error comes from viscous friction at shoulder_pan and shoulder_lift, "
+        "6 % from perhaps less mass than modelled at the link of elbow."
     )
 
 

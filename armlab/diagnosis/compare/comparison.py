@@ -25,6 +25,7 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation
 from armlab.recordings.recording import Recording
+from problem.arm import Arm
 
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
@@ -55,6 +56,11 @@ class Comparison:
     def new(self) -> Diagnosis:
         """Of the last recording."""
         return self.diagnoses[-1]
+
+    @property
+    def arm(self) -> Arm:
+        """Of all recordings: the simulation's, with the names of its joints."""
+        return self.new.simulation.arm
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -149,8 +149,9 @@ def pool_recordings(
     runs = [run for number, each in enumerate(recordings) for run in _labelled_runs(each, number)]
     owner = tuple(number for number, each in enumerate(recordings) for _ in each.runs)
     observed = observe(runs, simulation.arm, simulation.inertial, settings)
-    if observed.reason_too_short is not None:
-        raise DataError(observed.reason_too_short)
+    reason = observed.reason_too_short(simulation.arm)
+    if reason is not None:
+        raise DataError(reason)
     bare = build_design_matrix(observed, simulation, base_parameters(simulation.arm), None, settings)
     found = unite_candidates(diagnoses)
     design = _with_candidates(bare, [*found, *_usual_beside(bare, found)])

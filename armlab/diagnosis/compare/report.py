@@ -35,6 +35,7 @@ from armlab.common.report.charts import (
 )
 from armlab.common.report.numbers import format_number, format_unit
 from armlab.common.report.page import Table, render_page
+from armlab.common.report.words import join_words
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
 from armlab.diagnosis.compare.named import ONE_FACTOR, NamedChange
@@ -59,16 +60,17 @@ from armlab.diagnosis.report.words import (
     PARAMETER_DIGITS,
     effect_in_words,
     format_probability,
-    join_words,
     parameter_rows,
     place_in_words,
+    rival_in_words,
 )
-from armlab.diagnosis.result import Rival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.diagnosis.verdict_files import check_output_folder
 from armlab.effects.library import effect_named
 from armlab.recordings.load import load_recording
+from problem.arm import Arm
+from problem.joint_words import joint_in_words
 
 MAX_NAMED_CHANGES = 3
 SEEN_EFFECTS = ("coulomb_friction", "viscous_friction", "payload", "torque_gain_error", "encoder_offset", "time_delay")
@@ -82,8 +84,9 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     seen = detectable_sentence(comparison)
     if comparison.status == "same":
         return f"Nothing changed between {names} that the recordings show.", seen
-    places = list(dict.fromkeys(_place_phrase(each) for each in comparison.named))
-    phrases = [change_phrase(each) for each in comparison.named[:MAX_NAMED_CHANGES]]
+    arm = comparison.arm
+    places = list(dict.fromkeys(_place_phrase(arm, each) for each in comparison.named))
+    phrases = [change_phrase(arm, each) for each in comparison.named[:MAX_NAMED_CHANGES]]
     rest = len(comparison.named) - len(phrases)
     more = f", and {rest} more" if rest else ""
     numbers = f"{join_words(phrases)}{more}."
@@ -96,19 +99,21 @@ def _whole_friction(comparison: Comparison) -> Iterator[str]:
     """All friction of each joint of which single laws changed."""
     factors = {each.joint for each in comparison.named if each.form == ONE_FACTOR}
     for each in comparison.changes:
-        if each.parameter == ALL_FRICTION and each.joint not in factors and each.ratio is not None:
-            yield f"All friction of joint {each.joint} together: {_percents(each.ratio)}."
+        if each.joint is None or each.ratio is None or each.parameter != ALL_FRICTION:
+            continue
+        if each.joint not in factors:
+            yield f"All friction of {joint_in_words(comparison.arm, each.joint)} together: {_percents(each.ratio)}."
 
 
-def change_phrase(named: NamedChange) -> str:
+def change_phrase(arm: Arm, named: NamedChange) -> str:
     """A change with its numbers: in percent where there is a level, else in units."""
-    where, parts = _place_phrase(named), [_amount(each) for each in named.changes]
+    where, parts = _place_phrase(arm, named), [_amount(each) for each in named.changes]
     return f"{where} ({', '.join(parts)})" if parts else f"{where}: {named.equation}"
 
 
-def _place_phrase(named: NamedChange) -> str:
+def _place_phrase(arm: Arm, named: NamedChange) -> str:
     between = "of" if named.joint is None else "at"
-    return f"{effect_in_words(named.effect)} {between} {place_in_words(named.effect, named.joint, named.joints)}"
+    return f"{effect_in_words(named.effect)} {between} {place_in_words(arm, named.effect, named.joint, named.joints)}"
 
 
 def _amount(change: Change) -> str:
@@ -167,23 +172,22 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     first, second = comparison_sentences(comparison)
     yield from wrap(f"{comparison.status.upper()}: {first} {second}", LINE_WIDTH)
     for each in comparison.named:
-        rivals = [_rival_phrase(rival) for rival in each.rivals]
+        rivals = [rival_in_words(comparison.arm, rival) for rival in each.rivals]
         also = f"; it could also be {join_words(rivals)}" if rivals else ""
-        text = f"{change_phrase(each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
+        text = f"{change_phrase(comparison.arm, each)}: {each.equation}, p {format_probability(each.p_value)}{also}"
         yield from wrap(text, LINE_WIDTH, initial_indent="  ", subsequent_indent="    ")
     for trend in comparison.trends:
         yield from wrap(
-            trend_phrase(trend, comparison.names), LINE_WIDTH, initial_indent="  ", subsequent_indent="    "
+            trend_phrase(comparison.arm, trend, comparison.names),
+            LINE_WIDTH,
+            initial_indent="  ",
+            subsequent_indent="    ",
         )
     for note in comparison.notes:
         yield from wrap(note, LINE_WIDTH, initial_indent="  ", subsequent_indent="  ")
     if comparison.changes:
         changed = sum(each.changed for each in comparison.changes)
         yield f"  {len(comparison.changes) - changed} of {len(comparison.changes)} parameters show no change"
-
-
-def _rival_phrase(rival: Rival) -> str:
-    return f"{effect_in_words(rival.effect)} at {place_in_words(rival.effect, rival.joint, rival.joints)}"
 
 
 def make_comparison_file(comparison: Comparison) -> ComparisonFile:
@@ -280,7 +284,7 @@ def _detectable_entry(each: Change) -> DetectableEntry:
 
 
 TABLE_HEADINGS = ("parameter", "where", "old", "new", "difference, 95 %", "unit", "p", "smallest seen")
-PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 22.0, 208.0
+PICTURE_WIDTH, ROW_HEIGHT, NAMES_WIDTH = 372.0, 28.0, 208.0
 MAX_DRAWN_CHANGES = 24
 VALUE_LOOK = Look("value", LAW_LOOK.color, 4.0)
 INTERVAL_LOOK = Look("95 % interval", palette.MIDDLE, 2.0)
@@ -315,11 +319,11 @@ def comparison_page(comparison: Comparison, command: str) -> str:
         status=kind,
         verdict=comparison_sentences(comparison),
         changed=_named_table(comparison) if comparison.named else None,
-        cards=[_card(each, comparison.names) for each in comparison.named],
+        cards=[_card(comparison.arm, each, comparison.names) for each in comparison.named],
         trends=_trend_part(comparison) if comparison.trends else None,
-        picture=draw_changes(changes) if changes else None,
-        moved=_changes_table([each for each in changes if each.changed]),
-        still=_changes_table([each for each in changes if not each.changed]),
+        picture=draw_changes(comparison.arm, changes) if changes else None,
+        moved=_changes_table(comparison.arm, [each for each in changes if each.changed]),
+        still=_changes_table(comparison.arm, [each for each in changes if not each.changed]),
         notes=comparison.notes,
         origin=origin_of(comparison.new, command),
     )
@@ -330,39 +334,43 @@ def _named_table(comparison: Comparison) -> Table:
     rows = []
     for each in comparison.named:
         amounts = "; ".join(_amount(one) for one in each.changes) or each.equation
-        where = place_in_words(each.effect, each.joint, each.joints)
-        rivals = join_words([_rival_phrase(rival) for rival in each.rivals], "or") if each.rivals else "–"
+        where = place_in_words(comparison.arm, each.effect, each.joint, each.joints)
+        rivals = (
+            join_words([rival_in_words(comparison.arm, rival) for rival in each.rivals], "or") if each.rivals else "–"
+        )
         rows.append([effect_in_words(each.effect), where, amounts, rivals])
     return Table(["what", "where", "change, 95 % interval", "it could also be"], rows, (1, 2, 3), stacked=True)
 
 
-def _card(named: NamedChange, names: Sequence[str]) -> ChangeCard:
+def _card(arm: Arm, named: NamedChange, names: Sequence[str]) -> ChangeCard:
     rows = [[one.name, one.value, one.interval, one.unit] for each in named.parameters for one in parameter_rows(each)]
     factors = [f"{format_number(1 + gain)} times in {name}" for name, gain in zip(names, named.gains, strict=True)]
-    rivals = [_rival_phrase(each) for each in named.rivals]
+    rivals = [rival_in_words(arm, each) for each in named.rivals]
     texts = (
         f"{named.equation}. Log evidence {named.evidence:.0f}, p-value {format_probability(named.p_value)}.",
         f"Without this change the squared held-out error is larger: {join_words(factors)}.",
         f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well.",
     )
     numbers = Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
-    return ChangeCard(change_phrase(named), texts, numbers)
+    return ChangeCard(change_phrase(arm, named), texts, numbers)
 
 
 def _trend_part(comparison: Comparison) -> TrendPart:
     names = comparison.names
     days = [f"{name}: {'no date' if day is None else day}" for name, day in zip(names, comparison.dates, strict=True)]
     return TrendPart(
-        [trend_phrase(each, names) for each in comparison.trends],
-        [draw_trend(each, names) for each in comparison.trends],
+        [trend_phrase(comparison.arm, each, names) for each in comparison.trends],
+        [draw_trend(comparison.arm, each, names) for each in comparison.trends],
         "; ".join(days),
     )
 
 
-def trend_phrase(trend: Trend, names: Sequence[str]) -> str:
+def trend_phrase(arm: Arm, trend: Trend, names: Sequence[str]) -> str:
     """How a parameter moves over the recordings."""
     own, unit = trend.movement, format_unit(trend.movement.unit)
-    what = f"{own.parameter} of {effect_in_words(own.effect)} at {place_in_words(own.effect, own.joint, own.joints)}"
+    what = (
+        f"{own.parameter} of {effect_in_words(own.effect)} at {place_in_words(arm, own.effect, own.joint, own.joints)}"
+    )
     values = " to ".join(format_number(float(each)) for each in (trend.values[0], trend.values[-1]))
     if trend.change_point is not None:
         return f"{what} changes once, at {names[trend.change_point]}: {values} {unit}".rstrip() + "."
@@ -374,7 +382,7 @@ def trend_phrase(trend: Trend, names: Sequence[str]) -> str:
     )
 
 
-def draw_trend(trend: Trend, names: Sequence[str]) -> Markup:
+def draw_trend(arm: Arm, trend: Trend, names: Sequence[str]) -> Markup:
     """Values of a parameter over the recordings with their 95 % intervals."""
     own, count = trend.movement, len(names)
     x = Axis("recording", 0.5, count + 0.5)
@@ -383,24 +391,24 @@ def draw_trend(trend: Trend, names: Sequence[str]) -> Markup:
         Line(np.full(2, number + 1.0), interval, INTERVAL_LOOK) for number, interval in enumerate(trend.intervals)
     ]
     layers.append(Points(np.arange(1.0, count + 1), trend.values, VALUE_LOOK))
-    title = f"{effect_in_words(own.effect)} at {place_in_words(own.effect, own.joint, own.joints)}"
+    title = f"{effect_in_words(own.effect)} at {place_in_words(arm, own.effect, own.joint, own.joints)}"
     return draw_chart(title, x, y, layers, f"{own.parameter} of {title} in {count} recordings")
 
 
-def _changes_table(changes: Sequence[Change]) -> Table:
-    return Table(TABLE_HEADINGS, [_change_row(each) for each in changes], (0, 1, 5), stacked=True)
+def _changes_table(arm: Arm, changes: Sequence[Change]) -> Table:
+    return Table(TABLE_HEADINGS, [_change_row(arm, each) for each in changes], (0, 1, 5), stacked=True)
 
 
 def _change_name(change: Change) -> str:
     return f"{change.parameter}, {effect_in_words(change.effect)}"
 
 
-def _change_row(change: Change) -> list[str]:
+def _change_row(arm: Arm, change: Change) -> list[str]:
     low, high = (format_number(value, PARAMETER_DIGITS) for value in change.interval)
     levels = ["–" if value is None else format_number(value, PARAMETER_DIGITS) for value in (change.old, change.new)]
     return [
         _change_name(change),
-        place_in_words(change.effect, change.joint, change.joints),
+        place_in_words(arm, change.effect, change.joint, change.joints),
         *levels,
         f"{low} to {high}",
         format_unit(change.unit),
@@ -409,7 +417,7 @@ def _change_row(change: Change) -> list[str]:
     ]
 
 
-def draw_changes(changes: Sequence[Change]) -> Markup:
+def draw_changes(arm: Arm, changes: Sequence[Change]) -> Markup:
     """Differences in units of half their own 95 % interval: within one of zero is no change."""
     chosen = sorted(changes, key=lambda each: each.p_value)[:MAX_DRAWN_CHANGES]
     height = 58 + ROW_HEIGHT * len(chosen) + 34
@@ -427,9 +435,10 @@ def draw_changes(changes: Sequence[Change]) -> Markup:
         out += svg_text(text.replace("-", "−"), x, height - 12, 10.5, "middle", fill=palette.PALE)
     for number, each in enumerate(chosen):
         y = 58 + ROW_HEIGHT * number
-        where = "" if each.joint is None else f"{each.joint}: "
+        where = place_in_words(arm, each.effect, each.joint, each.joints)
+        out += svg_text(shorten_text(_change_name(each), NAMES_WIDTH - 12, 10.5), NAMES_WIDTH - 8, y - 2, 10.5, "end")
         out += svg_text(
-            shorten_text(f"{where}{_change_name(each)}", NAMES_WIDTH - 12, 10.5), NAMES_WIDTH - 8, y + 4, 10.5, "end"
+            shorten_text(where, NAMES_WIDTH - 12, 9.5), NAMES_WIDTH - 8, y + 10, 9.5, "end", fill=palette.PALE
         )
         x = _score_position(_score(each), largest)
         out += svg_element(

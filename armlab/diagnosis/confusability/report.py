@@ -34,6 +34,7 @@ from armlab.diagnosis.confusability.card import (
 from armlab.diagnosis.report.words import effect_in_words, place_in_words
 from armlab.effects.library import library
 from problem.arm import Arm
+from problem.joint_words import joint_at_start, joint_in_words
 from problem.robot_file import load_arm
 
 CONFUSABILITY_SCHEMA = "confusability/1"
@@ -169,17 +170,18 @@ def draw_heat_map(card: Card, view: str, joint: int) -> Markup:
     chosen = [index for index, each in enumerate(card.entries) if each.joint in (joint, None)]
     count = len(chosen)
     width, height = NAMES_WIDTH + CELL_SIZE * count + 8, TOP_MARGIN + CELL_SIZE * count + 34
-    out = svg_text(f"Joint {joint}, {view}: can the column's effect imitate the row's?", 6, 14, 12, font_weight="600")
+    title = f"{joint_at_start(card.arm, joint)}, {view}: can the column's effect imitate the row's?"
+    out = svg_text(shorten_text(title, width - 12, 12), 6, 14, 12, font_weight="600")
     for place, index in enumerate(chosen):
         middle = CELL_SIZE * (place + 0.5)
-        label = shorten_text(f"{place + 1}  {_words(card.entries[index])}", NAMES_WIDTH - 8, LABEL_SIZE)
+        label = shorten_text(f"{place + 1}  {_words(card.arm, card.entries[index])}", NAMES_WIDTH - 8, LABEL_SIZE)
         out += svg_text(label, NAMES_WIDTH - 5, TOP_MARGIN + middle + 3.5, LABEL_SIZE, "end")
         out += svg_text(str(place + 1), NAMES_WIDTH + middle, TOP_MARGIN - 5, 8.5, "middle", fill=palette.PALE)
     cosines = card.cosines[view][np.ix_(chosen, chosen)]
     out += "".join(
         _draw_cell(row, column, float(cosines[row, column])) for row in range(count) for column in range(count)
     )
-    about = f"Cosines between the effects of joint {joint} of {card.arm.name} in the view {view}"
+    about = f"Cosines between the effects of {joint_in_words(card.arm, joint)} of {card.arm.name} in the view {view}"
     return svg_picture(out + _draw_scale(TOP_MARGIN + CELL_SIZE * count + 8), width, height, about)
 
 
@@ -251,7 +253,7 @@ def card_page(card: Card) -> str:
         f"Confusability of {card.trajectory}",
         verdict=_verdict(card),
         explanations=(_about_card(card), *EXPLANATIONS),
-        hidden=[_words(each) for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE],
+        hidden=[_words(card.arm, each) for each in card.entries if each.absorbed["refit"] > MIN_HIDDEN_SHARE],
         views=views,
     )
 
@@ -260,8 +262,8 @@ def _classes_table(card: Card, view: str) -> Table:
     rows = []
     for each in card.entries:
         for rival in each.rivals[view][:MAX_SHOWN_RIVALS]:
-            own = (_words(each), f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
-            beside = (_words(card.entries[rival.index]), f"{rival.cosine:.3f}", _size_text(rival.separation))
+            own = (_words(card.arm, each), f"{100 * each.absorbed[view]:.1f} %", _size_text(each.shows_from[view]))
+            beside = (_words(card.arm, card.entries[rival.index]), f"{rival.cosine:.3f}", _size_text(rival.separation))
             rows.append([*own, *beside])
     return Table(PAGE_HEADINGS, rows, (0, 3), stacked=True)
 
@@ -275,9 +277,9 @@ def _verdict(card: Card) -> str:
     )
 
 
-def _words(entry: Entry) -> str:
+def _words(arm: Arm, entry: Entry) -> str:
     """Effect, place and form as a person says them."""
-    name = f"{effect_in_words(entry.effect)}, {place_in_words(entry.effect, entry.joint, entry.joints)}"
+    name = f"{effect_in_words(entry.effect)}, {place_in_words(arm, entry.effect, entry.joint, entry.joints)}"
     return f"{name} ({entry.form})" if entry.form else name
 
 

@@ -30,6 +30,7 @@ from armlab.diagnosis.motion.simulation import read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.recordings.motion import MotionRecording
+from problem.arm import Arm
 
 MIN_RUNS = 3  # of each recording, for a scatter between runs
 POWER_QUANTILE = 1.2816  # of 90 % power, for the smallest change that would have been seen
@@ -65,9 +66,13 @@ class ServoChange:
 
 @dataclass(frozen=True, eq=False)
 class MotionComparison:
-    """What changed. reason: of an inconclusive one. notes: temperature and voltage in both recordings."""
+    """What changed. arm: with the joints of the recordings. reason: of an inconclusive one.
+
+    notes: temperature and voltage in both recordings.
+    """
 
     names: tuple[str, str]
+    arm: Arm
     reason: str
     changes: tuple[ServoChange, ...]
     notes: tuple[str, ...] = ()
@@ -94,7 +99,7 @@ def compare_motion(
     for recording in (old, new):
         reason = reason_unusable(recording)
         if reason is not None:
-            return MotionComparison(names, f"{recording.name}: {reason}", ())
+            return MotionComparison(names, new.recorded_arm, f"{recording.name}: {reason}", ())
     simulations = [read_servo_simulation(recording) for recording in (old, new)]
     windows = [
         make_windows(each.runs, simulation, tuning) for each, simulation in zip((old, new), simulations, strict=True)
@@ -117,7 +122,7 @@ def compare_motion(
         first, last = (each.fit for each in fits)
         starts = (np.where(first.free, first.values, last.values), np.where(last.free, last.values, first.values))
         changes += _compare_joint((thinned[0], thinned[1]), starts, free, (joint, looks), tuning)
-    return MotionComparison(names, "", tuple(changes), tuple(_notes(old, new)))
+    return MotionComparison(names, new.recorded_arm, "", tuple(changes), tuple(_notes(old, new)))
 
 
 def _notes(old: MotionRecording, new: MotionRecording) -> list[str]:

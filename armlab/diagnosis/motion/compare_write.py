@@ -23,6 +23,8 @@ from armlab.diagnosis.motion.compare import MotionComparison, ServoChange, compa
 from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
+from problem.arm import Arm
+from problem.joint_words import joint_in_table, joint_in_words
 
 
 def comparison_summary(comparison: MotionComparison) -> str:
@@ -32,13 +34,14 @@ def comparison_summary(comparison: MotionComparison) -> str:
         return f"{names} cannot be compared: {comparison.reason}."
     if not comparison.changed:
         return f"Nothing changed between {names} that the recordings show."
-    return f"Between {names} this changed: {'; '.join(map(change_phrase, comparison.changed))}. Nothing else changed."
+    phrases = "; ".join(change_phrase(comparison.arm, each) for each in comparison.changed)
+    return f"Between {names} this changed: {phrases}. Nothing else changed."
 
 
-def change_phrase(change: ServoChange) -> str:
-    """A change with its numbers."""
-    unit = format_unit(change.parameter.unit)
-    words = f"{effect_named(change.parameter.effect).words} at joint {change.joint} ({change.parameter.name} from "
+def change_phrase(arm: Arm, change: ServoChange) -> str:
+    """A change with its numbers. arm: with the joints of the recordings."""
+    unit, where = format_unit(change.parameter.unit), joint_in_words(arm, change.joint)
+    words = f"{effect_named(change.parameter.effect).words} at {where} ({change.parameter.name} from "
     words += f"{change.old:.4g} to {change.new:.4g} {unit}".rstrip()
     if change.ratio is not None:
         return f"{words}, a factor of {change.ratio[0]:.4g}, {change.ratio[1]:.4g} to {change.ratio[2]:.4g})"
@@ -113,7 +116,7 @@ def comparison_page(comparison: MotionComparison, command: str) -> str:
     """HTML text of the page."""
     rows = [
         (
-            str(each.joint),
+            joint_in_table(comparison.arm, each.joint),
             each.parameter.key,
             f"{each.old:.4g}",
             f"{each.new:.4g}" if each.changed else "unchanged",

@@ -39,7 +39,10 @@ def bench_real_motion(
     arm = _open("so101", recordings)
     diagnosis = diagnose_motion(arm, progress)
     alone = _replay_one_gain(diagnosis)
-    lines = [summary_of(diagnosis), *(finding_phrase(each) for each in diagnosis.findings)]
+    lines = [
+        summary_of(diagnosis),
+        *(finding_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.findings),
+    ]
     table = _replay_table(diagnosis, alone)
     yield from (*lines, table)
     beside: list[str] = []
@@ -60,7 +63,7 @@ def bench_real_motion(
         f"Held out: {_held_out(diagnosis)}. Left out before any fit, as contact: {_contact()}. "
         f"{diagnosis.seconds:.0f} s for the diagnosis.",
         summary_of(diagnosis),
-        "\n".join(f"- {finding_phrase(each)}" for each in diagnosis.findings),
+        "\n".join(f"- {finding_phrase(diagnosis.recording.recorded_arm, each)}" for each in diagnosis.findings),
         "Root mean square of simulated minus measured position on the held-out runs, mrad; at the tool mm. Whole arm, "
         f"whole runs. One gain: the simulation with kp {ONE_GAIN} N m/rad and kv 0, nothing else changed.",
         table,

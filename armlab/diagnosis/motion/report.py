@@ -6,11 +6,12 @@ from markupsafe import Markup
 from armlab.common.report.charts import FOUND_LOOK, GIVEN_LOOK, MEASURED_LOOK, Layer, Line, draw_chart, fit_axis
 from armlab.common.report.numbers import format_unit
 from armlab.common.report.page import Table, render_page
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, ServoFinding
+from armlab.diagnosis.motion.diagnose import MotionDiagnosis
 from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
-from armlab.diagnosis.motion.words import finding_phrase, summary_of
+from armlab.diagnosis.motion.words import finding_phrase, finding_with_numbers, summary_of
 from armlab.effects.library import effect_named
+from problem.joint_words import joint_at_start, joint_in_table
 
 SHOWN_S = 20.0  # of the longest held-out run, in the figures
 
@@ -31,7 +32,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         errors=_error_table(diagnosis) if known else None,
         tool=_tool_text(diagnosis),
         pictures=_pictures(diagnosis) if known else [],
-        findings=[finding_phrase(each) for each in diagnosis.findings],
+        findings=[finding_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.findings],
         numbers=_number_table(diagnosis) if known else None,
         missing=_missing_fields(diagnosis),
         command=command,
@@ -40,22 +41,14 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
 
 def joint_table(diagnosis: MotionDiagnosis) -> Table:
     """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
-    rows = []
+    rows, arm = [], diagnosis.recording.recorded_arm
     for each in diagnosis.errors:
         own = [finding for finding in diagnosis.findings if finding.joint == each.joint]
-        words = "; ".join(_finding_cell(finding) for finding in own) or "–"
+        words = "; ".join(finding_with_numbers(finding) for finding in own) or "–"
         before = "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
-        name = diagnosis.simulation.arm.joints[diagnosis.simulation.joints[each.joint - 1]].name
-        rows.append((f"{each.joint}  {name}", words, before, f"{1e3 * each.replay_after:.3g} mrad"))
+        rows.append((joint_in_table(arm, each.joint), words, before, f"{1e3 * each.replay_after:.3g} mrad"))
     headings = ("joint", "what is wrong, 95 % interval", "replay error before", "after")
     return Table(headings, rows, (1,), stacked=True)
-
-
-def _finding_cell(finding: ServoFinding) -> str:
-    low, high = finding.interval
-    value = f"{finding.value:.4g} {format_unit(finding.parameter.unit)}".rstrip()
-    known = f", not {finding.nominal:.4g}" if finding.nominal == finding.nominal else ""
-    return f"{effect_named(finding.effect).words}: {finding.name} {value} ({low:.4g} to {high:.4g}){known}"
 
 
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
@@ -69,7 +62,7 @@ def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
 def _error_table(diagnosis: MotionDiagnosis) -> Table:
     rows = [
         (
-            str(each.joint),
+            joint_in_table(diagnosis.recording.recorded_arm, each.joint),
             f"{1e3 * each.command:.3g}",
             "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g}",
             f"{1e3 * each.replay_after:.3g}",
@@ -89,7 +82,7 @@ def _tool_text(diagnosis: MotionDiagnosis) -> str:
 def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
     """One figure a joint: a stretch of a held-out run in which it moves most."""
     made = []
-    for row, joint in enumerate(diagnosis.simulation.joints):
+    for row in range(len(diagnosis.simulation.joints)):
         after = max(diagnosis.replayed_after, key=lambda each: float(np.ptp(each.run.position[:, row])))
         run = after.run
         centre = run.time[int(np.argmax(np.abs(np.gradient(run.position[:, row]))))]
@@ -100,10 +93,11 @@ def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
             if before.run is run:
                 layers.append(Line(time, before.position[chosen, row], GIVEN_LOOK))
         layers.append(Line(time, after.position[chosen, row], FOUND_LOOK))
-        name = diagnosis.simulation.arm.joints[joint].name
         shown = [layer.y for layer in layers if isinstance(layer, Line)]
         x, y = fit_axis("time, s", time), fit_axis("position, rad", *shown)
-        made.append(draw_chart(f"joint {row + 1}, {name}: {run.name}", x, y, layers))
+        made.append(
+            draw_chart(f"{joint_at_start(diagnosis.recording.recorded_arm, row + 1)}: {run.name}", x, y, layers)
+        )
     return made
 
 
@@ -120,7 +114,8 @@ def _number_table(diagnosis: MotionDiagnosis) -> Table:
                 continue
             given = "unknown" if np.isnan(nominal) else "none" if nominal >= INFINITE_LIMIT else f"{nominal:.4g}"
             interval = f"{low[place]:.4g} to {high[place]:.4g}"
-            rows.append((str(row + 1), parameter.key, given, f"{value:.4g}", interval, format_unit(parameter.unit)))
+            joint = joint_in_table(diagnosis.recording.recorded_arm, row + 1)
+            rows.append((joint, parameter.key, given, f"{value:.4g}", interval, format_unit(parameter.unit)))
     headings = ("joint", "number", "simulation", "found", "95 % interval", "unit")
     return Table(headings, rows, (1, 5), stacked=True)
 

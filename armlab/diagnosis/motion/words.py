@@ -1,12 +1,18 @@
 """What a diagnosis of motion only says in words: the summary, and the lines on a terminal."""
 
-from collections.abc import Iterator
-from itertools import groupby
+import math
+from collections.abc import Iterator, Sequence
 
 from armlab.common.report.numbers import format_unit
+from armlab.common.report.words import join_words
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.servo import PARAMETERS
+from armlab.diagnosis.report.words import LESS_MASS
 from armlab.effects.library import effect_named
+from problem.arm import Arm
+from problem.joint_words import joint_in_words, joints_in_words
+
+MAX_LISTED_WORDS = 24  # of the findings with their places in the first sentence; more are named without
 
 
 def summary_of(diagnosis: MotionDiagnosis) -> str:
@@ -16,32 +22,53 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     if diagnosis.status == "none":
         first = "The simulation replays the held-out commands as well as any servo of this law."
         return first + _replay_sentence(diagnosis)
-    parts = [
-        f"{effect_named(effect).words} at joint{'s' if len(joints) > 1 else ''} {', '.join(map(str, joints))}"
-        for effect, joints in findings_by_effect(diagnosis)
-    ]
-    listed = parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
-    if len(listed.split()) > 24:
-        words = [effect_named(effect).words for effect, _ in findings_by_effect(diagnosis)]
-        listed = f"{', '.join(words[:-1])} and {words[-1]}"
+    arm = diagnosis.recording.recorded_arm
+    found = findings_by_name(diagnosis)
+    listed = join_words([f"{name} at {_places(arm, own)}" for name, own in found.items()])
+    if len(listed.split()) > MAX_LISTED_WORDS:
+        listed = join_words(list(found))
     first = f"The simulation differs from the arm in {listed}."
     return first + _replay_sentence(diagnosis) + _silent_sentence(diagnosis) + _odd_sentence(diagnosis)
 
 
-def findings_by_effect(diagnosis: MotionDiagnosis) -> list[tuple[str, list[int]]]:
-    """Effects with their joints, in the order of the law's parameters."""
+def findings_by_name(diagnosis: MotionDiagnosis) -> dict[str, list[ServoFinding]]:
+    """The findings of each name, in the order of the law's parameters; those that may be nothing at the end."""
     places = {parameter.effect: number for number, parameter in enumerate(PARAMETERS)}
-    ordered = sorted(diagnosis.findings, key=lambda each: (places.get(each.effect, len(places)), each.joint))
-    return [
-        (effect, sorted({each.joint for each in group}))
-        for effect, group in groupby(ordered, key=lambda each: each.effect)
-    ]
+    ordered = sorted(
+        diagnosis.findings, key=lambda each: (is_doubtful(each), places.get(each.effect, len(places)), each.joint)
+    )
+    found: dict[str, list[ServoFinding]] = {}
+    for each in ordered:
+        found.setdefault(finding_name(each), []).append(each)
+    return found
+
+
+def finding_name(finding: ServoFinding) -> str:
+    """The name of a finding, `perhaps` before one that may be nothing; a load below zero is less mass than modelled."""
+    is_lighter = finding.parameter.key == "payload" and finding.value < 0
+    name = LESS_MASS if is_lighter else effect_named(finding.effect).words
+    return f"perhaps {name}" if is_doubtful(finding) else name
+
+
+def is_doubtful(finding: ServoFinding) -> bool:
+    """Whether the interval of a number reaches that of the simulation, or zero where the simulation has none."""
+    low, high = finding.interval
+    return low <= (0.0 if math.isnan(finding.nominal) else finding.nominal) <= high
+
+
+def _places(arm: Arm, findings: Sequence[ServoFinding]) -> str:
+    if findings[0].parameter.key == "payload":
+        return "the tool"
+    return joints_in_words(arm, sorted({each.joint for each in findings}))
 
 
 def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     if not diagnosis.errors:
         return ""
-    places = [(f"joint {each.joint}", each.replay_before, each.replay_after, "mrad") for each in diagnosis.errors]
+    arm = diagnosis.recording.recorded_arm
+    places = [
+        (joint_in_words(arm, each.joint), each.replay_before, each.replay_after, "mrad") for each in diagnosis.errors
+    ]
     tool_before, tool_after = diagnosis.tool
     if tool_before is not None:
         places.append(("at the tool", tool_before, tool_after, "mm"))
@@ -55,9 +82,9 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
 def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
     if not diagnosis.silent:
         return ""
-    return (
-        f" Of joint {', '.join(map(str, diagnosis.silent))} nothing can be said: it stands still or follows no servo."
-    )
+    joints = joints_in_words(diagnosis.recording.recorded_arm, diagnosis.silent)
+    stands = "it stands still or follows" if len(diagnosis.silent) == 1 else "they stand still or follow"
+    return f" Of {joints} nothing can be said: {stands} no servo."
 
 
 def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
@@ -71,26 +98,34 @@ def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
 
 def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
     """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint."""
+    arm = diagnosis.recording.recorded_arm
     yield f"{diagnosis.status.upper()}: {summary_of(diagnosis)}"
     for each in diagnosis.findings:
-        yield f"  {finding_phrase(each)}"
+        yield f"  {finding_phrase(arm, each)}"
     for error in diagnosis.errors:
-        yield f"  {error_phrase(error)}"
+        yield f"  {error_phrase(arm, error)}"
 
 
-def finding_phrase(finding: ServoFinding) -> str:
-    """A finding in one line."""
+def finding_phrase(arm: Arm, finding: ServoFinding) -> str:
+    """A finding in one line. arm: with the joints of the recording."""
+    rivals = " or ".join(effect_named(each).words for each in finding.rivals)
+    also = f"; it could also be {rivals}" if rivals else ""
+    return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}{also}"
+
+
+def finding_with_numbers(finding: ServoFinding) -> str:
+    """The name of a finding, its number with the interval, and that of the simulation."""
     low, high = finding.interval
     unit = format_unit(finding.parameter.unit)
-    words = f"joint {finding.joint}: {effect_named(finding.effect).words}, {finding.name} {finding.value:.4g} "
-    words += f"({low:.4g} to {high:.4g}){f' {unit}' if unit else ''}"
-    known = f"; the simulation has {finding.nominal:.4g}" if finding.nominal == finding.nominal else ""
-    rivals = " or ".join(effect_named(each).words for each in finding.rivals)
-    return f"{words}{known}{f'; it could also be {rivals}' if rivals else ''}"
+    if finding.parameter.key == "payload" and finding.value < 0:
+        return f"{finding_name(finding)}, {-finding.value:.4g} {unit} ({-high:.4g} to {-low:.4g})"
+    value = f"{finding.value:.4g} {unit}".rstrip()
+    known = "" if math.isnan(finding.nominal) else f"; the simulation has {finding.nominal:.4g}"
+    return f"{finding_name(finding)}, {finding.name} {value} ({low:.4g} to {high:.4g}){known}"
 
 
-def error_phrase(error: JointError) -> str:
-    """Replay errors of a joint in one line."""
+def error_phrase(arm: Arm, error: JointError) -> str:
+    """Replay errors of a joint in one line. arm: with the joints of the recording."""
     before = "" if error.replay_before is None else f"{1e3 * error.replay_before:.3g} before, "
     numbers = f"{before}{1e3 * error.replay_after:.3g} after, {1e3 * error.command:.3g} of the command itself"
-    return f"joint {error.joint}: replay error on held-out runs, mrad: {numbers}"
+    return f"{joint_in_words(arm, error.joint)}: replay error on held-out runs, mrad: {numbers}"

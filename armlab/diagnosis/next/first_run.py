@@ -114,7 +114,7 @@ def observe_first_run(recording: Recording, present: PresentModel) -> FirstRun:
     settings = Settings()
     reason = reason_unusable(recording, settings.tuning.soundness)
     observed = None if reason else observe(recording.runs, present.arm, present.inertial, settings)
-    reason = reason if observed is None else observed.reason_too_short
+    reason = reason if observed is None else observed.reason_too_short(present.arm)
     if reason or observed is None:
         raise InputError(f"--recording {recording.name}: {reason}")
     scenes, torques = [], []

@@ -7,17 +7,26 @@ import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report.numbers import format_number
+from armlab.common.report.words import join_words
 from armlab.diagnosis.real_arms.checks import MIN_FRICTION_SHARE, Check, mass_agreement, mass_claims, named_mass
 from armlab.diagnosis.real_arms.checks import numbers_in_words as claim_numbers
 from armlab.diagnosis.real_arms.direct_reading import MIDDLE
 from armlab.diagnosis.real_arms.figure import MODEL_STYLES, PICTURE_NAME
 from armlab.diagnosis.real_arms.study import AloneStudy, ArmStudy, Line, ModelName
 from armlab.diagnosis.report.verdict import verdict_sentences
-from armlab.diagnosis.report.words import effect_in_words, finding_in_words, joint_unit, place_in_words
+from armlab.diagnosis.report.words import (
+    effect_in_words,
+    finding_in_words,
+    joint_unit,
+    place_in_words,
+    rival_in_words,
+    variable_in_words,
+)
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR
 from armlab.identification.real.looks import LOOKS_FILE
 from armlab.identification.real.study import describe_study
+from problem.joint_words import joint_in_words
 
 PAGE_NAME, TABLE_NAME = "arms.md", "arms.csv"
 MODELS: tuple[ModelName, ...] = tuple(MODEL_STYLES)
@@ -123,8 +132,9 @@ def _study_parts(study: ArmStudy) -> Iterator[str]:
         if diagnosis.claims:
             yield claims_table(diagnosis)
         for each in diagnosis.unexplained:
-            depends = ", ".join(each.depends_on)
-            yield f"Unexplained at joint {each.joint}: {100 * each.share:.0f} % of the held-out variance, by {depends}."
+            arm, share = diagnosis.simulation.arm, f"{100 * each.share:.0f} %"
+            depends = join_words([variable_in_words(arm, name) for name in each.depends_on])
+            yield f"Unexplained at {joint_in_words(arm, each.joint)}: {share} of the held-out variance, by {depends}."
     if study.alone:
         yield from _alone_parts(study)
 
@@ -136,16 +146,16 @@ def claims_table(diagnosis: Diagnosis) -> str:
 
 
 def _claim_row(diagnosis: Diagnosis, claim: Claim) -> list[str]:
-    evidence = claim.evidence
-    unit = joint_unit(diagnosis.simulation.arm, evidence.joint)
+    evidence, arm = claim.evidence, diagnosis.simulation.arm
+    unit = joint_unit(arm, evidence.joint)
     errors = f"{format_number(evidence.rms_before)}, {format_number(evidence.rms_after)} {unit}"
     return [
         effect_in_words(claim.effect),
-        place_in_words(claim.effect, claim.joint, claim.joints),
+        place_in_words(arm, claim.effect, claim.joint, claim.joints),
         f"`{claim.equation}`",
         claim_numbers(claim) or "–",
-        f"{errors} (joint {evidence.joint + 1})",
-        "; ".join(finding_in_words(each) for each in claim.rivals) or "–",
+        f"{errors} ({joint_in_words(arm, evidence.joint + 1)})",
+        "; ".join(rival_in_words(arm, each) for each in claim.rivals) or "–",
     ]
 
 
@@ -161,7 +171,7 @@ def _alone_parts(study: ArmStudy) -> Iterator[str]:
 
 
 def _alone_row(alone: AloneStudy) -> list[str]:
-    claims = mass_claims(alone.diagnosis)
+    claims, arm = mass_claims(alone.diagnosis), alone.diagnosis.simulation.arm
     springs = [each for each in alone.diagnosis.claims if each.effect in COUNTERBALANCE_EFFECTS]
     errors = [
         f"{run} " + ", ".join(f"{each.recorded:.1f} / {each.filtered:.1f}" for each in found.values())
@@ -169,8 +179,8 @@ def _alone_row(alone: AloneStudy) -> list[str]:
     ]
     return [
         alone.run,
-        "; ".join(f"{finding_in_words(each)}: {claim_numbers(each)}" for each in claims) or "nothing",
-        "; ".join(finding_in_words(each) for each in springs) or "–",
+        "; ".join(f"{finding_in_words(arm, each)}: {claim_numbers(each)}" for each in claims) or "nothing",
+        "; ".join(finding_in_words(arm, each) for each in springs) or "–",
         "; ".join(errors) or "–",
     ]
 

@@ -22,8 +22,9 @@ from armlab.diagnosis.real_concealed.examine import Outcome, ReportedFinding, op
 from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart
 from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
-from armlab.diagnosis.report.words import effect_in_words, place_in_words
+from armlab.diagnosis.report.words import effect_in_words
 from armlab.effects.contract import UNKNOWN
+from armlab.effects.library import effect_named
 from armlab.identification.real.looks import LOOKS_FILE, Looks
 
 ANSWER_WORDS = {
@@ -38,9 +39,12 @@ ANSWER_WORDS = {
 
 
 def finding_in_words(finding: ReportedFinding) -> str:
-    """A finding with its place."""
-    joint = finding.joints[0] if finding.joints else None
-    return f"{effect_in_words(finding.effect)}, {place_in_words(finding.effect, joint, finding.joints)}"
+    """A finding with its place, by number as the plan of the concealed effects."""
+    place = "the whole robot"
+    if finding.joints:
+        kind = "link" if effect_named(finding.effect).where == "link" else "joint"
+        place = f"{kind} {' from joint '.join(map(str, finding.joints[:2]))}"
+    return f"{effect_in_words(finding.effect)}, {place}"
 
 
 def answer_in_words(part: JudgedPart) -> str:

@@ -15,8 +15,10 @@ from armlab.common.report.charts import (
     svg_text,
 )
 from problem.arm import Arm
+from problem.joint_words import joint_in_words
 
 PICTURE_WIDTH, ROW_HEIGHT = 412.0, 17.0
+MARK_HEIGHT = 13.0  # px: of the line under a joint's name that says what was found there
 ARM_WIDTH = 168.0  # px: width of the arm itself; the names stand beside it
 BOLD = 1.1  # width of bold letters over that of others, about
 ELEVATION = np.deg2rad(18)
@@ -69,7 +71,8 @@ def clearest_posture(arm: Arm, positions: Array) -> Array:
 def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: Sequence[str] = ()) -> Markup:
     """The arm as SVG. marks: by joint, from 1. whole: what concerns the robot as a whole."""
     bones = arm_skeleton(arm, position)
-    height = max(230.0, 46.0 + ROW_HEIGHT * (len(arm) + len(whole)))
+    rows = ROW_HEIGHT * (len(arm) + len(whole)) + MARK_HEIGHT * len(marks)
+    height = max(230.0, 46.0 + rows)
     flat = _project_skeleton(bones, np.asarray(arm.gravity))
     scale, shift = _fit_to_picture(flat.path, height)
     content = _draw_base(flat.path[0] * scale + shift) + _draw_links(flat.path * scale + shift)
@@ -83,7 +86,8 @@ def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: S
         for index in reversed(range(len(arm)))
     )
     content += _draw_names(arm, flat.centres * scale + shift, marks, height) + _draw_whole_robot(whole, height)
-    guilty = ", ".join(f"joint {joint}: {mark.text}" for joint, mark in sorted(marks.items())) or "no joint is marked"
+    named = [f"{joint_in_words(arm, joint)}: {mark.text}" for joint, mark in sorted(marks.items())]
+    guilty = ", ".join(named) or "no joint is marked"
     return svg_picture(content, PICTURE_WIDTH, height, f"The arm {arm.name} as a line drawing; {guilty}")
 
 
@@ -174,10 +178,11 @@ def _draw_joint(centre: Array, axis: Array, mark: JointMark | None, size: float)
 def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height: float) -> str:
     """One row a joint beside the arm, from the highest to the lowest, with a line to the joint.
 
-    The joint's name stands first and whole; what is said of it ends where the picture does.
+    What is said of a joint stands under its name.
     """
     order = np.lexsort((np.arange(len(arm)), centres[:, 1]))
-    rows = 30 + ROW_HEIGHT * np.arange(len(arm)) + max(0.0, (height - 46 - ROW_HEIGHT * len(arm)) / 2)
+    steps = [ROW_HEIGHT + MARK_HEIGHT * (int(index) + 1 in marks) for index in order]
+    rows = 30 + np.cumsum([0.0, *steps[:-1]]) + max(0.0, (height - 46 - sum(steps)) / 2)
     out = ""
     for row, index in zip(rows, order, strict=True):
         mark = marks.get(int(index) + 1)
@@ -192,9 +197,11 @@ def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height
             stroke_width=1.2 if mark else 0.6,
             stroke_dasharray="none" if mark else "1 3",
         )
-        text = f"{index + 1}  {arm.joints[index].name}" + (f": {mark.text}" if mark else "")
         room = (PICTURE_WIDTH - start - 2) / (BOLD if mark else 1.0)
-        out += svg_text(shorten_text(text, room, 10.5), start, row, 10.5, fill=color, font_weight=weight)
+        name = shorten_text(joint_in_words(arm, int(index) + 1), room, 10.5)
+        out += svg_text(name, start, row, 10.5, fill=color, font_weight=weight)
+        if mark:
+            out += svg_text(shorten_text(mark.text, room, 10.5), start, row + MARK_HEIGHT, 10.5, fill=color)
     return out
 
 

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from armlab.common.report.numbers import count_of, format_number
 from armlab.common.report.page import Table
+from armlab.common.report.words import join_words
 from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.diagnosis.report.words import (
@@ -16,18 +17,20 @@ from armlab.diagnosis.report.words import (
     format_gap,
     format_probability,
     format_share,
-    join_words,
     joint_unit,
     parameter_rows,
-    place_in_words,
+    rival_in_words,
+    variable_in_words,
 )
-from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.diagnosis.story import finding_shares, story_sentence, tell_story
+from armlab.diagnosis.result import Claim, Diagnosis, Rival
+from armlab.diagnosis.story import claims_by_share, story_sentence, tell_story
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from armlab.recordings.reading.words import describe
+from problem.arm import Arm
+from problem.joint_words import joint_at_start, joint_in_table, joint_in_words
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ class SetupPart:
 def story_text(diagnosis: Diagnosis) -> str:
     """The causes of the error in a sentence; empty without findings."""
     chapters = tell_story(diagnosis)
-    return story_sentence(chapters, len(diagnosis.simulation.arm)) if chapters else ""
+    return story_sentence(chapters, diagnosis.simulation.arm) if chapters else ""
 
 
 def cause_table(diagnosis: Diagnosis) -> Table | None:
@@ -74,7 +77,7 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
     rows = []
     for each in tell_story(diagnosis):
         names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
-        joints = ", ".join(str(joint) for joint in each.joints) or "all"
+        joints = ", ".join(joint_in_table(diagnosis.simulation.arm, joint) for joint in each.joints) or "all"
         rows.append([each.cause, joints, format_share(each.share), join_words(list(names))])
     return Table(["cause", "joints", "share of the error", "findings"], rows, (0, 1, 3)) if rows else None
 
@@ -88,7 +91,8 @@ def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
     for each in setup.findings:
         size = joint_unit(diagnosis.simulation.arm, each.worst_joint - 1)
         error = (
-            f"{format_number(each.rms_before)} → {format_number(each.rms_after)} {size} (joint {each.worst_joint}); "
+            f"{format_number(each.rms_before)} → {format_number(each.rms_after)} {size} "
+            f"({joint_in_words(diagnosis.simulation.arm, each.worst_joint)}); "
             f"{each.share_before:.0%} → {each.share_after:.0%} of its torque"
         )
         rivals = "; ".join(rival.text for rival in each.rivals)
@@ -115,7 +119,9 @@ def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> Table:
             1e3 * correlation_seconds(residual[:, joint], joint, data.observed) for residual in (data.refit, data.final)
         ]
         memory = f"{times[0]:.0f} → {times[1]:.0f} ms"
-        rows.append([str(each.joint), *first, *errors, format_gap(each.gap_closed), memory])
+        rows.append(
+            [joint_in_table(diagnosis.simulation.arm, each.joint), *first, *errors, format_gap(each.gap_closed), memory]
+        )
     headings.append(f"memory (filter {1e3 * filter_correlation_seconds(data.observed):.0f} ms)")
     return Table(headings, rows, stacked=True)
 
@@ -124,45 +130,53 @@ def whiteness_text(diagnosis: Diagnosis, data: ShownResiduals) -> str:
     """Whether what is left is noise: a floor that remembers itself holds structure too."""
     joints = [joint for joint in range(len(diagnosis.fit)) if not is_white(data.final[:, joint], joint, data.observed)]
     times = [1e3 * correlation_seconds(data.final[:, joint], joint, data.observed) for joint in joints]
-    tied = [f"{joint + 1} ({each:.0f} ms)" for joint, each in zip(joints, times, strict=True)]
+    arm = diagnosis.simulation.arm
+    tied = [f"{joint_in_words(arm, joint + 1)} ({each:.0f} ms)" for joint, each in zip(joints, times, strict=True)]
     if not tied:
         return "What is left is as white as noise through this filter would be."
     filtered = 1e3 * filter_correlation_seconds(data.observed)
     return (
-        f"What is left is not white at joint {', '.join(tied)}: it is tied to itself for longer than noise through "
+        f"What is left is not white at {join_words(tied)}: it is tied to itself for longer than noise through "
         f"this filter ({filtered:.0f} ms), so the noise floor there holds structure too."
     )
 
 
 def finding_details(diagnosis: Diagnosis, gallery: Gallery) -> list[FindingDetail]:
     """Each finding with its equation, numbers, evidence and rivals, the largest share of the error first."""
-    shares = [share or 0.0 for share in finding_shares(diagnosis)]
-    order = sorted(range(len(shares)), key=lambda place: -shares[place])
-    return [_finding_detail(diagnosis, *gallery.evidence[place], shares[place]) for place in order]
+    pictures = {id(claim): picture for claim, picture in gallery.evidence}
+    return [
+        _finding_detail(diagnosis, claim, pictures[id(claim)], share) for claim, share in claims_by_share(diagnosis)
+    ]
 
 
 def _finding_detail(diagnosis: Diagnosis, claim: Claim, picture: Markup, share: float) -> FindingDetail:
-    evidence = claim.evidence
-    size = joint_unit(diagnosis.simulation.arm, evidence.joint)
+    evidence, arm = claim.evidence, diagnosis.simulation.arm
+    size = joint_unit(arm, evidence.joint)
     before, after = format_number(evidence.rms_before), format_number(evidence.rms_after)
+    where = joint_at_start(arm, evidence.joint + 1)
     gain = (
-        f"Joint {evidence.joint + 1} on held-out data: {before} {size} without it, {after} {size} with it (whitened, "
+        f"{where} on held-out data: {before} {size} without it, {after} {size} with it (whitened, "
         f"its variance is {format_number(1 + evidence.gain)} times as large without it). "
         f"p-value {format_probability(evidence.corrected)} after correction for everything that was compared."
     )
-    title = finding_in_words(claim)
     return FindingDetail(
-        title=title[0].upper() + title[1:],
+        title=_finding_at_start(arm, claim),
         share=format_share(share),
-        error=f"joint {evidence.joint + 1}: {before} → {after} {size}",
+        error=f"{joint_in_words(arm, evidence.joint + 1)}: {before} → {after} {size}",
         about=effect_named(claim.effect).meaning,
         equation=claim.equation,
         picture=picture,
         numbers=parameter_table(claim),
         gain=gain,
-        rivals=[_rival_text(claim, place) for place in range(len(claim.rivals))],
+        rivals=[_rival_text(arm, each) for each in claim.rivals],
         next_experiment=claim.next_experiment or "",
     )
+
+
+def _finding_at_start(arm: Arm, claim: Claim) -> str:
+    """A finding with its place, at the start of a line."""
+    words = finding_in_words(arm, claim)
+    return words[0].upper() + words[1:]
 
 
 def parameter_table(claim: Claim) -> Table:
@@ -173,21 +187,21 @@ def parameter_table(claim: Claim) -> Table:
     return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3))
 
 
-def _rival_text(claim: Claim, place: int) -> str:
-    each = claim.rivals[place]
+def _rival_text(arm: Arm, each: Rival) -> str:
     why = (
         "no motion of that joint alone can tell the two apart; armlab next says whether one of the whole arm can"
         if each.identical
         else f"on this very motion it fits as well ({format_number(each.deficit)} units of log likelihood worse)"
     )
-    return f"{effect_in_words(each.effect)}, {place_in_words(each.effect, each.joint, each.joints)}: {why}"
+    return f"{rival_in_words(arm, each)}: {why}"
 
 
 def unexplained_lines(diagnosis: Diagnosis) -> list[str]:
     """What stays without a name, joint by joint."""
+    arm = diagnosis.simulation.arm
     return [
-        f"Joint {each.joint}: {100 * each.share:.0f} % of the held-out error variance depends on "
-        f"{', '.join(name.replace('_', ' of joint ') for name in each.depends_on)}, and no effect of the library has "
+        f"{joint_at_start(arm, each.joint)}: {100 * each.share:.0f} % of the held-out error variance depends on "
+        f"{join_words([variable_in_words(arm, name) for name in each.depends_on])}, and no effect of the library has "
         "that form. A surrogate of these variables is in the errors above, not in model.yaml."
         for each in diagnosis.unexplained
     ]
@@ -195,10 +209,14 @@ def unexplained_lines(diagnosis: Diagnosis) -> list[str]:
 
 def located_table(diagnosis: Diagnosis) -> Table:
     """Which joints carry the excess error, and in which regime."""
-    rows = []
+    rows, arm = [], diagnosis.simulation.arm
     for each in diagnosis.located:
+        where = each.regime
+        if each.variable is not None:
+            where = variable_in_words(arm, each.variable) + each.regime.removeprefix(each.variable)
         stretch = "–" if each.time is None else f"{format_number(each.time[0])} to {format_number(each.time[1])} s"
-        rows.append([str(each.joint), format_share(each.share), each.regime, ", ".join(each.runs) or "–", stretch])
+        joint, runs = joint_in_table(arm, each.joint), ", ".join(each.runs) or "–"
+        rows.append([joint, format_share(each.share), where, runs, stretch])
     return Table(["joint", "share of the excess error", "where", "runs", "stretch of time"], rows, (2, 3, 4))
 
 
@@ -207,8 +225,8 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
     if not diagnosis.fit:
         return []
     asked = [
-        f"{finding_in_words(claim)[0].upper()}{finding_in_words(claim)[1:]}: {claim.next_experiment}."
-        for claim in diagnosis.claims
+        f"{_finding_at_start(diagnosis.simulation.arm, claim)}: {claim.next_experiment}."
+        for claim, _ in claims_by_share(diagnosis)
         if claim.next_experiment
     ]
     if any(claim.rivals for claim in diagnosis.claims):

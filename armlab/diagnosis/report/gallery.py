@@ -15,17 +15,13 @@ from armlab.diagnosis.report.torque_pictures import (
     draw_located_errors,
     draw_torques,
 )
-from armlab.diagnosis.report.words import effect_in_words
+from armlab.diagnosis.report.words import SOMETHING_UNKNOWN, claim_in_words
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.diagnosis.story import finding_shares
-from armlab.effects.contract import UNKNOWN
+from armlab.diagnosis.story import claims_by_share
 from armlab.effects.library import effect_named
 
 MAX_POSTURES = 100  # recorded ones, of which the most telling is drawn
 MAX_LOCATED_JOINTS = 4  # joints whose error is drawn against every variable
-
-
-SOMETHING_UNKNOWN = "something unknown"
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +59,7 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
     arm = diagnosis.simulation.arm
     postures = data.observed.kept("position")[space_rows(np.arange(data.observed.rows), MAX_POSTURES)]
     position = clearest_posture(arm, postures)
-    whole = [effect_in_words(claim.effect) for claim in diagnosis.claims if claim.joint is None]
+    whole = [claim_in_words(claim) for claim in diagnosis.claims if claim.joint is None]
     worst = [each.joint for each in diagnosis.located[:MAX_LOCATED_JOINTS]]
     located = [(joint, draw_located_errors(diagnosis, data, joint - 1)) for joint in worst]
     motions, motion_text = draw_motion(diagnosis)
@@ -86,13 +82,10 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
 def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
     """What is said of each joint in the picture of the arm."""
     texts: dict[int, list[str]] = {}
-    shares = [share or 0.0 for share in finding_shares(diagnosis)]
-    for place in sorted(range(len(shares)), key=lambda place: -shares[place]):
-        claim = diagnosis.claims[place]
+    for claim, _ in claims_by_share(diagnosis):
         if claim.joint is not None:
-            facts = effect_named(claim.effect)
-            words = SOMETHING_UNKNOWN if facts == UNKNOWN else facts.words
-            texts.setdefault(claim.joint, []).append(f"link: {words}" if facts.where == "link" else words)
+            is_link = effect_named(claim.effect).where == "link"
+            texts.setdefault(claim.joint, []).append(f"{'link: ' if is_link else ''}{claim_in_words(claim)}")
     return {joint: JointMark(_short_mark(names), SOMETHING_UNKNOWN in names) for joint, names in texts.items()}
 
 

@@ -20,10 +20,12 @@ from armlab.common.report.charts import (
     fit_axis,
 )
 from armlab.common.report.numbers import format_number
-from armlab.diagnosis.report.words import join_words, shorten_name
+from armlab.common.report.words import join_words
+from armlab.diagnosis.report.words import shorten_name
 from armlab.diagnosis.resimulate import WINDOW_SECONDS, NoInertiaError, Resimulation, resimulate
 from armlab.diagnosis.result import Diagnosis
 from armlab.recordings.recording import Run
+from problem.joint_words import joint_at_start
 
 MAX_DRAWN_WINDOWS = 3  # joints whose most telling window is drawn
 MOTION_HEIGHT = 215.0
@@ -76,7 +78,7 @@ def _draw_growths(diagnosis: Diagnosis, resimulation: Resimulation) -> list[Mark
         ends = [float(each.y[-1]) for each in lines]
         floor = max(min(ends) / MAX_ERROR_RATIO, 1e-12)
         y = fit_axis(f"rms error, {size} (log)", *(np.maximum(each.y, floor) for each in lines), log=True)
-        title = f"Joint {joint + 1}: growth of the position error"
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: growth of the position error"
         about = (
             f"{title}; after {format_number(float(time[-1]))} s: "
             f"{join_words([format_number(end) for end in ends])} {size}"
@@ -101,7 +103,8 @@ def _draw_windows(diagnosis: Diagnosis, resimulation: Resimulation) -> list[Mark
             f"position, {_position_unit(diagnosis, joint)}", *(each.y for each in lines if isinstance(each, Line))
         )
         x = Axis(f"time in {shorten_name(resimulation.run)}, s", float(time[0]), float(time[-1]))
-        out.append(draw_chart(f"Joint {joint + 1}: measured and simulated motion", x, y, lines, height=MOTION_HEIGHT))
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: simulated motion"
+        out.append(draw_chart(title, x, y, lines, height=MOTION_HEIGHT))
     return out
 
 
@@ -130,7 +133,8 @@ def draw_motion_differences(diagnosis: Diagnosis) -> tuple[list[Markup], str]:
             f"difference, {size}", *(MILLI_PER_UNIT * difference[:, joint] for _, difference in differences), zero=True
         )
         x = Axis(f"time in {shorten_name(chosen.name)}, s", float(time[0]), float(time[-1]))
-        pictures.append(draw_chart(f"Joint {joint + 1}: difference of motion", x, y, lines, height=DIFFERENCE_HEIGHT))
+        title = f"{shorten_name(joint_at_start(arm, joint + 1))}: difference of motion"
+        pictures.append(draw_chart(title, x, y, lines, height=DIFFERENCE_HEIGHT))
     for look, difference in differences:
         sizes = [
             format_number(MILLI_PER_UNIT * float(np.sqrt(np.nanmean(difference[:, joint] ** 2))))

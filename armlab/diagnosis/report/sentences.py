@@ -13,12 +13,23 @@ from itertools import starmap
 import numpy as np
 
 from armlab.common.report.numbers import format_unit
-from armlab.diagnosis.report.words import effect_in_words, format_fixed, format_measured, join_words, place_in_words
+from armlab.common.report.words import join_words
+from armlab.diagnosis.report.words import (
+    effect_in_words,
+    format_fixed,
+    format_measured,
+    is_doubtful,
+    is_negative_load,
+    may_be_zero,
+    place_in_words,
+)
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named
-from armlab.effects.parameters import ParameterValue
+from armlab.effects.parameters import Interval, ParameterValue
+from problem.arm import Arm
+from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
 MILLI = 1e3  # mm in a m
 
@@ -29,16 +40,16 @@ def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most:
     """
     unknown = [claim for claim in claims if claim.effect == UNKNOWN.id]
     lacking = [claim for claim in claims if claim.effect != UNKNOWN.id and not _facts(claim).sentence]
-    differing: dict[tuple[str, str], list[Claim]] = {}
+    differing: dict[tuple[str, str, bool], list[Claim]] = {}
     for claim in claims:
         if claim.effect != UNKNOWN.id and _facts(claim).sentence:
-            differing.setdefault((claim.effect, rivals_in_words(claim)), []).append(claim)
+            differing.setdefault((claim.effect, rivals_in_words(claim), is_doubtful(claim)), []).append(claim)
     groups = list(differing.values())
     sentences = [_lacking_sentence(lacking, simulation)] if lacking else []
     sentences += [_differing_sentence(own, simulation) for own in groups[:most]]
     sentences += _count_sentence(sum(len(own) for own in groups[most:]))
     if unknown:
-        sentences.append(UNKNOWN.sentence.format(place=_places(unknown)))
+        sentences.append(UNKNOWN.sentence.format(place=_places(simulation.arm, unknown)))
     return " ".join(f"{each}." for each in sentences)
 
 
@@ -50,27 +61,46 @@ def _differing_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
         return finding_sentence(claims[0], simulation) + also
     ordered = sorted(claims, key=lambda each: each.joint or 0)
     facts = _facts(claims[0])
-    sentence = facts.sentence.format(model=model_in_words(simulation), place=_places(ordered))
+    sentence = facts.sentence.format(model=model_in_words(simulation), place=_places(simulation.arm, ordered))
     numbers = [
         _figures(facts, [replace(one, interval=None) for one in each.parameters], _frame(each, simulation))
         for each in ordered
     ]
     shown = [each for each in numbers if each]
-    return _capitalise(sentence) + (f": {join_words(shown)}" if shown else "") + also
+    return _begin(sentence, is_doubtful(claims[0])) + (f": {join_words(shown)}" if shown else "") + also
 
 
 def finding_sentence(claim: Claim, simulation: Simulation) -> str:
     """One finding with its numbers, without rivals and without a full stop."""
-    facts, place, model = _facts(claim), _places([claim]), model_in_words(simulation)
+    facts, place, model = _facts(claim), _places(simulation.arm, [claim]), model_in_words(simulation)
     if not facts.sentence:
-        return _capitalise(f"{model} lacks {facts.words} at {place}")
+        return _begin(f"{model} lacks {facts.words} at {place}", is_doubtful(claim))
     sentence = facts.sentence.format(model=model, place=place)
-    figures = _figures(facts, claim.parameters, _frame(claim, simulation))
-    return _capitalise(sentence) + (f": {figures}" if figures else "")
+    if is_negative_load(claim):
+        sentence = f"The arm has less mass than {model}"
+    figures = claim_figures(claim, simulation)
+    return _begin(sentence, is_doubtful(claim)) + (f": {figures}" if figures else "")
+
+
+def claim_figures(claim: Claim, simulation: Simulation) -> str:
+    """The numbers of a finding: `2.00 kg (1.998 to 2.003) at (0, 20, 60) mm of wrist_3`."""
+    parameters = claim.parameters
+    if is_negative_load(claim):
+        parameters = tuple(_as_less(each) if each.name == "mass" else each for each in parameters)
+    return _figures(_facts(claim), parameters, _frame(claim, simulation))
+
+
+def _as_less(mass: ParameterValue) -> ParameterValue:
+    """A mass of the other sign."""
+    interval: Interval | None = None
+    if mass.interval is not None:
+        low, high = np.asarray(mass.interval, dtype=float).tolist()
+        interval = (-high, -low)
+    return replace(mass, value=-float(np.asarray(mass.value)), interval=interval)
 
 
 def _frame(claim: Claim, simulation: Simulation) -> str:
-    return "" if claim.joint is None else simulation.arm.joints[claim.joint - 1].name
+    return "" if claim.joint is None else joint_in_words(simulation.arm, claim.joint)
 
 
 def model_in_words(simulation: Simulation) -> str:
@@ -83,14 +113,16 @@ def _facts(claim: Claim) -> Effect:
 
 
 def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
-    """What the model lacks, one effect at several joints together where its rivals are the same."""
-    groups: dict[tuple[str, str], list[Claim]] = {}
+    """What the model lacks, with one place for all effects that have it, and their rivals, in common."""
+    groups: dict[tuple[bool, str, str], list[Claim]] = {}
     for claim in sorted(claims, key=lambda each: each.joint or 0):
-        groups.setdefault((claim.effect, rivals_in_words(claim)), []).append(claim)
-    lacking = [
-        f"{effect_in_words(effect)}{_size(own)} at {_places(own)}{f' (or {rivals})' if rivals else ''}"
-        for (effect, rivals), own in groups.items()
-    ]
+        groups.setdefault((is_doubtful(claim), claim.effect, rivals_in_words(claim)), []).append(claim)
+    names_by_place: dict[str, list[str]] = {}
+    for (doubtful, effect, rivals), own in sorted(groups.items(), key=lambda group: group[0][0]):
+        place = f"{_places(simulation.arm, own)}{f' (or {rivals})' if rivals else ''}"
+        name = f"{'perhaps ' if doubtful else ''}{effect_in_words(effect)}{_size(own)}"
+        names_by_place.setdefault(place, []).append(name)
+    lacking = [f"{join_words(names)} at {place}" for place, names in names_by_place.items()]
     return _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
 
 
@@ -103,13 +135,13 @@ def _size(claims: Sequence[Claim]) -> str:
     return f" of {figures}" if figures else ""
 
 
-def _places(claims: Sequence[Claim]) -> str:
-    """`joints 1 and 3`, `joint 2 from joint 1`, `the whole robot`."""
-    places = [place_in_words(claim.effect, claim.joint, claim.joints) for claim in claims]
-    if len(places) > 1 and all(re.fullmatch(r"(joint|link) \d+", each) for each in places):
-        what = places[0].split()[0]
-        return f"{what}s {join_words([each.split()[1] for each in places])}"
-    return join_words(places)
+def _places(arm: Arm, claims: Sequence[Claim]) -> str:
+    """Where an effect is: `joints 1 and 3`, `elbow from shoulder_lift`, `the whole robot`."""
+    joints = [claim.joint for claim in claims if claim.joint is not None and len(claim.joints) < 2]
+    if len(joints) < len(claims):
+        return join_words([place_in_words(arm, claim.effect, claim.joint, claim.joints) for claim in claims])
+    is_link = _facts(claims[0]).where == "link"
+    return links_in_words(arm, joints) if is_link else joints_in_words(arm, joints)
 
 
 def rivals_in_words(claim: Claim) -> str:
@@ -128,7 +160,15 @@ def _figures(facts: Effect, parameters: Sequence[ParameterValue], frame: str) ->
     values = {each.name: _format_value(each) for each in parameters}
     if not facts.figures:
         first = next((each for each in parameters if np.ndim(each.value) == 0), None)
-        return "" if first is None else f"{number_in_words(first.name)} {values[first.name]}"
+        if first is None:
+            return ""
+        name = number_in_words(first.name)
+        if not facts.in_links:
+            return f"{name} {values[first.name]}"
+        if may_be_zero(first):
+            return f"{name} perhaps {values[first.name]}"
+        is_lighter = first.name == "mass" and float(np.asarray(first.value)) < 0
+        return f"{_format_value(_as_less(first))} less mass" if is_lighter else f"{name} {values[first.name]}"
     if not values:
         return ""
     try:
@@ -168,6 +208,11 @@ def _millimetres(value: float, half: float) -> str:
     """A length, m, in whole mm; in tenths where its interval is that narrow."""
     decimals = 1 if MILLI * half < 1.0 else 0
     return f"{round(MILLI * value, decimals) + 0.0:.{decimals}f}".replace("-", "−")  # + 0.0: no minus before a zero
+
+
+def _begin(sentence: str, doubtful: bool) -> str:
+    """The sentence with its first letter large, or behind `Perhaps`."""
+    return f"Perhaps {sentence[0].lower()}{sentence[1:]}" if doubtful else _capitalise(sentence)
 
 
 def _capitalise(sentence: str) -> str:

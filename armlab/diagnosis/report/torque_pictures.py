@@ -2,6 +2,8 @@
 the error is.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from markupsafe import Markup
 
@@ -28,6 +30,7 @@ from armlab.common.report.charts import (
     Points,
     draw_chart,
     fit_axis,
+    shorten_text,
     svg_element,
     svg_picture,
     svg_text,
@@ -35,11 +38,13 @@ from armlab.common.report.charts import (
 )
 from armlab.common.report.numbers import format_number
 from armlab.diagnosis.report.residuals import ShownResiduals, bin_means, clearest_stretch, residual_without, space_rows
-from armlab.diagnosis.report.words import effect_in_words, joint_unit, shorten_name
+from armlab.diagnosis.report.words import claim_name, joint_unit, shorten_name
 from armlab.diagnosis.result import Claim, Diagnosis
+from problem.joint_words import joint_at_start, joint_in_words
 
 STRETCH_SECONDS = 4.0
 JOINT_ROW_HEIGHT = 26.0
+MAX_NAMES_WIDTH = 150.0  # px: of the names of joints beside a plot; longer ones are cut
 Series = list[tuple[Look, Array]]
 
 
@@ -48,18 +53,23 @@ def draw_errors_by_joint(diagnosis: Diagnosis, data: ShownResiduals) -> Markup:
     series: Series = [(REFITTED_LOOK, data.held_out_rms(data.refit)), (FOUND_LOOK, data.held_out_rms(data.final))]
     if data.given is not None:
         series.insert(0, (GIVEN_LOOK, data.held_out_rms(data.given)))
+    arm = diagnosis.simulation.arm
     floors = np.array([each.noise_floor for each in diagnosis.fit])
-    kinds = {joint_unit(diagnosis.simulation.arm, joint) for joint in range(len(floors))}
+    kinds = {joint_unit(arm, joint) for joint in range(len(floors))}
     axis = fit_axis(f"rms error, {' or '.join(sorted(kinds))}", *(each for _, each in series), floors, log=True)
+    names = [shorten_name(joint_in_words(arm, joint + 1)) for joint in range(len(floors))]
+    left = float(np.clip(max(map(text_width, names)) + 12, LEFT_MARGIN, MAX_NAMES_WIDTH))
     top = 62.0
     height = top + JOINT_ROW_HEIGHT * len(floors) + 42
     content = svg_text("Error on held-out data", 6, 14, 12, font_weight="600") + _draw_marks_legend(series)
-    content += _draw_grid(axis, top, height)
-    for joint in range(len(floors)):
-        content += _draw_joint_row(axis, top + JOINT_ROW_HEIGHT * (joint + 0.5), joint, series, float(floors[joint]))
+    content += _draw_grid(axis, left, top, height)
+    for joint, name in enumerate(names):
+        y = top + JOINT_ROW_HEIGHT * (joint + 0.5)
+        content += svg_text(shorten_text(name, left - 12), 6, y + 4, 11)
+        content += _draw_joint_row(axis, left, y, [(look, float(each[joint])) for look, each in series], floors[joint])
     values = "; ".join(
-        f"joint {joint + 1}: {', '.join(f'{look.name} {format_number(float(each[joint]))}' for look, each in series)}"
-        for joint in range(len(floors))
+        f"{name}: {', '.join(f'{look.name} {format_number(float(each[joint]))}' for look, each in series)}"
+        for joint, name in enumerate(names)
     )
     return svg_picture(content, CHART_WIDTH, height, f"Held-out error by joint, logarithmic. {values}")
 
@@ -75,27 +85,27 @@ def _draw_marks_legend(series: Series) -> str:
     return out
 
 
-def _draw_grid(axis: Axis, top: float, height: float) -> str:
+def _draw_grid(axis: Axis, left: float, top: float, height: float) -> str:
+    """left: px, where the plot begins, behind the names."""
     out = ""
     for value, text in axis.ticks(6):
-        x = _axis_position(axis, value)
+        x = _axis_position(axis, left, value)
         out += svg_element("line", x1=x, x2=x, y1=top, y2=height - 40, stroke=palette.GRID)
         out += svg_text(text, x, height - 25, 10.5, "middle", fill=palette.PALE)
     return out + svg_text(
-        f"{axis.label} (logarithmic)", (LEFT_MARGIN + CHART_WIDTH - RIGHT_MARGIN) / 2, height - 8, 11, "middle"
+        f"{axis.label} (logarithmic)", (left + CHART_WIDTH - RIGHT_MARGIN) / 2, height - 8, 11, "middle"
     )
 
 
-def _draw_joint_row(axis: Axis, y: float, joint: int, series: Series, floor: float) -> str:
-    places = [_axis_position(axis, float(each[joint])) for _, each in series]
-    out = svg_text(f"joint {joint + 1}", 6, y + 4, 11)
-    out += svg_element("line", x1=min(places), x2=max(places), y1=y, y2=y, stroke=palette.STROKE, stroke_width=2)
-    out += _draw_mark(_axis_position(axis, floor), y, FLOOR_LOOK)
-    return out + "".join(_draw_mark(x, y, look) for x, (look, _) in zip(places, series, strict=True))
+def _draw_joint_row(axis: Axis, left: float, y: float, errors: Sequence[tuple[Look, float]], floor: float) -> str:
+    places = [_axis_position(axis, left, value) for _, value in errors]
+    out = svg_element("line", x1=min(places), x2=max(places), y1=y, y2=y, stroke=palette.STROKE, stroke_width=2)
+    out += _draw_mark(_axis_position(axis, left, floor), y, FLOOR_LOOK)
+    return out + "".join(_draw_mark(x, y, look) for x, (look, _) in zip(places, errors, strict=True))
 
 
-def _axis_position(axis: Axis, value: float) -> float:
-    return float(LEFT_MARGIN + 4 + (CHART_WIDTH - LEFT_MARGIN - RIGHT_MARGIN - 8) * np.clip(axis.at(value), 0, 1))
+def _axis_position(axis: Axis, left: float, value: float) -> float:
+    return float(left + 4 + (CHART_WIDTH - left - RIGHT_MARGIN - 8) * np.clip(axis.at(value), 0, 1))
 
 
 def _draw_mark(x: float, y: float, look: Look) -> str:
@@ -126,7 +136,8 @@ def draw_torques(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
         values = [each.y for each in lines if isinstance(each, Line)]
         y = fit_axis(f"{'torque' if size == 'N m' else 'force'}, {size}", *values)
         x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
-        out.append(draw_chart(f"Joint {joint + 1}: measured and predicted", x, y, lines))
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: measured and predicted"
+        out.append(draw_chart(title, x, y, lines))
     return out
 
 
@@ -145,7 +156,7 @@ def draw_errors(diagnosis: Diagnosis, data: ShownResiduals) -> list[Markup]:
         lines += [Level(sign * fit.noise_floor, FLOOR_LOOK) for sign in (1, -1)]
         y = fit_axis(f"measured − predicted, {size}", *(left[rows, joint] for _, left in models), zero=True)
         x = Axis(f"time in {shorten_name(run)}, s", float(time[0]), float(time[-1]))
-        title = f"Joint {joint + 1}: error"
+        title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: error"
         out.append(draw_chart(title, x, y, lines, f"{title} over {run}, measured less predicted, with the noise floor"))
     return out
 
@@ -170,7 +181,8 @@ def draw_evidence(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) -> M
     layers += _law_layers(x[used], law[used], LAW_LOOK if claim.candidate else SURROGATE_LOOK)
     size = joint_unit(diagnosis.simulation.arm, joint)
     y = fit_axis(f"left without it, {size}", np.quantile(left[used], [0.002, 0.998]), law[used])
-    title = f"{effect_in_words(claim.effect).capitalize()}, joint {joint + 1}"
+    name = claim_name(claim)
+    title = f"{name[0].upper()}{name[1:]}, {shorten_name(joint_in_words(diagnosis.simulation.arm, joint + 1))}"
     return draw_chart(
         title, fit_axis(label, x[used]), y, layers, f"{title}: torque left without it against {label}, and its law"
     )
@@ -185,7 +197,7 @@ def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) 
     if axis in MOTION_UNITS and moving >= 0:
         return _motion_variable(diagnosis, data, axis, moving)
     if axis == "cycle" and moving >= 0:
-        return _cycle_variable(data, claim, moving)
+        return _cycle_variable(diagnosis, data, claim, moving)
     if axis == "time" or claim.depends_on[:1] == ("time",):
         return "time from the start of the run, s", observed.time
     for name in claim.depends_on:
@@ -198,25 +210,25 @@ def evidence_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim) 
 
 
 def _motion_variable(diagnosis: Diagnosis, data: ShownResiduals, kind: str, joint: int) -> tuple[str, Array]:
-    units = MOTION_UNITS[kind]
-    unit = units[0] if diagnosis.simulation.arm.joints[joint].kind == "revolute" else units[1]
-    return f"{kind} of joint {joint + 1}, {unit}", data.observed.kept(kind)[:, joint]
+    units, arm = MOTION_UNITS[kind], diagnosis.simulation.arm
+    unit = units[0] if arm.joints[joint].kind == "revolute" else units[1]
+    return f"{kind} of {shorten_name(joint_in_words(arm, joint + 1))}, {unit}", data.observed.kept(kind)[:, joint]
 
 
 def _load_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
     """Torque of the model without the finding."""
     torque = data.observed.torque[:, joint] - data.final[:, joint] - claim.prediction[:, joint]
-    return f"torque of the model at joint {joint + 1}, {joint_unit(diagnosis.simulation.arm, joint)}", torque
+    arm = diagnosis.simulation.arm
+    return f"torque of the model at {shorten_name(joint_in_words(arm, joint + 1))}, {joint_unit(arm, joint)}", torque
 
 
-def _cycle_variable(data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
+def _cycle_variable(diagnosis: Diagnosis, data: ShownResiduals, claim: Claim, joint: int) -> tuple[str, Array]:
     """Position within one wave; the parameter `order` of the effect counts the waves a turn."""
     order = next((each.value for each in claim.parameters if each.name == "order"), 1.0)
     waves = float(order) if isinstance(order, float) and order else 1.0
     position = data.observed.kept("position")[:, joint]
-    return f"position of joint {joint + 1} within a wave of 1/{waves:.4g} turn, share", (
-        position * waves / FULL_TURN
-    ) % 1.0
+    where = shorten_name(joint_in_words(diagnosis.simulation.arm, joint + 1))
+    return f"position of {where} within a wave of 1/{waves:.4g} turn, share", (position * waves / FULL_TURN) % 1.0
 
 
 def _law_layers(x: Array, law: Array, look: Look) -> list[Layer]:
@@ -234,17 +246,19 @@ LOCATED_HEIGHT = 205.0
 
 def draw_located_errors(diagnosis: Diagnosis, data: ShownResiduals, joint: int) -> list[Markup]:
     """rms error of a joint (from 0) against its position, velocity, acceleration, and time."""
-    arm = diagnosis.simulation.arm
-    turns = arm.joints[joint].kind == "revolute"
-    pictures = []
-    for kind, (angle, length) in MOTION_UNITS.items():
-        label = f"{kind} of joint {joint + 1}, {angle if turns else length}"
-        pictures.append(_draw_error_against(diagnosis, data, joint, label, data.observed.kept(kind)[:, joint]))
-    over_time = _draw_error_against(diagnosis, data, joint, "time from the start of the run, s", data.observed.time)
-    return [*pictures, over_time]
+    pictures = [
+        _draw_error_against(diagnosis, data, joint, kind, _motion_variable(diagnosis, data, kind, joint))
+        for kind in MOTION_UNITS
+    ]
+    time = "time from the start of the run, s", data.observed.time
+    return [*pictures, _draw_error_against(diagnosis, data, joint, "time", time)]
 
 
-def _draw_error_against(diagnosis: Diagnosis, data: ShownResiduals, joint: int, label: str, x: Array) -> Markup:
+def _draw_error_against(
+    diagnosis: Diagnosis, data: ShownResiduals, joint: int, quantity: str, variable: tuple[str, Array]
+) -> Markup:
+    """variable: label and values (rows,) of the quantity."""
+    label, x = variable
     start = REFITTED_LOOK if data.given is None else GIVEN_LOOK
     used, layers = data.used(joint), []
     for look, residual in ((start, data.before), (FOUND_LOOK, data.final)):
@@ -253,6 +267,5 @@ def _draw_error_against(diagnosis: Diagnosis, data: ShownResiduals, joint: int, 
     floor = diagnosis.fit[joint].noise_floor
     size = joint_unit(diagnosis.simulation.arm, joint)
     y = fit_axis(f"rms error, {size}", *(layer.y for layer in layers), np.array([floor]), zero=True)
-    quantity = label.split(",")[0].replace(f" of joint {joint + 1}", "")
-    title = f"Joint {joint + 1}: error by {'time' if quantity.startswith('time') else quantity}"
+    title = f"{shorten_name(joint_at_start(diagnosis.simulation.arm, joint + 1))}: error by {quantity}"
     return draw_chart(title, fit_axis(label, x[used]), y, [*layers, Level(floor, FLOOR_LOOK)], height=LOCATED_HEIGHT)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from string import Formatter
 
 import numpy as np
 
@@ -10,9 +11,13 @@ from armlab.common.report.numbers import format_number, format_unit
 from armlab.diagnosis.result import Claim, Rival
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
+from armlab.effects.links import PAYLOAD_FACTS
 from armlab.effects.parameters import ParameterValue
 from problem.arm import Arm
+from problem.joint_words import joint_in_words, links_in_words
 
+SOMETHING_UNKNOWN = "something unknown"
+LESS_MASS = "less mass than modelled"
 MAX_NAME_LENGTH = 24  # letters
 PARAMETER_DIGITS = 4  # of a parameter
 COMPONENT_NAMES = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "xz", "yz")}
@@ -25,21 +30,75 @@ def effect_in_words(effect: str) -> str:
     return effect_named(effect).words
 
 
-def place_in_words(effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
+def place_in_words(arm: Arm, effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
     """Where an effect is: a joint, a link, a coupling, or the whole robot."""
     if joint is None:
         return "the whole robot"
     if effect_named(effect).where == "link":
-        return f"link {joint}"
-    return f"joint {joint} from joint {joints[1]}" if len(joints) > 1 else f"joint {joint}"
+        return links_in_words(arm, (joint,))
+    driver = f" from {joint_in_words(arm, joints[1])}" if len(joints) > 1 else ""
+    return f"{joint_in_words(arm, joint)}{driver}"
 
 
-def finding_in_words(claim: Claim | Rival) -> str:
-    """An effect with its place."""
+def finding_in_words(arm: Arm, claim: Claim) -> str:
+    """A finding with its place."""
+    return _at_place(arm, claim_in_words(claim), claim)
+
+
+def rival_in_words(arm: Arm, rival: Rival) -> str:
+    """An effect that fits as well, with its place."""
+    return _at_place(arm, effect_in_words(rival.effect), rival)
+
+
+def _at_place(arm: Arm, name: str, claim: Claim | Rival) -> str:
+    where = place_in_words(arm, claim.effect, claim.joint, claim.joints)
+    return f"{name} {'of' if claim.joint is None else 'at'} {where}"
+
+
+def claim_in_words(claim: Claim) -> str:
+    """The name of a finding, `perhaps` before one that may be nothing."""
+    return f"{'perhaps ' if is_doubtful(claim) else ''}{claim_name(claim)}"
+
+
+def claim_name(claim: Claim) -> str:
+    """The name of a finding: of its effect, but a load that weighs less than nothing is called what it is."""
     if claim.effect == UNKNOWN.id:
-        return f"something unknown at {place_in_words(claim.effect, claim.joint)}"
-    where = place_in_words(claim.effect, claim.joint, claim.joints)
-    return f"{effect_in_words(claim.effect)} {'of' if claim.joint is None else 'at'} {where}"
+        return SOMETHING_UNKNOWN
+    return LESS_MASS if is_negative_load(claim) else effect_in_words(claim.effect)
+
+
+def is_negative_load(claim: Claim) -> bool:
+    """Whether a load has a negative mass: then the arm has less mass there than the model."""
+    mass = next((each.value for each in claim.parameters if each.name == "mass"), 0.0)
+    return claim.effect == PAYLOAD_FACTS.id and isinstance(mass, float) and mass < 0
+
+
+def is_doubtful(claim: Claim) -> bool:
+    """Whether a finding may be nothing: the interval of its size reaches zero.
+
+    The size is the number that stands first in the effect's figures; of an effect without figures, all its numbers.
+    The numbers of a link that is off may each be nothing while the link is off.
+    """
+    facts = effect_named(claim.effect)
+    if facts.in_links:
+        return False
+    first = next((field for _, field, _, _ in Formatter().parse(facts.figures) if field is not None), None)
+    sizes = [each for each in claim.parameters if np.ndim(each.value) == 0 and first in (None, each.name)]
+    return bool(sizes) and all(map(may_be_zero, sizes))
+
+
+def may_be_zero(parameter: ParameterValue) -> bool:
+    """Whether the interval of a scalar reaches zero."""
+    if parameter.interval is None or np.ndim(parameter.value) > 0:
+        return False
+    low, high = np.asarray(parameter.interval, dtype=float).tolist()
+    return bool(low <= 0 <= high)
+
+
+def variable_in_words(arm: Arm, name: str) -> str:
+    """`velocity of shoulder_lift` of a variable like `velocity_2`; others, like `time`, as they are."""
+    kind, _, joint = name.rpartition("_")
+    return f"{kind} of {joint_in_words(arm, int(joint))}" if kind and joint.isdigit() else name
 
 
 def shorten_name(name: str) -> str:
@@ -124,8 +183,3 @@ def format_interval(low: float, high: float) -> str:
         return f"{format_number(low)} to {format_number(high)}"
     decimals = max(-math.floor(math.log10(half)), 0)
     return f"{low:.{decimals}f} to {high:.{decimals}f}".replace("-", "−")
-
-
-def join_words(parts: Sequence[str], last: str = "and") -> str:
-    """a, b and c."""
-    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"

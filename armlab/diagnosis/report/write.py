@@ -30,6 +30,7 @@ from armlab.diagnosis.verdict_files import (
 )
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
+from problem.joint_words import joint_at_start
 
 
 def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:
@@ -62,6 +63,9 @@ def _details(diagnosis: Diagnosis, gallery: Gallery) -> dict[str, Any]:
         "fits": content.fit_table(diagnosis, gallery.data),
         "whiteness": content.whiteness_text(diagnosis, gallery.data),
         "located": content.located_table(diagnosis),
+        "located_pictures": [
+            (joint_at_start(diagnosis.simulation.arm, joint), pictures) for joint, pictures in gallery.located
+        ],
         "method": content.method_text(diagnosis, gallery.data.observed.held_out_blocks),
     }
 
