@@ -26,7 +26,13 @@ from armlab.identification.export import (
 )
 from problem.mjcf import carried_bodies, compile_mjcf, import_mujoco, written_mjcf
 from problem.urdf import read_urdf_chain
-from problem.urdf_document import move_urdf, urdf_text
+from problem.urdf_document import move_urdf, read_urdf_root, urdf_text
+
+MESH_SUFFIXES = (".stl", ".obj", ".msh")  # that MuJoCo reads
+
+
+class UnreadableError(InputError):
+    """MuJoCo is missing, or refuses a URDF."""
 
 
 @dataclass(frozen=True)
@@ -81,13 +87,12 @@ def patched_urdf(simulated: SimulatorModel, source: Path, folder: Path) -> Patch
 def patched_mjcf(simulated: SimulatorModel, source: Path) -> Patched:
     """An MJCF with the links, gravity and joint fields of a model; paths of meshes are made absolute.
 
-    Raises InputError where the file has another arm than the model, where the model has no links, or where MuJoCo
-    refuses the result.
+    source: of an MJCF, or of a URDF, which MuJoCo reads. Raises InputError where the file has another arm than the
+    model, where the model has no links, or where MuJoCo refuses the result; UnreadableError where it refuses a URDF.
     """
-    mujoco, compiled = import_mujoco(), compile_mjcf(source)
-    spec, notes = mujoco.MjSpec.from_file(str(source)), list[str]()
+    spec, notes = _spec_of_urdf(source) if source.suffix == ".urdf" else _spec_of_mjcf(source)
+    compiled = spec.compile()  # numbers the bodies and joints of the spec, too
     _check_same_arm(simulated, [compiled.joint(number).name for number in range(compiled.njnt)], source)
-    spec.compile()  # numbers the bodies and joints as in the compiled model
     bodies = {each.id: each for each in spec.bodies}
     for own, total in zip(carried_bodies(compiled), link_inertias(simulated), strict=True):
         shares = share_inertia(total, [each.seen for each in own])
@@ -100,9 +105,54 @@ def patched_mjcf(simulated: SimulatorModel, source: Path) -> Patched:
     for joint in spec.joints:
         _set_joint(joint, simulated, spec.compiler.degree)
     spec.option.gravity = simulated.model.arm.gravity
-    spec.compiler.inertiafromgeom = mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO
+    guess = import_mujoco().mjtInertiaFromGeom
+    unstated = guess.mjINERTIAFROMGEOM_FALSE if source.suffix == ".urdf" else guess.mjINERTIAFROMGEOM_AUTO
+    spec.compiler.inertiafromgeom = unstated
     spec.compiler.settotalmass = -1
     return Patched(written_mjcf(spec, source), tuple(notes))
+
+
+def _spec_of_mjcf(source: Path) -> tuple[Any, list[str]]:
+    compile_mjcf(source)
+    return import_mujoco().MjSpec.from_file(str(source)), []
+
+
+def _spec_of_urdf(source: Path) -> tuple[Any, list[str]]:
+    """A mujoco.MjSpec of a URDF with the frames of fixed joints, and what a person has to know of it.
+
+    Meshes that are not at hand, or that MuJoCo cannot read, are left out. Raises UnreadableError.
+    """
+    root, left_out = read_urdf_root(source), list[str]()
+    for link in root.findall("link"):
+        for shape in [*link.findall("visual"), *link.findall("collision")]:
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            path = _mesh_path(str(mesh.get("filename")), source)
+            if path is None:
+                left_out.append(str(mesh.get("filename")))
+                link.remove(shape)
+            else:
+                mesh.set("filename", str(path))
+    for own in root.findall("mujoco"):
+        root.remove(own)
+    keep = dict.fromkeys(("strippath", "fusestatic", "discardvisual", "inertiafromgeom"), "false")
+    ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler", {**keep, "balanceinertia": "true"})
+    try:
+        spec = import_mujoco().MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+        spec.compile()
+    except (InputError, ValueError) as error:
+        raise UnreadableError(f"MuJoCo cannot read {source.name}: {' '.join(str(error).split())}") from None
+    names = ", ".join(sorted(set(left_out)))
+    return spec, [f"left out, since they are not at hand as STL or OBJ: {names}"] if names else []
+
+
+def _mesh_path(name: str, source: Path) -> Path | None:
+    """The file of a mesh as a URDF names it; packages are looked for in the folders above the URDF."""
+    package, mark, inner = name.removeprefix("file://").partition("package://")
+    choices = [folder / inner for folder in source.resolve().parents] if mark else [source.resolve().parent / package]
+    found = [path for path in choices if path.is_file() and path.suffix.lower() in MESH_SUFFIXES]
+    return found[0] if found else None
 
 
 def _check_same_arm(simulated: SimulatorModel, joints: list[str], source: Path) -> None:
@@ -139,6 +189,7 @@ def _set_body(body: Any, pseudo: Array) -> None:
 def _empty_body(body: Any) -> None:
     """A body without inertia; MuJoCo takes that of its geoms where none is stated, so they are made weightless."""
     body.explicitinertial = False
+    body.mass, body.inertia, body.fullinertia = 0.0, np.zeros(3), np.full(6, np.nan)
     for geom in body.geoms:
         geom.mass = 0.0
 

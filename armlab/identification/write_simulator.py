@@ -13,7 +13,7 @@ from armlab.identification.export import (
     urdf_document,
 )
 from armlab.identification.model_file import read_model
-from armlab.identification.patch import Patched, patched_mjcf, patched_urdf
+from armlab.identification.patch import Patched, UnreadableError, patched_mjcf, patched_urdf
 
 FORMATS = (".urdf", ".xml")
 
@@ -21,8 +21,9 @@ FORMATS = (".urdf", ".xml")
 def export_model(path: Path, out: Path) -> ResultLines:
     """Writes the file and says what it does not hold.
 
-    A model of a URDF becomes that URDF with other numbers, and that of an MJCF likewise; any other model becomes a
-    chain of bodies without meshes. Raises InputError where the ending or the model does not fit.
+    A model of a URDF becomes that URDF with other numbers, or an MJCF as MuJoCo reads the URDF; a model of an MJCF
+    becomes that MJCF; any other one becomes a chain of bodies without meshes. Raises InputError where the ending or
+    the model does not fit.
     """
     if out.suffix not in FORMATS:
         raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
@@ -51,9 +52,17 @@ def export_model(path: Path, out: Path) -> ResultLines:
 
 
 def _document(simulated: SimulatorModel, source: Path, out: Path) -> Patched:
-    if source.suffix != out.suffix:
-        text = urdf_document(simulated) if out.suffix == ".urdf" else mjcf_document(simulated)
-        keeps = f"a chain of bodies without meshes: only a {source.suffix} file keeps what {source.name} has"
-        return Patched(text, (keeps,) if source.suffix in FORMATS else ())
-    made = patched_urdf(simulated, source, out.parent) if out.suffix == ".urdf" else patched_mjcf(simulated, source)
+    if source.suffix not in FORMATS:
+        return Patched(_chain(simulated, out), ())
+    if source.suffix == ".xml" and out.suffix == ".urdf":
+        keeps = f"a chain of bodies without meshes: only an .xml file keeps what {source.name} has"
+        return Patched(_chain(simulated, out), (keeps,))
+    try:
+        made = patched_urdf(simulated, source, out.parent) if out.suffix == ".urdf" else patched_mjcf(simulated, source)
+    except UnreadableError as error:
+        return Patched(_chain(simulated, out), (f"a chain of bodies without meshes: {error}",))
     return Patched(made.text, (f"{source.name} with other numbers: its names, frames and meshes stay", *made.notes))
+
+
+def _chain(simulated: SimulatorModel, out: Path) -> str:
+    return urdf_document(simulated) if out.suffix == ".urdf" else mjcf_document(simulated)

@@ -166,9 +166,46 @@ def test_mujoco_finds_the_models_torque_in_the_users_mjcf_with_its_actuators(
     assert_allclose(read.jnt_range[0], np.radians([-120, 120]), atol=1e-5)
 
 
-def test_another_format_is_a_chain_and_says_what_keeps_the_meshes(urdf: Path, tmp_path: Path) -> None:
+CUBE = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1)) + "\nf 1 2 3\nf 5 6 7\nf 2 4 8\n"
+
+
+@pytest.mark.parametrize("change", [1.2, 0.15])
+def test_a_urdf_becomes_an_mjcf_with_its_names_frames_and_the_meshes_at_hand(
+    urdf: Path, tmp_path: Path, change: float
+) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    mesh = '<collision><geometry><mesh filename="package://own/cube.obj"/></geometry></collision>'
+    urdf.write_text(URDF.replace('<link name="tool0"/>', f'<link name="tool0">{mesh}</link>'))
+    (urdf.parent / "cube.obj").write_text(CUBE)
+    model, out, motion = model_of(urdf, change), tmp_path / "new" / "two.xml", states()
+    lines = list(export_model(model, out))
+    assert lines[1] == "two.urdf with other numbers: its names, frames and meshes stay"
+    assert "left out, since they are not at hand as STL or OBJ: meshes/upper.stl" in lines
+    assert_allclose(mujoco_torque(out, motion), predicted(model, motion), atol=1e-4)  # MuJoCo writes six digits
+    read = mujoco.MjModel.from_xml_path(str(out))
+    assert [read.body(number).name for number in range(1, read.nbody)] == [
+        "base_link",
+        "upper",
+        "lower",
+        "gripper",
+        "tool0",
+    ]
+    assert [read.joint(number).name for number in range(2)] == ["shoulder", "elbow"]
+    assert read.nmesh == 1
+    assert_allclose(read.jnt_range, [[-2, 2], [-2, 2]])
+
+
+def test_a_urdf_that_mujoco_refuses_becomes_a_chain_and_the_reason_is_told(urdf: Path, tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    shape = '<collision><geometry><sphere radius="-1"/></geometry></collision>'
+    urdf.write_text(URDF.replace('<link name="tool0"/>', f'<link name="tool0">{shape}</link>'))
     lines = list(export_model(model_of(urdf), tmp_path / "two.xml"))
-    assert lines[1] == "a chain of bodies without meshes: only a .urdf file keeps what two.urdf has"
+    assert lines[1].startswith("a chain of bodies without meshes: MuJoCo cannot read two.urdf: ")
+
+
+def test_an_mjcf_becomes_a_chain_as_urdf_and_what_keeps_the_meshes_is_told(mjcf: Path, tmp_path: Path) -> None:
+    lines = list(export_model(model_of(mjcf), tmp_path / "two.urdf"))
+    assert "a chain of bodies without meshes: only an .xml file keeps what two.xml has" in lines
 
 
 def test_an_input_file_is_never_written_over(urdf: Path) -> None:
