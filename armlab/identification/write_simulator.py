@@ -14,6 +14,7 @@ from armlab.identification.export import (
 )
 from armlab.identification.model_file import read_model
 from armlab.identification.patch import Patched, UnreadableError, patched_mjcf, patched_urdf
+from problem.joint_words import joint_in_words
 
 FORMATS = (".urdf", ".xml")
 
@@ -33,7 +34,11 @@ def export_model(path: Path, out: Path) -> ResultLines:
     texts = {out.name: patched.text}
     missing, notes = list(simulated.missing), list(patched.notes)
     if out.suffix == ".urdf":
-        missing = [f"spring of joint {number}" for number, each in enumerate(simulated.field("stiffness"), 1) if each]
+        missing = [
+            f"spring of {joint_in_words(model.arm, number)}"
+            for number, each in enumerate(simulated.field("stiffness"), 1)
+            if each
+        ]
         missing += simulated.missing
         if simulated.field("armature").any():
             texts[out.with_suffix(".srdf").name] = srdf_document(simulated)

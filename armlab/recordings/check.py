@@ -22,10 +22,10 @@ from armlab.recordings.possible import LIMIT_TOLERANCE_FACTOR, has_usual_positio
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.signs import compare_standstill
 from armlab.recordings.reading.tuning import ReadingTuning
-from armlab.recordings.reading.words import describe
 from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, Run
 from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm
+from problem.joint_words import joint_in_words
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
 MIN_SLOPE_CORRELATION = 0.9  # correlation of a velocity channel with the slope of its position
@@ -35,10 +35,10 @@ def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
     """Warnings about the channels of a run, joint by joint."""
     findings: list[Finding] = []
     for joint in range(run.joints):
-        findings += _find_dead_channels(run, joint) + _find_limit_violations(run, arm, joint)
+        findings += _find_dead_channels(run, arm, joint) + _find_limit_violations(run, arm, joint)
         if isinstance(run, Run):
-            findings += _find_frozen_torque(run, joint)
-        findings += _check_velocity(run, joint)
+            findings += _find_frozen_torque(run, arm, joint)
+        findings += _check_velocity(run, arm, joint)
     return tuple(findings)
 
 
@@ -58,17 +58,17 @@ def _joint_warning(kind: str, joint: int, text: str) -> list[Finding]:
     return [Finding(kind, "warning", text, joint + 1)]
 
 
-def _find_dead_channels(run: MotionRun, joint: int) -> list[Finding]:
-    found = []
+def _find_dead_channels(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
+    found, own = [], joint_in_words(arm, joint + 1)
     for name, signal in run.signals.items():
         if name in ("torque", "velocity") and np.ptp(signal[:, joint]) == 0:
-            found += _joint_warning("dead_channel", joint, f"{name} of joint {joint + 1} is constant: a dead channel?")
+            found += _joint_warning("dead_channel", joint, f"{name} of {own} is constant: a dead channel?")
     if np.ptp(run.position[:, joint]) == 0:
-        found += _joint_warning("still_joint", joint, f"position of joint {joint + 1} is constant: locked, or dead?")
+        found += _joint_warning("still_joint", joint, f"position of {own} is constant: locked, or dead?")
     return found
 
 
-def _find_frozen_torque(run: Run, joint: int) -> list[Finding]:
+def _find_frozen_torque(run: Run, arm: Arm, joint: int) -> list[Finding]:
     torque, position = run.torque[:, joint], run.position[:, joint]
     longest, start = _longest_repetition(torque)
     least = max(int(MIN_FROZEN_TIME_S * run.rate_hz), 20)
@@ -78,7 +78,8 @@ def _find_frozen_torque(run: Run, joint: int) -> list[Finding]:
     if moved < 0.01 * np.ptp(position):
         return []
     where = f"{run.time[start]:.4g} s to {run.time[start + longest - 1]:.4g} s"
-    text = f"torque of joint {joint + 1} repeats one value from {where} while the joint moves: frozen channel?"
+    own = joint_in_words(arm, joint + 1)
+    text = f"torque of {own} repeats one value from {where} while the joint moves: frozen channel?"
     return _joint_warning("frozen_channel", joint, text)
 
 
@@ -93,50 +94,51 @@ def _longest_repetition(values: Array) -> tuple[int, int]:
 def _find_limit_violations(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     limits = arm.joints[joint].limits
     low, high = run.position[:, joint].min(), run.position[:, joint].max()
-    found = []
+    found, own = [], joint_in_words(arm, joint + 1)
     if not has_usual_position(arm.joints[joint], low, high):
         text = (
-            f"position of joint {joint + 1} runs from {low:.4g} to {high:.4g}, its limits are "
+            f"position of {own} runs from {low:.4g} to {high:.4g}, its limits are "
             f"{limits.position[0]:.4g} and {limits.position[1]:.4g}: another unit, zero or robot?"
         )
         found += _joint_warning("beyond_limits", joint, text)
     fastest = float(np.abs(_block_means(np.gradient(run.position[:, [joint]], run.time, axis=0))).max())
     if fastest > LIMIT_TOLERANCE_FACTOR * limits.velocity:
-        text = f"joint {joint + 1} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}: another unit or clock?"
+        text = f"{own} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}: another unit or clock?"
         found += _joint_warning("beyond_limits", joint, text)
     peak = float(np.abs(run.torque[:, joint]).max()) if isinstance(run, Run) else 0.0
     if peak > LIMIT_TOLERANCE_FACTOR * limits.torque:
-        text = f"torque of joint {joint + 1} reaches {peak:.4g}, its limit is {limits.torque:.4g}: another unit?"
+        text = f"torque of {own} reaches {peak:.4g}, its limit is {limits.torque:.4g}: another unit?"
         found += _joint_warning("beyond_limits", joint, text)
     return found
 
 
-def _check_velocity(run: MotionRun, joint: int) -> list[Finding]:
+def _check_velocity(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     """Compares a velocity channel with the slope of the position; averages remove the steps of the encoder."""
     if run.velocity is None or np.ptp(run.velocity[:, joint]) == 0:
         return []
     slopes = _block_means(np.gradient(run.position, run.time, axis=0))
     velocity = _block_means(run.velocity[:, joint : joint + 1])[:, 0]
     likeness = np.array([_correlation(velocity, slope) for slope in slopes.T])
-    if likeness[joint] >= MIN_SLOPE_CORRELATION or np.ptp(slopes[:, joint]) == 0:
-        return (
-            _check_velocity_scale(velocity, slopes[:, joint], joint) if likeness[joint] >= MIN_SLOPE_CORRELATION else []
-        )
-    best = int(np.argmax(np.abs(likeness)))
+    if likeness[joint] >= MIN_SLOPE_CORRELATION:
+        return _check_velocity_scale(velocity, slopes[:, joint], arm, joint)
+    if np.ptp(slopes[:, joint]) == 0:
+        return []
+    best, own = int(np.argmax(np.abs(likeness))), joint_in_words(arm, joint + 1)
     if abs(likeness[best]) < MIN_SLOPE_CORRELATION:
-        text = f"velocity of joint {joint + 1} does not follow its position (correlation {likeness[joint]:.2f})"
+        text = f"velocity of {own} does not follow its position (correlation {likeness[joint]:.2f})"
     elif best == joint:
-        text = f"velocity of joint {joint + 1} has the opposite sign of its position's slope"
+        text = f"velocity of {own} has the opposite sign of its position's slope"
     else:
-        text = f"velocity of joint {joint + 1} follows the position of joint {best + 1}: swapped channels?"
+        text = f"velocity of {own} follows the position of {joint_in_words(arm, best + 1)}: swapped channels?"
     return _joint_warning("velocity_mismatch", joint, text)
 
 
-def _check_velocity_scale(velocity: Array, slope: Array, joint: int) -> list[Finding]:
+def _check_velocity_scale(velocity: Array, slope: Array, arm: Arm, joint: int) -> list[Finding]:
     scale = float(velocity @ slope / (slope @ slope))
     if 0.9 < scale < 1.1:
         return []
-    text = f"velocity of joint {joint + 1} is {scale:.4g} times its position's slope: another unit or gear?"
+    own = joint_in_words(arm, joint + 1)
+    text = f"velocity of {own} is {scale:.4g} times its position's slope: another unit or gear?"
     return _joint_warning("velocity_mismatch", joint, text)
 
 
@@ -197,7 +199,7 @@ def check_recording(folder: Path) -> CheckResult:
         moved, file = open_motion_recording(folder)
         motions, refused = _read_runs(lambda entry: load_motion_runs(moved, file, entry), file)
         recording = with_motion_runs(moved, motions)
-        answers = check_answers(motions) if motions else ()
+        answers = check_answers(motions, recording.arm) if motions else ()
         findings = _collect_findings(recording, recording.recorded_arm, (*recording.findings, *answers))
         return CheckResult(recording, tuple(findings), refused)
     empty, file = open_recording(folder)
@@ -247,7 +249,7 @@ def _check_reading(recording: Recording, inertial: Array | None, tuning: Reading
     findings = []
     for each in answer.findings:
         rivals = "".join(f"; or {rival.text}" for rival in each.rivals)
-        text = f"{describe(each.mistake)}{rivals} (error of joint {each.worst_joint} {each.share_before:.0%}, read so "
-        text += f"{each.share_after:.0%})"
+        worst = joint_in_words(recording.arm, each.worst_joint)
+        text = f"{each.description}{rivals} (error of {worst} {each.share_before:.0%}, read so {each.share_after:.0%})"
         findings.append(Finding("setup", "warning", text, each.mistake.joint))
     return tuple(findings)

@@ -6,6 +6,8 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.recordings.recording import Finding, MotionRun
+from problem.arm import Arm
+from problem.joint_words import joint_in_words
 
 MIN_MOVED = 0.02  # rad (m): less travel of a joint than this says nothing about its drive
 MIN_LIKENESS = 0.9  # correlation of a position with a command that it answers
@@ -15,7 +17,7 @@ KNOWN_FACTORS = {"degrees for radians": 180 / np.pi, "counts of 4096 a turn for 
 FACTOR_TOLERANCE = 0.25  # relative
 
 
-def check_answers(runs: Sequence[MotionRun]) -> tuple[Finding, ...]:
+def check_answers(runs: Sequence[MotionRun], arm: Arm) -> tuple[Finding, ...]:
     """Warnings where positions do not answer their commands; the first names what was probably mistaken.
 
     A joint that stands still is reported, too: its drive cannot be diagnosed.
@@ -25,9 +27,9 @@ def check_answers(runs: Sequence[MotionRun]) -> tuple[Finding, ...]:
     moved, told = np.ptp(positions, axis=0), np.ptp(commands, axis=0)
     still = (moved < MIN_MOVED) & (told < MIN_MOVED)
     likeness = _correlations(positions, commands)
-    found = [_unit_error(commands, positions, likeness, joint) for joint in range(len(moved)) if not still[joint]]
-    found += [_exchanged(likeness, joint) for joint in range(len(moved)) if not still[joint]]
-    found += [_still(int(joint)) for joint in np.flatnonzero(still)]
+    found = [_unit_error(commands, positions, likeness, arm, joint) for joint in range(len(moved)) if not still[joint]]
+    found += [_exchanged(likeness, arm, joint) for joint in range(len(moved)) if not still[joint]]
+    found += [_still(arm, int(joint)) for joint in np.flatnonzero(still)]
     return tuple(each for each in found if each is not None)
 
 
@@ -38,27 +40,29 @@ def _correlations(positions: Array, commands: Array) -> Array:
     return np.asarray(np.divide(first.T @ second, sizes, out=np.zeros_like(sizes), where=sizes > 0))
 
 
-def _unit_error(commands: Array, positions: Array, likeness: Array, joint: int) -> Finding | None:
+def _unit_error(commands: Array, positions: Array, likeness: Array, arm: Arm, joint: int) -> Finding | None:
     told = commands[:, joint] - commands[:, joint].mean()
     gain = float(told @ positions[:, joint]) / max(float(told @ told), 1e-300)
     if abs(likeness[joint, joint]) < MIN_LIKENESS or 1 / MAX_GAIN < abs(gain) < MAX_GAIN:
         return None
     size = max(abs(gain), 1 / max(abs(gain), 1e-300))
     named = [name for name, factor in KNOWN_FACTORS.items() if abs(size / factor - 1) < FACTOR_TOLERANCE]
-    text = f"position of joint {joint + 1} moves {gain:.3g} times as far as its command: units.position and "
+    own = joint_in_words(arm, joint + 1)
+    text = f"position of {own} moves {gain:.3g} times as far as its command: units.position and "
     text += f"units.reference_position differ{': ' + named[0] + '?' if named else '?'}"
     return Finding("command_unit", "warning", text, joint + 1)
 
 
-def _exchanged(likeness: Array, joint: int) -> Finding | None:
+def _exchanged(likeness: Array, arm: Arm, joint: int) -> Finding | None:
     own, best = abs(likeness[joint, joint]), int(np.argmax(np.abs(likeness[joint])))
     if best == joint or abs(likeness[joint, best]) < max(MIN_LIKENESS, own + MIN_LIKENESS_GAP):
         return None
-    text = f"position of joint {joint + 1} follows the command of joint {best + 1} (correlation "
-    text += f"{likeness[joint, best]:.2f}, with its own {likeness[joint, joint]:.2f}): exchanged columns?"
+    text = f"position of {joint_in_words(arm, joint + 1)} follows the command of {joint_in_words(arm, best + 1)} "
+    text += f"(correlation {likeness[joint, best]:.2f}, with its own {likeness[joint, joint]:.2f}): exchanged columns?"
     return Finding("exchanged_columns", "warning", text, joint + 1)
 
 
-def _still(joint: int) -> Finding:
-    text = f"joint {joint + 1} moves less than {MIN_MOVED} rad (m) and is told no more: its drive cannot be diagnosed"
+def _still(arm: Arm, joint: int) -> Finding:
+    own = joint_in_words(arm, joint + 1)
+    text = f"{own} moves less than {MIN_MOVED} rad (m) and is told no more: its drive cannot be diagnosed"
     return Finding("still_joint", "warning", text, joint + 1)

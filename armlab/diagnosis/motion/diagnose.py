@@ -166,7 +166,7 @@ def diagnose_motion(
 
 def reason_unusable(recording: MotionRecording) -> str | None:
     """Why nothing can be said, in one line; None where something can."""
-    findings = check_answers(recording.runs)
+    findings = check_answers(recording.runs, recording.arm)
     wrong = [finding.text for finding in findings if finding.kind != "still_joint"]
     if wrong:
         return wrong[0]

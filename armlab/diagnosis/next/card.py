@@ -18,6 +18,7 @@ from armlab.diagnosis.next.moments import solve_least_squares, unexplained_power
 from armlab.diagnosis.next.motion import random_point
 from armlab.diagnosis.next.question import CLEAR_SEPARATION, Question
 from armlab.diagnosis.next.sampling import kept_columns, noise_levels
+from problem.joint_words import joint_in_words
 
 CARD_SCHEMA = "next/1"
 
@@ -177,7 +178,10 @@ def _fill_panels(axes: list[Axes], experiment: Experiment, pair: RivalPair) -> N
             difference.time, difference.torque[:, joint], color=color, linewidth=1.1, label="difference of the rivals"
         )
         axis.set(
-            title=difference.title, ylim=(-top, top), xlabel="time, s", ylabel=f"{drive} of joint {joint + 1}, {unit}"
+            title=difference.title,
+            ylim=(-top, top),
+            xlabel="time, s",
+            ylabel=f"{drive} of {joint_in_words(experiment.excitation.arm, joint + 1)}, {unit}",
         )
         axis.legend(loc="upper right", fontsize=8)
     _draw_separations(axes[2], pair)

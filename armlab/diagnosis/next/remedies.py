@@ -15,6 +15,7 @@ from armlab.diagnosis.next.question import CLEAR_SEPARATION, Layout, Question, R
 from armlab.effects.transmission import Transmission
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
+from problem.joint_words import joint_in_words, links_in_words
 from problem.motion import Motion
 from problem.transforms import rotation_x
 
@@ -44,7 +45,7 @@ def find_remedies(
         *_remedy_by_load(prepared, question, rivals, motion, times),
         *_remedy_by_tilt(prepared, question, rivals, motion, times),
         *_remedy_by_removal(prepared, question, rivals, motion, times),
-        *_remedy_by_data_sheet(rivals),
+        *_remedy_by_data_sheet(prepared, rivals),
         *_remedy_by_encoder(prepared, rivals, motion, times),
     ]
     return sorted((each for each in every if each.separation > 1), key=lambda each: -each.separation)
@@ -109,16 +110,18 @@ def _remedy_by_removal(
                 without[law.columns] = 0
                 without[:, law.columns] = 0
             separation = _pair_separation(rivals, question.free, prepared.layout.prior + with_it + without)
-            yield Remedy(f"the motion with and without the load on link {rival.name.joint}", separation)
+            link = links_in_words(prepared.present.arm, rival.laws[0].candidate.joints[:1])
+            yield Remedy(f"the motion with and without the load on {link}", separation)
 
 
-def _remedy_by_data_sheet(rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
+def _remedy_by_data_sheet(prepared: PreparedQuestions, rivals: tuple[Rival, ...]) -> Iterator[Remedy]:
     """A value that the maker states."""
     for rival in rivals:
         armature = rival.laws[0].candidate.joint_fields(rival.values).get("armature")
         if armature is not None:
             accuracy = abs(armature) / CLEAR_SEPARATION
-            what = f"a data sheet that gives the rotor inertia of joint {rival.name.joint} to {accuracy:.3g} kg m2"
+            own = joint_in_words(prepared.present.arm, rival.laws[0].candidate.joints[0])
+            what = f"a data sheet that gives the rotor inertia of {own} to {accuracy:.3g} kg m2"
             yield Remedy(what, CLEAR_SEPARATION)
 
 
@@ -132,9 +135,8 @@ def _remedy_by_encoder(
             torque = prepared.present.scene(motion, times).torque[:, candidate.index]
             twist = size * _static_twist(candidate, torque)
             separation = float(np.sqrt(np.sum((twist - twist.mean()) ** 2))) / ENCODER_NOISE
-            what = (
-                f"a second encoder behind the gear of joint {candidate.index + 1} with {ENCODER_NOISE:g} rad of noise"
-            )
+            own = joint_in_words(prepared.present.arm, candidate.index + 1)
+            what = f"a second encoder behind the gear of {own} with {ENCODER_NOISE:g} rad of noise"
             yield Remedy(what, separation)
 
 

@@ -28,7 +28,6 @@ from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
-from armlab.recordings.reading.words import describe
 from problem.arm import Arm
 from problem.joint_words import joint_at_start, joint_in_table, joint_in_words
 
@@ -96,7 +95,7 @@ def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
             f"{each.share_before:.0%} → {each.share_after:.0%} of its torque"
         )
         rivals = "; ".join(rival.text for rival in each.rivals)
-        rows.append([describe(each.mistake), error, rivals or "–", each.next_experiment or "–"])
+        rows.append([each.description, error, rivals or "–", each.next_experiment or "–"])
     headings = ["read wrongly", "held-out error as it is → read rightly", "fits as well", "to tell"]
     text = (
         f"{setup.looks} readings of the recording and of the robot file were compared on blocks of time that were held "

@@ -14,6 +14,8 @@ from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement
 from armlab.recordings.recording import Recording
+from problem.arm import Arm
+from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 from problem.pseudo_inertia import are_bodies
 
 
@@ -33,10 +35,11 @@ class SetupFinding:
     """One mistake. worst_joint: from 1, where the errors fall most; rms_before, rms_after: there, N m (N).
 
     share_before, share_after: the same over the torque's scatter, without and with this one taken back. sigmas: of
-    the fall between blocks of time. probability: of the name against its rivals.
+    the fall between blocks of time. probability: of the name against its rivals. arm: for the names of its joints.
     """
 
     mistake: Mistake
+    arm: Arm
     worst_joint: int
     rms_before: float
     rms_after: float
@@ -48,10 +51,16 @@ class SetupFinding:
     next_experiment: str | None
 
     @property
+    def description(self) -> str:
+        """What is wrong, in a clause."""
+        return describe(self.mistake, self.arm)
+
+    @property
     def text(self) -> str:
         """What is wrong, and the evidence."""
+        worst = joint_in_words(self.arm, self.worst_joint)
         return (
-            f"{describe(self.mistake)} (read so, the held-out error of joint {self.worst_joint} falls from "
+            f"{self.description} (read so, the held-out error of {worst} falls from "
             f"{self.share_before:.0%} to {self.share_after:.0%} of its torque)"
         )
 
@@ -83,9 +92,9 @@ class Answer:
         """The findings in a sentence, empty where there are none."""
         if not self.findings:
             return ""
-        mistakes = "; ".join(describe(each.mistake) for each in self.findings)
-        zeros = ", ".join(map(str, self.undecided))
-        told = f" These data do not tell the zero of joint {zeros} by quarters of a turn." if zeros else ""
+        mistakes = "; ".join(each.description for each in self.findings)
+        zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
+        told = f" These data do not tell the zero of {zeros} by quarters of a turn." if zeros else ""
         return (
             f"The recording is read wrongly: {mistakes}. Read rightly, the held-out error falls from {self.share:.1%} "
             f"to {self.share_after:.1%} of the torque.{told}"
@@ -95,7 +104,7 @@ class Answer:
         """Why nothing can be said of the physics: readings that fit alike, or none that fits."""
         if self.open:
             names = "; or ".join(
-                [describe(self.open[0].mistake), *(rival.text for each in self.open for rival in each.rivals)]
+                [self.open[0].description, *(rival.text for each in self.open for rival in each.rivals)]
             )
             told = f"The recording is read wrongly, and these data do not tell how: {names}."
             return f"{told} To decide, {_decide(self.open)}."
@@ -111,7 +120,8 @@ class Answer:
 
 
 def _decide(findings: tuple[SetupFinding, ...]) -> str:
-    return findings[0].next_experiment or measurement(findings[0].mistake.effect, findings[0].mistake.joint)
+    first = findings[0]
+    return first.next_experiment or measurement(first.mistake.effect, first.mistake.joint, first.arm)
 
 
 def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:
@@ -129,7 +139,7 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     share = overall_error(judge, start.reading, near=False)
     if found.best is found.start or overall_error(judge, found.best.reading, near=True) > tuning.max_read_error:
         nearest = found.tried if found.best is found.start else (found.best,)
-        tried = tuple(describe(mistake) for each in nearest for mistake in each.reading.mistakes)
+        tried = tuple(describe(mistake, recording.arm) for each in nearest for mistake in each.reading.mistakes)
         return Answer((), recording, None, share, tried=tried, looks=found.looks)
     findings = tuple(_finding(judge, found, place) for place in range(len(found.best.reading.mistakes)))
     open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
@@ -159,7 +169,7 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     worst = int(np.argmax(np.log(before) - np.log(after)))
     if mistake.joint is not None and mistake.effect not in ("link_data_error",):
         worst = mistake.joint - 1 if after[mistake.joint - 1] < before[mistake.joint - 1] else worst
-    gain = Gain.between(without, best)
+    gain, arm = Gain.between(without, best), best.reading.arm
     rivals = [(each.reading.mistakes[-1], each.loss) for each in found.rivals[place]]
     weights = np.array([best.loss, *(loss for _, loss in rivals)])
     chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
@@ -167,18 +177,20 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     chances = np.append(chances, np.mean(chances) * judge.tuning.other_links_chance if by_links else 0.0)
     chances = chances / chances.sum()
     listed = [
-        Rival(each.effect, each.joint, each.joints, describe(each), float(chance))
+        Rival(each.effect, each.joint, each.joints, describe(each, arm), float(chance))
         for (each, _), chance in zip(rivals, chances[1:-1], strict=True)
     ]
     if by_links:
-        link = len(best.reading.arm) if mistake.joint is None else mistake.joint
-        listed.append(Rival(INERTIAL_ERROR, link, (), f"link {link} is not as simulated", float(chances[-1])))
+        link = len(arm) if mistake.joint is None else mistake.joint
+        words = f"{links_in_words(arm, [link])} is not as simulated"
+        listed.append(Rival(INERTIAL_ERROR, link, (), words, float(chances[-1])))
     measure = dict.fromkeys(
-        measurement(effect, joint)
+        measurement(effect, joint, arm)
         for effect, joint in ((mistake.effect, mistake.joint), *((each.effect, each.joint) for each in listed))
     )
     return SetupFinding(
         mistake,
+        arm,
         worst + 1,
         float(rms_before[worst]),
         float(rms_after[worst]),

@@ -8,6 +8,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Finding, Recording, Run
 from problem.arm import Arm
+from problem.joint_words import joint_in_words
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -23,8 +24,8 @@ def compare_joint_names(columns: Sequence[str], arm: Arm, signal: str) -> tuple[
         named = sorted((name for name in names if name in column.lower()), key=len)
         if named and len(set(names)) == len(names) and named[-1] != names[place]:
             text = (
-                f"column {column} of {signal} stands for joint {place + 1} ({arm.joints[place].name}) and bears the "
-                f"name of joint {names.index(named[-1]) + 1}: columns in another order?"
+                f"column {column} of {signal} stands for {joint_in_words(arm, place + 1)} and bears the name of "
+                f"{joint_in_words(arm, names.index(named[-1]) + 1)}: columns in another order?"
             )
             out.append(Finding("joint_names", "warning", text, place + 1))
     return tuple(out)
@@ -49,8 +50,9 @@ def compare_standstill(recording: Recording, inertial: Array | None, tuning: Rea
             continue
         share = float(np.median(held[loaded] / needed[loaded]))
         if share < tuning.least_standstill_share:
+            own = joint_in_words(recording.arm, joint + 1)
             text = (
-                f"at standstill joint {joint + 1} holds {np.median(held[loaded]):.3g}, gravity on the links asks for "
+                f"at standstill {own} holds {np.median(held[loaded]):.3g}, gravity on the links asks for "
                 f"{np.median(needed[loaded]):.3g}: another sign, zero or mounting, or torque without gravity?"
             )
             out.append(Finding("standstill", "warning", text, joint + 1))

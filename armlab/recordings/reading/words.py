@@ -3,6 +3,8 @@
 import numpy as np
 
 from armlab.recordings.reading.reading import Mistake
+from problem.arm import Arm
+from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
 POSITION_AND_TORQUE = "position and torque"
 INERTIAL_ERROR = "inertial_parameter_error"
@@ -27,39 +29,39 @@ NAMES = {
 SETUP_EFFECTS = tuple(name for name in NAMES if name != INERTIAL_ERROR)
 
 MEASUREMENTS = {
-    "torque_sign": "push joint {joint} by hand in the direction in which its position grows: the drive's torque has to "
+    "torque_sign": "push {joint} by hand in the direction in which its position grows: the drive's torque has to "
     "point the other way",
-    "joint_direction": "turn joint {joint} alone in the direction that the drawing of the robot calls positive: its "
+    "joint_direction": "turn {joint} alone in the direction that the drawing of the robot calls positive: its "
     "position has to grow",
     "channel_swap": "move one joint alone: the column that changes is its own",
     "channel_order": "move one joint alone: the column that changes is its own",
     "unit_error": "turn a joint by a known angle, or hold a known load, and compare with the numbers of the file",
-    "gear_ratio": "turn joint {joint} by a known angle and compare with its position",
-    "encoder_offset": "drive joint {joint} to the zero of the drawing and read its position",
+    "gear_ratio": "turn {joint} by a known angle and compare with its position",
+    "encoder_offset": "drive {joint} to the zero of the drawing and read its position",
     "base_tilt": "lay a level on the base, and hold one pose with the arm stretched out",
     "gravity_compensated_torque": "hold one pose with the arm stretched out: the torque has to carry the arm",
     "dh_convention": "measure where the second joint axis is, and compare with the D-H table",
     "inertia_reference": "ask the source of the robot file about which point its inertias are",
-    "link_data_error": "weigh link {joint}, or the tool, and measure its centre",
+    "link_data_error": "weigh {link}, or the tool, and measure its centre",
     "clock_error": "compare the length of a run with a watch",
     "time_delay": "step one joint and compare when torque and position begin to move",
-    "channel_skew": "step joint {joint} alone and compare when torque and position begin to move",
+    "channel_skew": "step {joint} alone and compare when torque and position begin to move",
     INERTIAL_ERROR: "weigh the link, or the tool, and measure its centre",
 }
 
 
-def describe(mistake: Mistake) -> str:
+def describe(mistake: Mistake, arm: Arm) -> str:
     """What is wrong, in a clause."""
     numbers = {name: value for name, value, _ in mistake.parameters}
-    place = "all joints" if mistake.joint is None else f"joint {mistake.joint}"
-    link = "all links" if mistake.joint is None else f"link {mistake.joint}"
-    pair = " and ".join(map(str, mistake.joints))
+    place = "all joints" if mistake.joint is None else joint_in_words(arm, mistake.joint)
+    link = "all links" if mistake.joint is None else links_in_words(arm, [mistake.joint])
+    pair = joints_in_words(arm, mistake.joints) if mistake.joints else ""
     form = mistake.form
     columns = POSITION_AND_TORQUE if form == "both" else form
     texts = {
         "torque_sign": f"the torque of {place} has the other sign",
         "joint_direction": f"{place} counts the other way round ({form})",
-        "channel_swap": f"the {columns} columns of joints {pair} are exchanged",
+        "channel_swap": f"the {columns} columns of {pair} are exchanged",
         "channel_order": f"the {columns} columns stand in the order {', '.join(map(str, mistake.joints))}",
         "gravity_compensated_torque": "the recorded torque holds no gravity",
         "dh_convention": f"the D-H table is of the {form} convention",
@@ -95,6 +97,8 @@ def _reference_text(form: str) -> str:
     return f"in the robot file {meanings.get(form, form)}"
 
 
-def measurement(effect: str, joint: int | None) -> str:
+def measurement(effect: str, joint: int | None, arm: Arm) -> str:
     """What to measure to decide whether an effect is there."""
-    return MEASUREMENTS[effect].format(joint="one after the other" if joint is None else joint)
+    if joint is None:
+        return MEASUREMENTS[effect].format(joint="one joint after the other", link="one link after the other")
+    return MEASUREMENTS[effect].format(joint=joint_in_words(arm, joint), link=links_in_words(arm, [joint]))
