@@ -23,6 +23,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import cache
+from html import escape
 from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -31,6 +32,7 @@ from typing import Any
 import numpy as np
 import yaml
 from click.testing import CliRunner
+from gripper_robots import GRIPPER_MJCF, GRIPPER_URDF
 
 from armlab.cli.main import main as armlab
 from problem.robot_file import BUILT_IN_FOLDER
@@ -209,6 +211,19 @@ def damage_table(text: str, rng: random.Random) -> str:
     return "\n".join(",".join(row) for row in [head, *rows]) + "\n"
 
 
+def damage_xml(text: str, rng: random.Random) -> str:
+    """An XML file with the value of one attribute replaced, one element left out or given twice, or the end cut off."""
+    kind = rng.random()
+    if kind < 0.05:
+        return text[: rng.randrange(len(text))]
+    if kind < 0.7:
+        place = rng.choice(list(re.finditer(r'="[^"]*"', text)))
+        value = escape(str(rng.choice(HOSTILE_WORDS)), quote=True)
+        return f'{text[: place.start()]}="{value}"{text[place.end() :]}'
+    place = rng.choice(list(re.finditer(r"<[^<>]*/>", text)))
+    return text[: place.start()] + place[0] * 2 * (kind < 0.85) + text[place.end() :]
+
+
 def _scaled(cell: str, factor: float) -> str:
     try:
         return repr(float(cell) * factor)
@@ -240,6 +255,8 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
         whole = mutate(content, rng) if Path(name).stem == damaged else content
         text = yaml.safe_dump(whole) if name.endswith(".yaml") else json.dumps(whole)
         (folder / name).write_text(text)
+    for name, text in (("toy.urdf", GRIPPER_URDF), ("toy.xml", GRIPPER_MJCF)):
+        (folder / name).write_text(damage_xml(text, rng) if name.endswith(damaged) else text)
     (folder / "servo").mkdir()
     servo = mutate(SERVO_RECORDING, rng) if damaged == "servo" else SERVO_RECORDING
     (folder / "servo" / "recording.yaml").write_text(yaml.safe_dump(servo))
@@ -272,6 +289,11 @@ COMMANDS = {
     "gains": "gains rec --without rec --mass 5 --centre 0 0 0.1",
     "import": "recording import rec/run.csv --robot irb120-arm --position q* --torque u* --time t --out new "
     "--unit position=rad --unit torque=N.m --unit time=s",
+    "lock-urdf": "lock-joints toy.urdf out.urdf --tip hand --lock finger1=0.02",
+    "lock-mjcf": "lock-joints toy.xml out.xml --tip hand --lock finger1=0.2",
+    "base-urdf": "base toy.urdf",
+    "import-gripper": "recording import rec/run.csv --robot toy.urdf --tip hand --lock finger1=0.02 --position q* "
+    "--torque u* --time t --out new --unit position=rad --unit torque=N.m --unit time=s",
     "confusability": "confusability irb120-arm motion.csv --noise 0.1",
     "diagnose": "diagnose rec --out out",
     "compare-recordings": "diagnose rec --compare rec --out out",
@@ -333,6 +355,12 @@ KINDS = (
     Kind("gains", "words", 4),
     Kind("import", "table", 4),
     Kind("import", "words", 4),
+    Kind("import-gripper", "words", 15),
+    Kind("lock-urdf", "urdf", 40),
+    Kind("lock-urdf", "words", 15),
+    Kind("lock-mjcf", "xml", 40),
+    Kind("lock-mjcf", "words", 10),
+    Kind("base-urdf", "urdf", 10),
     Kind("confusability", "table", 4),
     Kind("next", "verdict", 4),
     Kind("next", "words", 4),
@@ -449,11 +477,12 @@ def _new_files(folder: Path, names: set[str]) -> Iterator[Path]:
 
 
 def _is_free_of_nan(path: Path, kind: Kind) -> bool:
-    """Whether all numbers of a file are finite; an infeasible end of a search counts as infinite."""
-    if path.suffix not in (".yaml", ".json", ".csv", ".xml", ".mod"):
+    """Whether all numbers of a file are finite, names aside; an infeasible end of a search counts as infinite."""
+    if path.suffix not in (".yaml", ".json", ".csv", ".xml", ".urdf", ".mod"):
         return True
     wrong = "nan" if kind.command in OF_RESULTS and path.suffix == ".csv" else "nan|inf|infinity"
-    return not re.search(rf"(?i)(^|[\s,:\[\"])[+-]?\.?({wrong})($|[\s,\]\"])", path.read_text(encoding="utf-8"))
+    text = re.sub(r'\b(name|joint[12]?|link|actuator|tendon)="[^"]*"', "", path.read_text(encoding="utf-8"))
+    return not re.search(rf"(?i)(^|[\s,:\[\"])[+-]?\.?({wrong})($|[\s,\]\"])", text)
 
 
 def outcomes_of(kind: Kind, seeds: Iterable[int]) -> Iterator[Outcome]:

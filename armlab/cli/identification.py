@@ -186,11 +186,11 @@ def lock_joints(robot: Path, out: Path, tip: str | None, lock: tuple[str, ...]) 
     from problem.locked_joints import lock_joints as lock_in_file
     from problem.locked_joints import parse_locks
 
-    if out.suffix != robot.suffix:
-        raise InputError(f"{out}: the file should end in {robot.suffix}, as {robot} does")
     if out.exists():
         raise InputError(f"{out} is there already: choose a new file")
     locked = lock_in_file(robot, tip, parse_locks(lock), out.parent)
+    if out.suffix != robot.suffix:
+        raise InputError(f"{out}: the file should end in {robot.suffix}, as {robot} does")
     write_whole(out, locked.text)
     yield f"{out}: {locked.words}"
     return {"files": [out], "joints": [joint.name for joint in locked.arm.joints], "locked": locked.positions}
