@@ -22,11 +22,12 @@ from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
-from armlab.diagnosis.compare.numbers import Change
+from armlab.diagnosis.compare.numbers import Change, laws_of
 from armlab.diagnosis.compare.pooled import unite_candidates
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.found_model import model_found
 from armlab.effects.contract import Scene
+from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording
@@ -50,6 +51,17 @@ def test_the_laws_in_common_do_not_depend_on_the_order_of_the_recordings() -> No
     diagnoses = [SimpleNamespace(model=model) for model in models]
     there, back = unite_candidates(diagnoses), unite_candidates(diagnoses[::-1])
     assert there == back == (LevelsAndSlopes.at(ARM, 1), ViscousFriction.at(ARM, 2))
+
+
+def test_a_gain_has_no_level_where_the_recordings_have_it_by_sign_in_common() -> None:
+    """Its change is told alone, since two numbers of the wider form are no level of one."""
+    by_sign, gain = TorqueGainBySign.at(ARM, 2), TorqueGain.at(ARM, 2)
+    pooled = SimpleNamespace(design=SimpleNamespace(blocks=[SimpleNamespace(candidate=by_sign)]))
+    group = SimpleNamespace(candidate=gain, laws=(), shaped=None, common=np.array([0, 1]))
+    table = SimpleNamespace(groups=[group], contrast=np.array([[-0.5], [0.5]]))
+    ((law, numbers, _),) = laws_of(pooled, table, (), SimpleNamespace(group=0, values=np.array([0.1])))
+    assert not law.known
+    assert_allclose(numbers, [[-0.05], [0.05]])
 
 
 @cache

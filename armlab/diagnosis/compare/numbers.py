@@ -200,9 +200,13 @@ class Law:
 
 
 def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
-    """Whether the common model has a level of it: faults of channels and loads are known as differences alone."""
-    place = place_of(candidate)
-    return not is_body(candidate) and any(place_of(each.candidate) == place for each in pooled.design.blocks)
+    """Whether the common model has a level of it: faults of channels and loads are known as differences alone.
+
+    A law that the common model has in a wider form has no level in this one.
+    """
+    alike = (place_of(candidate), candidate.size)
+    known = ((place_of(each.candidate), each.candidate.size) for each in pooled.design.blocks)
+    return not is_body(candidate) and alike in known
 
 
 def _simulated(pooled: Pooled, candidate: Candidate) -> Array:
