@@ -99,6 +99,7 @@ ASYMMETRIC_FACTS = Effect(
         r"\Delta\tau_j = \begin{cases} \text{positive} & \dot{q}_j > 0 \\ "
         r"-\text{negative} & \dot{q}_j < 0 \end{cases}"
     ),
+    figures="{positive} forwards and {negative} backwards",
     dissipates=True,
     sticks=True,
     contains=("coulomb_friction", "viscous_friction"),
