@@ -97,7 +97,8 @@ class KinematicTree:
             return InputError(message)
         ends = ", ".join(f"{link} ({count} joint{'s' * (count > 1)})" for link, count in self.ends.items())
         return UndecidedError(
-            f"{message}; `armlab lock-joints` and `armlab recording import` take one arm of it: --tip {ends}",
+            f"{message}: say with --tip of `armlab recording import` or `armlab lock-joints` where the arm ends, and "
+            f"the joints beside it are locked: {ends}",
             "tip",
             tuple(self.ends),
         )

@@ -46,7 +46,7 @@ def written_mjcf(spec: Any, source: Path) -> str:
 
     Raises InputError, in one line, where MuJoCo refuses it.
     """
-    if source.suffix == ".xml":
+    if source.suffix == ".xml" and (spec.meshes or spec.textures or spec.hfields or spec.skins):
         folder = source.parent.resolve()
         spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
     try:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -129,9 +128,17 @@ def _set_origin(node: ElementTree.Element, pose: Array) -> None:
     if origin is None:
         origin = ElementTree.Element("origin")
         node.insert(0, origin)
-    angles = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
     origin.set("xyz", " ".join(repr(float(value)) for value in pose[:3, 3]))
-    origin.set("rpy", " ".join(repr(float(value)) for value in angles))
+    origin.set("rpy", " ".join(repr(float(value)) for value in _roll_pitch_yaw_of(pose[:3, :3])))
+
+
+def _roll_pitch_yaw_of(rotation: Array) -> tuple[float, float, float]:
+    """The angles of a turn (3, 3) about the fixed axes x, y, z; yaw is zero where pitch is a quarter turn."""
+    level = np.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = np.arctan2(-rotation[2, 0], level)
+    if level < 1e-9:
+        return np.arctan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
+    return np.arctan2(rotation[2, 1], rotation[2, 2]), pitch, np.arctan2(rotation[1, 0], rotation[0, 0])
 
 
 def urdf_tree(root: ElementTree.Element, path: Path) -> KinematicTree:

@@ -15,7 +15,14 @@ METHODS = ("weighted", "ordinary", "alike", "huber", "tukey", "total", "likeliho
 @click.command()
 @click.argument("recording", type=click.Path(path_type=Path))
 @click.option("--out", type=OutputPath(), help="Folder for model.yaml and report.html [default: RECORDING].")
-@click.option("--method", type=click.Choice(METHODS), default="weighted", show_default=True, help="Estimator.")
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="weighted",
+    show_default=True,
+    metavar="NAME",
+    help=f"Estimator: {', '.join(METHODS)}.",
+)
 @click.option(
     "--cutoff-hz", type=FiniteNumber(min=0, min_open=True), help="Cut-off of the low-pass [default: from the data]."
 )
@@ -182,12 +189,11 @@ def lock_joints(robot: Path, out: Path, tip: str | None, lock: tuple[str, ...]) 
     OUT: a new file of the same kind. The links of locked joints stay, with mass.
     """
     from armlab.common.errors import InputError
-    from armlab.common.files import write_whole
+    from armlab.common.files import refuse_existing, write_whole
     from problem.locked_joints import lock_joints as lock_in_file
     from problem.locked_joints import parse_locks
 
-    if out.exists():
-        raise InputError(f"{out} is there already: choose a new file")
+    refuse_existing([out])
     locked = lock_in_file(robot, tip, parse_locks(lock), out.parent)
     if out.suffix != robot.suffix:
         raise InputError(f"{out}: the file should end in {robot.suffix}, as {robot} does")

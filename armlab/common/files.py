@@ -38,6 +38,13 @@ def refuse_inputs(inputs: Iterable[Path], outputs: Iterable[Path], made: str) ->
             raise InputError(f"{place} is a file that {made} is made from: choose another name")
 
 
+def refuse_existing(outputs: Iterable[Path]) -> None:
+    """Raises InputError where a file that would be written is there already."""
+    for place in outputs:
+        if place.exists():
+            raise InputError(f"{place} is there already: choose another name")
+
+
 def write_texts(texts: Mapping[str, str | bytes], folder: Path) -> tuple[Path, ...]:
     """Write all texts (or bytes) under their names into a folder, or none of them; returns their paths.
 

@@ -9,7 +9,7 @@ import yaml
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.files import write_texts
+from armlab.common.files import refuse_existing, write_texts
 from armlab.common.streams import named_generator
 from armlab.effects.contract import Scene, Value
 from armlab.effects.library import family_named
@@ -45,7 +45,7 @@ def write_example(folder: Path) -> tuple[Path, ...]:
     """Writes two logs as a driver writes them, the robot file, and what was hidden; returns the paths.
 
     Columns of a log: `timestamp_ns` since 1970, positions `q1_rad` .., torques `tau1_Nm` ...
-    Raises InputError if a file cannot be written.
+    Raises InputError if a file is there already or cannot be written.
     """
     arm = load_arm(ARM_NAME)
     effects = [
@@ -60,14 +60,13 @@ def write_example(folder: Path) -> tuple[Path, ...]:
         }
         for name, joints, values in HIDDEN
     ]
-    return write_texts(
-        {
-            **{name: log.to_csv(index=False, float_format="%.6g") for name, log in logs.items()},
-            "robot.yaml": (BUILT_IN_FOLDER / f"{ARM_NAME}.yaml").read_text(encoding="utf-8"),
-            "hidden.yaml": yaml.safe_dump(truth, sort_keys=False),
-        },
-        folder,
-    )
+    texts = {
+        **{name: log.to_csv(index=False, float_format="%.6g") for name, log in logs.items()},
+        "robot.yaml": (BUILT_IN_FOLDER / f"{ARM_NAME}.yaml").read_text(encoding="utf-8"),
+        "hidden.yaml": yaml.safe_dump(truth, sort_keys=False),
+    }
+    refuse_existing(folder / name for name in texts)
+    return write_texts(texts, folder)
 
 
 def _log(arm: Arm, effects: list[FittedEffect], number: int) -> pd.DataFrame:

@@ -41,8 +41,8 @@ class SimulatorModel:
     """What a simulator can hold of a model.
 
     model: links with the bodies that were added, gravity as tilted. fields: of the joints, (joints,) each. missing:
-    labels of the effects without a place. thickened_links: links, from 1, that were points or rods, which no simulator
-    takes, and have been given a little extent.
+    labels of the named effects without a place. thickened_links: links, from 1, that were points or rods, which no
+    simulator takes, and have been given a little extent.
     """
 
     model: TorqueModel
@@ -65,7 +65,7 @@ def has_place_in_simulator(candidate: Candidate, coefficients: Array) -> bool:
 def build_simulator_model(known: TorqueModel) -> SimulatorModel:
     """Sorts the effects of a model into links, gravity and fields of joints; the rest is named as missing."""
     arm, inertial, missing = known.arm, known.inertial, list[str]()
-    for effect in known.effects:
+    for number, effect in enumerate(known.effects):
         candidate, values = effect.candidate, effect.coefficients
         body, gravity = candidate.added_body(values), candidate.changed_gravity(values)
         if body is not None and inertial is not None:
@@ -74,7 +74,7 @@ def build_simulator_model(known: TorqueModel) -> SimulatorModel:
         elif gravity is not None:
             x, y, z = gravity.tolist()
             arm = replace(arm, gravity=(x, y, z))
-        elif not candidate.joint_fields(values):
+        elif not candidate.joint_fields(values) and number not in known.unclaimed:
             missing.append(candidate.label)
     thickened: tuple[int, ...] = ()
     if inertial is not None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
-from armlab.common.files import refuse_inputs, write_texts
+from armlab.common.files import refuse_existing, write_texts
 from armlab.identification.export import (
     SimulatorModel,
     build_simulator_model,
@@ -45,7 +45,7 @@ def export_model(path: Path, out: Path) -> ResultLines:
             notes.append(
                 "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
             )
-    refuse_inputs((path, source), (out.parent / name for name in texts), "the model")
+    refuse_existing(out.parent / name for name in texts)
     written = write_texts(texts, out.parent)
     yield from map(str, written)
     yield from notes

@@ -210,6 +210,6 @@ def test_an_mjcf_becomes_a_chain_as_urdf_and_what_keeps_the_meshes_is_told(mjcf:
 
 def test_an_input_file_is_never_written_over(urdf: Path) -> None:
     model, before = model_of(urdf), urdf.read_text()
-    with pytest.raises(InputError, match="choose another name"):
+    with pytest.raises(InputError, match="is there already: choose another name"):
         list(export_model(model, urdf))
     assert urdf.read_text() == before

@@ -11,6 +11,7 @@ from refusals import refusal
 
 from armlab.cli.main import main
 from armlab.common.errors import UndecidedError
+from problem.arm import link_poses
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.locked_joints import lock_joints, parse_locks
 from problem.motion import Motion
@@ -48,6 +49,18 @@ def test_the_torques_of_a_locked_urdf_are_those_of_pinocchios_reduced_model(urdf
     arm, motion = lock_joints(urdf, "hand", {"finger1": 0.03}, tmp_path).arm, some_motion(3)
     theirs = [pin.rnea(reduced, reduced.createData(), *state) for state in zip(*vars(motion).values(), strict=True)]
     np.testing.assert_allclose(rigid_body_torque(arm, motion), theirs, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [np.pi / 2, -np.pi / 2, 0.3])
+def test_a_joint_locked_at_a_quarter_turn_stands_there(tmp_path: Path, angle: float) -> None:
+    """Angles about fixed axes are not unique there."""
+    path = tmp_path / "toy.urdf"
+    path.write_text(GRIPPER_URDF.replace('rpy="0.1 0.2 0.3"', 'rpy="0.1 0 0"').replace('xyz="0 1 1"', 'xyz="0 1 0"'))
+    arm = lock_joints(path, "hand", {"joint2": angle}, tmp_path).arm
+    whole = lock_joints(path, "hand", {}, tmp_path).arm
+    for position in some_motion(2).position:
+        one, other = link_poses(arm, position), link_poses(whole, np.array([position[0], angle, position[1]]))
+        np.testing.assert_allclose(one[1], other[2], atol=1e-12)
 
 
 def test_the_torques_of_a_locked_mjcf_are_those_of_mujoco_with_still_fingers(mjcf: Path, tmp_path: Path) -> None:
@@ -91,7 +104,7 @@ def test_the_written_file_is_the_arm_and_its_meshes_are_found(urdf: Path, tmp_pa
     np.testing.assert_allclose(rigid_body_torque(arm, motion), rigid_body_torque(expected, motion))
     again = CliRunner().invoke(main, ["lock-joints", str(urdf), str(new), "--tip", "hand"])
     assert again.exit_code == 2
-    assert "is there already: choose a new file" in again.output
+    assert "is there already: choose another name" in again.output
 
 
 @pytest.mark.parametrize(
@@ -146,5 +159,5 @@ def test_a_robot_with_a_gripper_is_refused_with_the_link_where_its_arm_ends(urdf
     for path, joints in ((urdf, 3), (mjcf, 2)):
         with pytest.raises(UndecidedError) as raised:
             load_arm(str(path))
-        assert f"--tip hand ({joints} joints)" in str(raised.value)
+        assert f"locked: hand ({joints} joints)" in str(raised.value)
         assert raised.value.choices == ("hand",)

@@ -1,6 +1,8 @@
 """Other formats: what is in them arrives unchanged, under names that a person can choose from."""
 
+import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -184,7 +186,7 @@ def test_a_recording_of_a_robot_with_a_gripper_holds_a_robot_file_of_its_arm(tmp
     path = tmp_path / "log.csv"
     path.write_text(odd_text())
     options = {**OPTIONS, "robot": str(tmp_path / "toy.urdf")}
-    assert "--tip hand (3 joints)" in refusal(import_files, [path], tmp_path / "recording", options)
+    assert "locked: hand (3 joints)" in refusal(import_files, [path], tmp_path / "recording", options)
     imported = import_files([path], tmp_path / "recording", {**options, "tip": "hand", "lock": ("finger1=0.02",)})
     assert any("locked: finger1 at 0.02, finger2 at 0.4" in line for line in imported.lines)
     shutil.move(tmp_path / "recording", tmp_path / "elsewhere")
@@ -204,3 +206,33 @@ def test_a_tip_needs_a_robot_file_with_links(tmp_path: Path, given: dict[str, ob
     path = tmp_path / "log.csv"
     path.write_text(odd_text())
     assert message in refusal(import_files, [path], tmp_path / "recording", {**OPTIONS, **given})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda rows: rows[:5], "at least"),
+        (lambda rows: [re.sub(r"[^,]*$", "nan", row) if n % 2 else row for n, row in enumerate(rows)], "measurement"),
+    ],
+    ids=["five rows", "holes in a channel"],
+)
+def test_a_log_that_no_command_could_use_is_not_imported(
+    tmp_path: Path, spoil: Callable[[list[str]], list[str]], message: str
+) -> None:
+    head, *rows = odd_text().splitlines()
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([head, *spoil(rows), ""]))
+    told = refusal(import_files, [path], tmp_path / "recording", OPTIONS)
+    assert told.startswith("nothing is written: log.csv")
+    assert message in told
+    assert not (tmp_path / "recording").exists()
+
+
+def test_columns_of_another_order_than_the_positions_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    for signal, names in (("torque", "tau2,tau1,tau3"), ("position", "q2,q1,q3")):
+        told = refusal(import_files, [path], tmp_path / "recording", {**OPTIONS, signal: names})
+        assert "the columns of a joint should stand at one place in both" in told
+    both = {**OPTIONS, "torque": "tau2,tau1,tau3", "position": "q2,q1,q3"}
+    assert import_files([path], tmp_path / "recording", both).plan.columns["position"] == ("q2", "q1", "q3")

@@ -228,7 +228,7 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         for claim, _ in claims_by_share(diagnosis)
         if claim.next_experiment
     ]
-    if any(claim.rivals for claim in diagnosis.claims):
+    if any(_motion_may_tell(claim) for claim in diagnosis.claims):
         asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
     elif any(claim.effect == UNKNOWN.id for claim in diagnosis.claims):
         asked.append("Look at the details of what is unknown: the variables that it depends on say where to look.")
@@ -238,6 +238,12 @@ def next_steps(diagnosis: Diagnosis) -> list[str]:
         _export_text(diagnosis),
     ]
     return asked + use
+
+
+def _motion_may_tell(claim: Claim) -> bool:
+    """Whether a motion may tell a claim from a rival; none tells a load from a link that is off."""
+    of_link = effect_named(claim.effect).where == "link"
+    return any(not of_link or effect_named(each.effect).where != "link" for each in claim.rivals)
 
 
 def _export_text(diagnosis: Diagnosis) -> str:

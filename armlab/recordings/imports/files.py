@@ -1,5 +1,7 @@
 """From files of other formats to a recording folder: the last step of an import, and what it says about itself."""
 
+import os
+import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +11,8 @@ from armlab.common.errors import InputError
 from armlab.recordings.imports.plan import ImportPlan, plan_import
 from armlab.recordings.imports.questions import Options
 from armlab.recordings.imports.sources import Source
+from armlab.recordings.load import load_recording
+from armlab.recordings.motion import is_motion_only, load_motion_recording
 from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 
@@ -63,7 +67,10 @@ def import_files(files: Sequence[Path], out: Path, options: Options) -> Imported
 
 
 def write_plan(plan: ImportPlan) -> ImportedRecording:
-    """Writes the recording of a plan; InputError, with all of them, where questions are open."""
+    """Writes the recording of a plan.
+
+    Raises InputError, with all of them, where questions are open, and where no command could use what was recorded.
+    """
     if plan.questions or plan.robot is None:
         raise InputError("; ".join(question.missing for question in plan.questions))
     validate = {str(path) for path in plan.options["validate"]}
@@ -80,7 +87,15 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     note = tuple(f"{run.file}: imported from {Path(path).name}" for path, run in zip(plan.sources, runs, strict=True))
     draft = Draft(plan.robot.name, columns, dict(plan.units), tuple(runs), others, note)
     folder = Path(plan.options["out"])
+    was_there = folder.is_dir()
     write_recording(draft, folder, plan.robot.copies(folder))
+    try:
+        (load_motion_recording if is_motion_only(folder) else load_recording)(folder)
+    except InputError as error:
+        shutil.rmtree(folder)
+        if was_there:
+            folder.mkdir()
+        raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
     return ImportedRecording(folder, plan, draft)
 
 

@@ -3,6 +3,7 @@
 A plan is made anew with each answer: an answer is an option, as if it had been given with the command.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -69,6 +70,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     chosen_columns, unnamed = choose_columns(log, commands, unmatched)
     columns = {signal: known.value for signal, known in chosen_columns.items()}
     _check_sources(sources, columns)
+    _check_order(columns)
     chosen_units, unmeasured = choose_units(log, columns)
     units = {name: known.value[0] if len(known.value) == 1 else known.value for name, known in chosen_units.items()}
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
@@ -144,6 +146,25 @@ def _check_sources(sources: Mapping[str, Source], columns: Mapping[str, tuple[st
                         f"{name} is in {other or 'no unit'} in {path}, in {unit or 'no unit'} in {first_path}: "
                         "import files of one kind together"
                     )
+
+
+def _check_order(columns: Mapping[str, tuple[str, ...]]) -> None:
+    """Raises InputError for columns whose numbers stand in another order than those of the position."""
+    position = _numbers_of(columns.get("position", ()))
+    for signal, names in columns.items():
+        own = _numbers_of(names)
+        if own != position and sorted(own) == sorted(position):
+            raise InputError(
+                f"{signal.replace('_', ' ')} has the columns {', '.join(names)}, position has "
+                f"{', '.join(columns['position'])}: the columns of a joint should stand at one place in both"
+            )
+
+
+def _numbers_of(names: Sequence[str]) -> list[int]:
+    """The last number in each name; none where a name has no number or two have the same."""
+    found = [re.findall(r"\d+", name) for name in names]
+    numbers = [int(each[-1]) for each in found if each]
+    return numbers if len(set(numbers)) == len(names) else []
 
 
 def _ask_robot(log: Path, count: int | None, joints: tuple[str, ...]) -> Question:
