@@ -39,7 +39,7 @@ from problem.robot_file import BUILT_IN_FOLDER
 
 OUTCOMES = Path(__file__).with_name("hostile_outcomes.csv")
 TIME_LIMIT_S = 120
-TOLD_NAN = re.compile(r"(?i)(?<![\w/])(?<![qu]\d = )-?nan\b")  # of a repair: `line 3: q2 = nan`
+TOLD_NAN = re.compile(r"(?i)(?<![\w/])(?<![qu]\d = )(?<!: t = )-?nan\b")  # of a repair: `line 3: q2 = nan`
 HOSTILE_VALUES: tuple[Any, ...] = (
     *(float("nan"), float("inf"), -1, 0, 1e307, -1e307, 10**400, "", "../..", "/etc/passwd", "\u202e", "<b>", None),
     *([], {}, [[]], {"a": {}}, True, "1e5", [1, "x"], "x" * 10_000),

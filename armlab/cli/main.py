@@ -139,7 +139,8 @@ class _CommandGroup(click.Group):
                 warnings.showwarning = partial(_show_warning, warnings.showwarning)
                 return super().invoke(ctx)
         except (InputError, DataError) as error:
-            click.echo(f"armlab: {error}", err=True)
+            text = " ".join(str(error).split())  # a name out of a file may have lines of its own
+            click.echo(f"armlab: {text}", err=True)
             ctx.exit(2)
         except StoppedError as error:
             click.echo(f"armlab: {error}", err=True)

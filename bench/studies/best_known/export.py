@@ -75,7 +75,7 @@ def _find_record(path: Path, name: str) -> Record:
 
 def _check_same_trajectory(settings: ProblemSettings, record: Record, path: Path, name: str) -> None:
     own: dict[str, Any] = settings.model_dump(mode="json")
-    for key in own.keys() | record.settings.keys():
+    for key in sorted(own.keys() | record.settings.keys()):
         here = canonical(own.get(key))
         there = canonical(record.settings.get(key))
         if key not in _KEYS_THAT_MAY_DIFFER and here != there:
