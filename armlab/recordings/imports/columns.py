@@ -130,7 +130,8 @@ def _ask_columns(log: Log, signal: str, columns: Mapping[str, Known], reason: st
     shown = ", ".join(names[:SHOWN_COLUMNS]) + (", ..." if len(names) > SHOWN_COLUMNS else "")
     other = ", or --reference-position of a position servo" if signal == "torque" else ""
     flag = signal.replace("_", "-")
-    missing = reason or f"the columns of {signal} are missing: give --{flag}{other}; the file holds {shown}"
+    count = f" with {len(log.joints)} columns, one a joint of the robot" if log.joints and signal != "time" else ""
+    missing = reason or f"the columns of {signal} are missing: give --{flag}{count}{other}; the file holds {shown}"
     text = _column_text(signal, log.joints)
     if signal == "torque":
         text += f", or '{NO_TORQUE}' for a log of commands and positions"
