@@ -104,7 +104,7 @@ def test_an_export_never_replaces_the_robot_that_the_model_is_made_from(tmp_path
     (tmp_path / "arm.urdf").write_text(urdf(3))
     path = write_model(tmp_path / "model.yaml", robot="arm.urdf")
     message = run_refused(tmp_path, "export-model", path, tmp_path / "arm.urdf")
-    assert "arm.urdf is a file that the model is made from" in message
+    assert "arm.urdf is there already: choose another name" in message
 
 
 def test_a_verdict_that_is_nested_without_end_is_refused(tmp_path: Path) -> None:
