@@ -52,31 +52,21 @@ class KinematicTree:
         unknown names and for positions out of limits.
         """
         positions = {name: self._checked(name, position) for name, position in given.items()}
+        followers = {joint.name: joint.follows for joint in self.joints if joint.follows is not None}
         if tip is not None:
             way = self._way_to(tip)
             beside = {joint.name: joint for joint in self.joints if joint.moves and joint not in way}
-            for joint in beside.values():
-                if (
-                    joint.follows
-                    and joint.name in given
-                    and joint.follows.leader in beside
-                    and joint.follows.multiplier
-                ):
-                    leader = (given[joint.name] - joint.follows.offset) / joint.follows.multiplier
-                    positions.setdefault(joint.follows.leader, leader)
+            for name, follows in followers.items():
+                if name in given and follows.leader in beside and follows.multiplier:
+                    leader = (given[name] - follows.offset) / follows.multiplier
+                    positions.setdefault(follows.leader, self._checked(follows.leader, leader))
             for joint in beside.values():
                 if joint.free:
                     positions.setdefault(joint.name, float(np.clip(0.0, *joint.limits)))
-        waiting = [joint for joint in self.joints if joint.follows is not None and joint.name not in positions]
-        while waiting:
-            ready = [joint for joint in waiting if joint.follows and joint.follows.leader in positions]
-            for joint in ready:
-                assert joint.follows is not None
-                leader = positions[joint.follows.leader]
-                positions[joint.name] = joint.follows.multiplier * leader + joint.follows.offset
-            waiting = [joint for joint in waiting if joint not in ready]
-            if not ready:
-                break
+        for _ in followers:  # one that follows may lead another one
+            for name, follows in followers.items():
+                if follows.leader in positions:
+                    positions.setdefault(name, follows.multiplier * positions[follows.leader] + follows.offset)
         return positions
 
     @cached_property

@@ -27,6 +27,7 @@ class UrdfElement:
     where: str
 
     def numbers(self, path: str, key: str, default: str, count: int) -> Array:
+        """The numbers of an attribute of a child, (count,); InputError where they are others."""
         child = self.node.find(path)
         text = default if child is None else child.get(key, default)
         try:
@@ -38,11 +39,13 @@ class UrdfElement:
         return values
 
     def origin(self, path: str = "origin") -> Array:
+        """The pose (4, 4) that a child gives, m and rad; the unit matrix without it."""
         pose = roll_pitch_yaw(*self.numbers(path, "rpy", "0 0 0", 3).tolist())
         pose[:3, 3] = self.numbers(path, "xyz", "0 0 0", 3)
         return pose
 
     def end(self, path: str) -> str:
+        """The link that a child, <parent> or <child>, names; InputError where it is missing."""
         child = self.node.find(path)
         if child is None or not child.get("link"):
             raise InputError(f"{self.where}: <{path} link=...> is missing")

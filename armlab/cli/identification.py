@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from armlab.cli.options import FiniteNumber, OutputPath
+from armlab.cli.options import FiniteNumber, OutputPath, lock_option, tip_option
 from armlab.cli.output import prints_lines, prints_result, tell_progress
 from armlab.common.documents import ResultLines
 
@@ -179,8 +179,8 @@ def gains(
 @click.command("lock-joints")
 @click.argument("robot", type=click.Path(path_type=Path))
 @click.argument("out", type=OutputPath())
-@click.option("--tip", metavar="LINK", help="Link where the arm ends; what moves beside it is locked.")
-@click.option("--lock", multiple=True, metavar="JOINT=VALUE", help="Joint to lock at a position in rad or m.")
+@tip_option
+@lock_option
 @prints_result
 def lock_joints(robot: Path, out: Path, tip: str | None, lock: tuple[str, ...]) -> ResultLines:
     """Make one arm of ROBOT and write it to OUT.

@@ -31,6 +31,14 @@ class OutputPath(click.Path):
         return super().convert(value, param, ctx)
 
 
+tip_option = click.option(
+    "--tip", metavar="LINK", help="Link of the robot file where the arm ends; what moves beside it is locked."
+)
+lock_option = click.option(
+    "--lock", multiple=True, metavar="JOINT=VALUE", help="Joint to lock at a position in rad or m."
+)
+
+
 class PagePath(OutputPath):
     """An HTML page to write; a name without the ending .html, which no browser opens as a page, is refused."""
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from armlab.cli.options import OutputPath, PagePath
+from armlab.cli.options import OutputPath, PagePath, lock_option, tip_option
 from armlab.cli.output import can_ask, prints_result
 from armlab.common.documents import FailedResultError, ResultLines
 
@@ -108,10 +108,8 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @recording.command("import")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--robot", help="Built-in robot, or path of a robot file.")
-@click.option(
-    "--tip", metavar="LINK", help="Link of the robot file where the arm ends; what moves beside it is locked."
-)
-@click.option("--lock", multiple=True, metavar="JOINT=VALUE", help="Joint to lock at a position in rad or m.")
+@tip_option
+@lock_option
 @click.option("--out", type=OutputPath(), help="New folder for the recording.")
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")

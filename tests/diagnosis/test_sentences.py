@@ -178,6 +178,13 @@ def test_a_size_whose_interval_reaches_zero_is_told_as_perhaps() -> None:
     )
 
 
+def test_friction_that_acts_in_one_direction_alone_is_no_doubtful_friction() -> None:
+    alone = with_numbers("asymmetric_friction", positive=(0.0, (-0.1, 0.1)), negative=(2.0, (1.9, 2.1)))
+    assert finding_in_words(ARM, alone) == "asymmetric friction at joint 2"
+    neither = with_numbers("asymmetric_friction", positive=(0.0, (-0.1, 0.1)), negative=(0.0, (-0.1, 0.1)))
+    assert finding_in_words(ARM, neither) == "perhaps asymmetric friction at joint 2"
+
+
 def test_a_load_of_negative_mass_is_called_less_mass() -> None:
     load = with_numbers("payload", mass=(-0.5, (-0.6, -0.4)))
     assert finding_sentence(load, SIMULATION) == (

@@ -76,14 +76,15 @@ def is_negative_load(claim: Claim) -> bool:
 def is_doubtful(claim: Claim) -> bool:
     """Whether a finding may be nothing: the interval of its size reaches zero.
 
-    The size is the number that stands first in the effect's figures; of an effect without figures, all its numbers.
-    The numbers of a link that is off may each be nothing while the link is off.
+    The size is the number that stands first in the effect's figures, with all others of its unit; of an effect without
+    figures, all its numbers. The numbers of a link that is off may each be nothing while the link is off.
     """
     facts = effect_named(claim.effect)
     if facts.in_links:
         return False
     first = next((field for _, field, _, _ in Formatter().parse(facts.figures) if field is not None), None)
-    sizes = [each for each in claim.parameters if np.ndim(each.value) == 0 and first in (None, each.name)]
+    unit = next((each.unit for each in claim.parameters if each.name == first), None)
+    sizes = [each for each in claim.parameters if np.ndim(each.value) == 0 and unit in (None, each.unit)]
     return bool(sizes) and all(map(may_be_zero, sizes))
 
 

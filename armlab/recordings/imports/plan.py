@@ -18,6 +18,7 @@ from armlab.recordings.imports.robots import ImportedRobot, read_robot
 from armlab.recordings.imports.scales import choose_gains, choose_units
 from armlab.recordings.imports.sources import ReadOptions, Source, read_sources
 from armlab.recordings.recording_file import check_new_folder
+from armlab.recordings.units import SENSOR_SIGNALS
 from problem.robot_file import built_in_arms
 
 SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semicolon": ";"}
@@ -149,11 +150,11 @@ def _check_sources(sources: Mapping[str, Source], columns: Mapping[str, tuple[st
 
 
 def _check_order(columns: Mapping[str, tuple[str, ...]]) -> None:
-    """Raises InputError for columns whose numbers stand in another order than those of the position."""
+    """Raises InputError for columns of joints whose numbers stand in another order than those of the position."""
     position = _numbers_of(columns.get("position", ()))
     for signal, names in columns.items():
-        own = _numbers_of(names)
-        if own != position and sorted(own) == sorted(position):
+        own = [] if signal in SENSOR_SIGNALS else _numbers_of(names)
+        if own and own != position and sorted(own) == sorted(position):
             raise InputError(
                 f"{signal.replace('_', ' ')} has the columns {', '.join(names)}, position has "
                 f"{', '.join(columns['position'])}: the columns of a joint should stand at one place in both"
