@@ -39,7 +39,8 @@ from problem.robot_file import BUILT_IN_FOLDER
 
 OUTCOMES = Path(__file__).with_name("hostile_outcomes.csv")
 TIME_LIMIT_S = 120
-TOLD_NAN = re.compile(r"(?i)(?<![\w/])(?<![qu]\d = )(?<!: t = )-?nan\b")  # of a repair: `line 3: q2 = nan`
+TOLD_NAN = re.compile(r"(?i)(?<![\w/])-?nan\b")
+REPAIR = re.compile(r"line \d+: \S+ = nan")  # what a repair tells of its row
 HOSTILE_VALUES: tuple[Any, ...] = (
     *(float("nan"), float("inf"), -1, 0, 1e307, -1e307, 10**400, "", "../..", "/etc/passwd", "\u202e", "<b>", None),
     *([], {}, [[]], {"a": {}}, True, "1e5", [1, "x"], "x" * 10_000),
@@ -463,7 +464,7 @@ def _judge(kind: Kind, seed: int, words: list[str], result: Any, before: dict[st
         verdict = "broken: more than one line"
     elif result.exit_code == 0 and not all(_is_free_of_nan(each, kind) for each in _new_files(folder, changed)):
         verdict = "broken: NaN in a file"
-    elif result.exit_code == 0 and "nan" not in words and TOLD_NAN.search(result.stdout):
+    elif result.exit_code == 0 and "nan" not in words and TOLD_NAN.search(REPAIR.sub("", result.stdout)):
         verdict = "broken: NaN on the terminal"
     return Outcome(f"{kind.name}/{seed}", result.exit_code, verdict, told)
 
