@@ -248,8 +248,9 @@ class ComparisonFile(Entry):
     """The content of `comparison.json` (schema comparison/1).
 
     old, new: names of the first and of the last recording; recordings: of all, dates: as far as they are known.
-    level: a parameter changed where its p-value is below it. findings: what changed, parameters as changes. notes: what
-    the recordings hold and the comparison does not use.
+    level: a parameter changed where its p-value is below it. findings: what changed, parameters as changes. doubtful: a
+    change that would be a finding if the runs of one recording differed less. notes: what the recordings hold and the
+    comparison does not use.
     """
 
     schema_: Literal["comparison/1"] = Field(alias="schema")
@@ -261,6 +262,7 @@ class ComparisonFile(Entry):
     dates: tuple[str | None, ...] | None = None
     level: float
     findings: tuple[FindingEntry, ...] | None = None
+    doubtful: FindingEntry | None = None
     changes: tuple[ChangeEntry, ...]
     smallest_detectable: tuple[DetectableEntry, ...] | None = None
     trends: tuple[TrendEntry, ...] | None = None

@@ -622,6 +622,12 @@ class ComparisonTuning:
     drift_waves: int = tuned(
         6, unit="waves a run", meaning="slow waves in which offset and friction of a run may drift", least=1
     )
+    gain_drift: float = tuned(
+        0.005,
+        unit="of the torque",
+        meaning="standard deviation of a motor's torque constant between runs",
+        source="NdFeB magnets lose about 0.11 % of their field per kelvin; five kelvin",
+    )
     level: float = tuned(
         0.01, unit="probability", meaning="of a false change in all that is compared", source="convention", most=1.0
     )

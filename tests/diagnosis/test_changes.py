@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from public_copies import needs_copies
 from refusals import refusal
+from scipy.signal import savgol_filter
 from shipped_schemas import check_against_schema
 from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 
@@ -26,6 +27,7 @@ from armlab.diagnosis.compare.numbers import Change, laws_of
 from armlab.diagnosis.compare.pooled import unite_candidates
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.found_model import model_found
+from armlab.diagnosis.relations.variants import one_run
 from armlab.effects.contract import Scene
 from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
@@ -57,7 +59,7 @@ def test_a_gain_has_no_level_where_the_recordings_have_it_by_sign_in_common() ->
     """Its change is told alone, since two numbers of the wider form are no level of one."""
     by_sign, gain = TorqueGainBySign.at(ARM, 2), TorqueGain.at(ARM, 2)
     pooled = SimpleNamespace(design=SimpleNamespace(blocks=[SimpleNamespace(candidate=by_sign)]))
-    group = SimpleNamespace(candidate=gain, laws=(), shaped=None, common=np.array([0, 1]))
+    group = SimpleNamespace(candidate=gain, laws=(), whole_law=False, common=np.array([0, 1]))
     table = SimpleNamespace(groups=[group], contrast=np.array([[-0.5], [0.5]]))
     ((law, numbers, _),) = laws_of(pooled, table, (), SimpleNamespace(group=0, values=np.array([0.1])))
     assert not law.known
@@ -161,16 +163,49 @@ def test_all_friction_of_a_joint_is_told_as_one_level() -> None:
     assert level.interval[0] < change < level.interval[1]
 
 
-@needs_copies("friction-damper-20-lb", "friction-damper-25-lb")
-def test_a_damper_at_another_tension_has_other_friction_and_no_other_fault(tmp_path: Path) -> None:
-    names = [f"friction-damper-{tension}-lb" for tension in (20, 80)]
+DAMPER_LAWS = {"coulomb_friction", "viscous_friction", "presliding_hysteresis", "backlash", "asymmetric_friction"}
+
+
+@needs_copies(*(f"friction-damper-{tension}-lb" for tension in (20, 25, 80)))
+@pytest.mark.parametrize("tension", [25, 80])
+def test_a_damper_at_another_tension_has_other_friction_and_no_other_fault(tension: int, tmp_path: Path) -> None:
+    """The interval of new over old level holds the ratio of the forces themselves, run by run."""
+    names = [f"friction-damper-{each}-lb" for each in (20, tension)]
     opened = [load_recording(fetch_recording(name, tmp_path / name)) for name in names]
     found = compare(opened[0], opened[1], baseline="refit")
-    laws = {"coulomb_friction", "viscous_friction", "presliding_hysteresis", "backlash", "asymmetric_friction"}
-    assert {each.effect for each in found.named} <= laws
+    assert {each.effect for each in found.named} <= DAMPER_LAWS
     (level,) = [each for each in found.changes if each.parameter == ALL_FRICTION]
     assert level.ratio is not None
-    assert level.ratio[1] > 1.5
+    for old, new in zip(opened[0].runs, opened[1].runs, strict=True):
+        assert level.ratio[1] < np.sqrt(np.mean(new.torque**2) / np.mean(old.torque**2)) < level.ratio[2]
+
+
+@needs_copies("friction-damper-25-lb", "friction-damper-35-lb")
+def test_where_the_runs_of_one_recording_differ_as_much_nothing_is_sure_and_nothing_is_the_same(tmp_path: Path) -> None:
+    names = [f"friction-damper-{each}-lb" for each in (25, 35)]
+    opened = [load_recording(fetch_recording(name, tmp_path / name)) for name in names]
+    found = compare(opened[0], opened[1], baseline="refit")
+    assert found.status == "inconclusive"
+    assert found.doubtful is not None
+    assert found.doubtful.effect in DAMPER_LAWS
+    assert "record more runs" in comparison_sentences(found)[1]
+
+
+@needs_copies("emps")
+def test_the_friction_that_differs_between_two_runs_is_what_constant_speed_shows(tmp_path: Path) -> None:
+    """The force at constant speed is read without any model."""
+    whole = load_recording(fetch_recording("emps", tmp_path / "emps"))
+    found = compare(*(one_run(whole, run) for run in whole.runs))
+    assert [each.effect for each in found.named] == ["coulomb_friction"]
+    (level,) = [each for each in found.changes if each.parameter == ALL_FRICTION]
+    assert level.ratio is not None
+    forces = []
+    for run in whole.runs:
+        step = float(np.median(np.diff(run.time)))
+        speed, acceleration = (savgol_filter(run.position[:, 0], 101, 2, deriv=each, delta=step) for each in (1, 2))
+        steady = (np.abs(speed) > 0.08) & (np.abs(acceleration) < 0.03)
+        forces.append(np.mean(np.sign(speed[steady]) * run.torque[steady, 0]))
+    assert level.ratio[1] < forces[1] / forces[0] < level.ratio[2]
 
 
 def test_notes_say_which_columns_are_not_used() -> None:

@@ -40,7 +40,7 @@ class ChangeGroup:
     common: NDArray[np.intp]
     laws: tuple[tuple[Candidate, Array], ...] = ()
     least: float = 0.0
-    shaped: Array | None = None
+    whole_law: bool = False
     familiar: bool = False
 
     @property
@@ -128,6 +128,10 @@ class ChangeTable:
         half = (self.degrees + 1) / 2
         return np.asarray(half * np.sign(evidence) * np.log1p(2 * np.abs(evidence) / self.degrees))
 
+    def log_odds(self, tested: Tested) -> float:
+        """Log odds of a change, before and after the data."""
+        return float(self.odds(np.array(tested.evidence)) + self.prior_odds[tested.group])
+
     def deficits(self, chosen: Sequence[int], tested: Tested) -> Array:
         """How much worse each group would be in the place of a chosen one, log odds, (groups,): infinite for others."""
         number = tested.group
@@ -173,7 +177,7 @@ class ChangeTable:
         sizes = self.contrast @ values.T
         if float(np.ptp(sizes)) < group.least:
             return False
-        plain = not group.laws and group.shaped is None
+        plain = not group.laws and not group.whole_law
         if plain and any(group.candidate.absurdity(each) for each in sizes[1:] - sizes[0]):
             return False
         enough = tested.evidence > self.tuning.least_evidence
@@ -209,36 +213,33 @@ def make_table(pooled: Pooled) -> ChangeTable:
         common[place_of(block.candidate)] = columns
         for place, row in enumerate(block.candidate.rows):
             parts.add(row, block.values[:, place], columns)
-    shaped = _shape_derivatives(pooled)
-    for block, _ in shaped:
-        own_columns = np.arange(at, at + block.values.shape[2])
-        at += len(own_columns)
+    whole = _whole_laws(pooled)
+    for block in whole:
+        shapes = np.arange(at, at + len(block.candidate.shape))
+        at += len(shapes)
         prior.append(_shape_scales(block.candidate, tuning) ** -2.0)
-        common[id(block)] = own_columns
+        common[id(block)] = np.concatenate([common[place_of(block.candidate)], shapes])
         for place, row in enumerate(block.candidate.rows):
-            parts.add(row, block.values[:, place], own_columns)
+            parts.add(row, block.values[:, place, -len(shapes) :], shapes)
     everything, groups = np.arange(at), []
     scaled = _scaled_frictions(pooled)
+    none = np.empty(0, dtype=np.intp)
     offered = [
-        *((block, None, None) for block in pooled.changes),
-        *((block, laws, None) for block, laws in scaled),
-        *((block, None, values) for block, values in shaped),
+        *(
+            (block, (), common.get(place_of(block.candidate), none), _prior_scales(block, pooled))
+            for block in pooled.changes
+        ),
+        *((block, laws, none, np.full(1, tuning.typical_scale)) for block, laws in scaled),
+        *((block, (), common[id(block)], _whole_law_scales(block, pooled)) for block in whole),
     ]
-    for block, laws, law_values in offered:
+    for block, laws, own, scales in offered:
         columns = np.arange(at, at + block.values.shape[2] * contrast.shape[1])
         at += len(columns)
-        own = common.get(place_of(block.candidate), np.empty(0, dtype=np.intp))
-        if laws is not None:
-            scales, own = np.full(1, tuning.typical_scale), np.empty(0, dtype=np.intp)
-        elif law_values is not None:
-            scales, own = _shape_scales(block.candidate, tuning), common[id(block)]
-        else:
-            scales = _prior_scales(block, pooled)
         scales = np.repeat(scales, contrast.shape[1])
         sampled = any(each.sampled for each in block.candidate.facts.parameters)
         least = interval if sampled else 0.0
         familiar = place_of(block.candidate) in known
-        groups.append(ChangeGroup(block, columns, scales, own, laws or (), least, law_values, familiar))
+        groups.append(ChangeGroup(block, columns, scales, own, laws, least, id(block) in common, familiar))
         prior.append(scales**-2.0)
         for place, row in enumerate(block.candidate.rows):
             values = block.values[:, place, :, None] * contrast[pooled.members][:, None, :]
@@ -283,11 +284,20 @@ def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array 
             target=pooled.design.target[rows, joint],
             random=tuple(part * factor for part, _ in drifts for factor in (1.0, level[rows, None])),
             waves=np.concatenate([np.tile(kind, 2) for _, kind in drifts]),
+            known=_drift_of_gain(pooled, joint)[rows],
             stretches=pooled.stretches[rows],
             runs=runs,
             members=members,
         )
     )
+
+
+def _drift_of_gain(pooled: Pooled, joint: int) -> Array:
+    """The torque of each run times what a motor's torque constant differs by between runs, (rows, runs)."""
+    counts = [len(each.torque) for each in pooled.observed.signals]
+    runs = np.repeat(np.arange(len(counts)), counts)
+    torque = pooled.tuning.gain_drift * pooled.observed.torque[:, joint]
+    return np.asarray(torque[:, None] * (runs[:, None] == np.arange(len(counts))))
 
 
 def _runs_to_spare(runs: NDArray[np.intp], members: NDArray[np.intp]) -> int:
@@ -329,8 +339,8 @@ def _scaled_frictions(pooled: Pooled) -> list[tuple[Block, tuple[tuple[Candidate
     return out
 
 
-def _shape_derivatives(pooled: Pooled) -> list[tuple[Block, Array]]:
-    """Derivatives of the torque by the nonlinear parameters of laws at one joint, with the laws' coefficients."""
+def _whole_laws(pooled: Pooled) -> list[Block]:
+    """Laws at one joint with nonlinear parameters: their columns, and the derivatives of their torque by these."""
     model, design, out = pooled.model, pooled.design, []
     for number, block in enumerate(design.blocks):
         candidate = block.candidate
@@ -346,13 +356,20 @@ def _shape_derivatives(pooled: Pooled) -> list[tuple[Block, Array]]:
             columns.append((torques[0] - torques[1]) / (2 * SHAPE_STEP * abs(candidate.shape[place])))
         derivatives = np.stack(columns, axis=-1)
         if np.isfinite(derivatives).all() and np.all(np.any(derivatives != 0, axis=(0, 1))):
-            out.append((Block(candidate, 0, derivatives), values))
+            out.append(Block(candidate, 0, np.concatenate([block.values, derivatives], axis=2)))
     return out
 
 
 def _shape_scales(candidate: Candidate, tuning: ComparisonTuning) -> Array:
     """Standard deviations of changes of nonlinear parameters."""
     return np.asarray(tuning.typical_scale * np.abs(candidate.shape))
+
+
+def _whole_law_scales(block: Block, pooled: Pooled) -> Array:
+    """Standard deviations of changes of coefficients and nonlinear parameters."""
+    coefficients = Block(block.candidate, 0, block.values[:, :, : block.candidate.size])
+    shape = _shape_scales(block.candidate, pooled.tuning)
+    return np.concatenate([_prior_scales(coefficients, pooled), shape])
 
 
 def _prior_scales(block: Block, pooled: Pooled) -> Array:

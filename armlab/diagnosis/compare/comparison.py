@@ -27,6 +27,7 @@ from armlab.diagnosis.simulation import read_simulation
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
+RUNS_DIFFER = "The runs of one recording differ as much as the recordings do: record more runs of each."
 GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same robot
 
 
@@ -34,7 +35,8 @@ GEOMETRY_TOLERANCE = 1e-6  # rad (m): geometry that counts as that of the same r
 class Comparison:
     """diagnoses: of each recording alone. named: what changed, the surest first. changes: every parameter compared.
 
-    reason: of an inconclusive comparison. notes: sentences on what was not used. trends: of more than two recordings,
+    reason: of an inconclusive comparison. doubtful: what makes it so where the runs of one recording differ as much as
+    the recordings. notes: sentences on what was not used. trends: of more than two recordings,
     each parameter that moves; dates: of the recordings.
     """
 
@@ -43,6 +45,7 @@ class Comparison:
     named: tuple[NamedChange, ...] = ()
     changes: tuple[Change, ...] = ()
     reason: str = ""
+    doubtful: NamedChange | None = None
     notes: tuple[str, ...] = ()
     trends: tuple[Trend, ...] = ()
     dates: tuple[date | None, ...] = ()
@@ -70,6 +73,8 @@ class Comparison:
     def __repr__(self) -> str:
         """The status, what changed, and how much was compared."""
         lines = [f"Comparison of {', '.join(map(repr, self.names))}: {self.status}"]
+        if self.doubtful is not None:
+            lines.append(f"  perhaps {self.doubtful.effect}@{self.doubtful.joint}: {self.doubtful.equation}")
         if self.status == "inconclusive":
             return "\n".join([*lines, f"  {self.reason}"])
         lines += [f"  {each.effect}@{each.joint}: {each.equation}" for each in self.named]
@@ -128,20 +133,23 @@ def compare_diagnosed(
         return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
     progress("looking for changes")
     table = make_table(pooled)
-    found = find_sound_changes(pooled, table)
-    if found:
+    sound = find_sound_changes(pooled, table)
+    if sound.named:
         progress("fitting what is common beside the changes")
-        pooled = follow_levels(pooled, common_values(table, found)[table.model])
+        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
         table = make_table(pooled)
-        found = find_sound_changes(pooled, table)
-    named = name_changes(pooled, table, found)
+        sound = find_sound_changes(pooled, table)
+    named = name_changes(pooled, table, sound.named)
+    doubtful = () if sound.doubtful is None else name_changes(pooled, table, [sound.doubtful])
     return Comparison(
-        "changed" if named else "same",
+        "changed" if named else "inconclusive" if doubtful else "same",
         tuple(diagnoses),
         named,
-        list_table(pooled, table, found),
+        list_table(pooled, table, sound.named),
+        reason=RUNS_DIFFER if doubtful else "",
+        doubtful=next(iter(doubtful), None),
         notes=tuple(_notes(recordings, baseline)),
-        trends=_find_trends(pooled, table, found, dates),
+        trends=_find_trends(pooled, table, sound.named, dates),
         dates=tuple(dates),
     )
 

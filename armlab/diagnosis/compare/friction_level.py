@@ -38,7 +38,7 @@ def _friction_change(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]
     joint, rows = first.rows[0], table.mixed.joints[first.rows[0]].rows
     at_mean = common_values(table, found)
     everything = np.arange(table.mixed.size)
-    laws = [each.common for each in table.groups if each.shaped is None and each.candidate.is_friction_of(joint + 1)]
+    laws = [each.common for each in table.groups if not each.whole_law and each.candidate.is_friction_of(joint + 1)]
     mean = _torque_of(rows, np.concatenate([np.intersect1d(each, table.model) for each in laws]), at_mean)
     own = _torque_of(rows, np.concatenate([table.groups[each.group].columns for each in changed]), at_mean)
     whole = table.mixed.errors(joint, everything, at_mean) + mean + own

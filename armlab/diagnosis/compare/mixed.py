@@ -3,8 +3,8 @@
     torque = columns @ values + drift + noise
 
 at each joint. The drift is a slow change of offset and of friction within each run and between runs, its size found by
-restricted likelihood (Patterson and Thompson 1971). A level that wanders within a run wanders between runs, too, and is
-no evidence of a change.
+restricted likelihood (Patterson and Thompson 1971), and a torque constant that differs between runs by a known share. A
+level that wanders within a run wanders between runs, too, and is no evidence of a change.
 """
 
 from collections.abc import Sequence
@@ -30,8 +30,8 @@ class JointRows:
     """The rows of one joint that count.
 
     columns: (rows, own), index: (own,) their numbers among all. target: (rows,). random: parts (rows, count), one
-    variance a part. waves: (count of all,), False for constants of a run. stretches, runs, members: (rows,), stretch
-    of time, run and recording of each row.
+    variance a part. waves: (count of all,), False for constants of a run. known: (rows, count), random columns of known
+    size. stretches, runs, members: (rows,), stretch of time, run and recording of each row.
     """
 
     columns: Array
@@ -39,6 +39,7 @@ class JointRows:
     target: Array
     random: tuple[Array, ...]
     waves: NDArray[np.bool_]
+    known: Array
     stretches: NDArray[np.intp]
     runs: NDArray[np.intp]
     members: NDArray[np.intp]
@@ -48,8 +49,8 @@ class JointRows:
 class WeightedRows:
     """Rows of one joint with the covariance of drift and noise. variance: of the noise.
 
-    drift: (rows, count), random columns in units of the noise. weighted, weighted_target: inverse covariance times the
-    columns and the target.
+    drift: (rows, count), random columns in units of the noise, those of known size last. weighted, weighted_target:
+    inverse covariance times the columns and the target.
     """
 
     rows: JointRows
@@ -78,7 +79,8 @@ def weigh_rows(rows: JointRows) -> WeightedRows:
     """The rows with the likeliest covariance of drift and noise."""
     variance, ratios = _restricted_variances(rows)
     sizes = [part.shape[1] for part in rows.random]
-    drift = np.column_stack(rows.random) * np.sqrt(np.repeat(ratios, sizes))
+    drift = np.column_stack([*rows.random, rows.known])
+    drift = drift * np.sqrt([*np.repeat(ratios, sizes), *np.full(rows.known.shape[1], 1 / variance)])
     factor = cho_factor(np.eye(drift.shape[1]) + drift.T @ drift, lower=True)
     both = _weigh(np.column_stack([rows.columns, rows.target]), drift, factor, variance)
     return WeightedRows(rows, variance, drift, factor, both[:, :-1], both[:, -1])
@@ -92,11 +94,11 @@ def _restricted_variances(rows: JointRows) -> tuple[float, tuple[float, ...]]:
     """Variance of the noise, and of each random part over it, where the restricted likelihood is largest."""
     basis = _orthonormal_basis(rows.columns)
     left = rows.target - basis @ (basis.T @ rows.target)
-    random = np.column_stack(rows.random)
+    random = np.column_stack([*rows.random, rows.known])
     random = random - basis @ (basis.T @ random)
     gram, towards, power = random.T @ random, random.T @ left, float(left @ left)
     free = max(len(left) - basis.shape[1], 1)
-    sizes = [part.shape[1] for part in rows.random]
+    sizes = [part.shape[1] for part in (*rows.random, rows.known)]
 
     def rest_and_spread(ratios: Sequence[float]) -> tuple[float, float]:
         root = np.sqrt(np.repeat(ratios, sizes))
@@ -109,12 +111,14 @@ def _restricted_variances(rows: JointRows) -> tuple[float, tuple[float, ...]]:
         rest, spread = rest_and_spread(ratios)
         return float(-0.5 * (free * np.log(rest) + spread))
 
-    ratios = [FIRST_RATIO] * len(sizes)
+    ratios = [*[FIRST_RATIO] * len(rows.random), free / max(power, 1e-300)]
     for _ in range(LIKELIHOOD_ROUNDS):
-        for part in range(len(sizes)):
+        for part in range(len(rows.random)):
             tried = [likelihood([*ratios[:part], ratio, *ratios[part + 1 :]]) for ratio in VARIANCE_RATIOS]
             ratios[part] = float(VARIANCE_RATIOS[int(np.argmax(tried))])
-    return rest_and_spread(ratios)[0] / free, tuple(ratios)
+        variance = rest_and_spread(ratios)[0] / free
+        ratios[-1] = 1 / variance
+    return variance, tuple(ratios[:-1])
 
 
 def _orthonormal_basis(columns: Array) -> Array:
@@ -186,7 +190,7 @@ class MixedModel:
             noise = each.variance * each.weigh(self.errors(joint, chosen, values))
             products[:, place] += each.stretch_sums(self.stretches) @ (each.weighted[:, used] * noise[:, None])
             along = each.along_drift[:, used]
-            constant = along[~each.rows.waves]
+            constant = along[: len(each.rows.waves)][~each.rows.waves]
             drift[np.ix_(place, place)] += each.variance * along.T @ along
             between[np.ix_(place, place)] += each.variance * constant.T @ constant
         count = int(np.sum(np.any(products != 0, axis=1)))
@@ -198,7 +202,7 @@ class MixedModel:
         A constant of each run is no part of the drift here: it would stand for a change.
         """
         designs, places, at = [], [], len(chosen)
-        waves = [each.drift[:, each.rows.waves] for each in self.joints]
+        waves = [each.drift[:, : len(each.rows.waves)][:, each.rows.waves] for each in self.joints]
         where = np.full(self.size, -1)
         where[chosen] = np.arange(len(chosen))
         for each, drift in zip(self.joints, waves, strict=True):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.diagnosis.columns import place_of
+from armlab.diagnosis.compare.between_runs import scatter_between_runs
 from armlab.diagnosis.compare.changes import ChangeGroup, ChangeTable, Tested
 from armlab.diagnosis.compare.friction_level import friction_changes
 from armlab.diagnosis.compare.numbers import (
@@ -16,7 +17,7 @@ from armlab.diagnosis.compare.numbers import (
     list_changes,
 )
 from armlab.diagnosis.compare.pooled import Pooled, is_body
-from armlab.diagnosis.compare.search import between_runs, find_rivals, held_out_errors
+from armlab.diagnosis.compare.search import find_rivals, held_out_errors
 from armlab.diagnosis.compare.soundness import held_out_gains
 from armlab.diagnosis.result import Rival
 from armlab.effects.links import INERTIAL_ERROR_FACTS
@@ -67,8 +68,8 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     changes = tuple(list_changes(pooled, table, found, tested))
     factor = half_width_factor(tested.degrees)
     difference, covariance = between_ends(table, tested)
-    covariance = as_wide_as_runs(covariance, between_runs(table, chosen, tested.group))
-    if group.laws or group.shaped is not None:
+    covariance = as_wide_as_runs(covariance, scatter_between_runs(table, chosen, tested.group).variances())
+    if group.laws or group.whole_law:
         parameters = tuple(
             ParameterValue(each.parameter, each.difference, each.interval, each.unit) for each in changes
         )
@@ -110,17 +111,22 @@ def _list_rivals(table: ChangeTable, own: ChangeGroup, rivals: Sequence[tuple[in
 def list_table(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> tuple[Change, ...]:
     """Every parameter that was compared: those that changed as fitted together, each other one beside them."""
     chosen = [each.group for each in found]
-    rows: list[Change] = []
-    sure = {each.group: each for each in found}
-    scaled = {place_of(law) for number in chosen for law, _ in table.groups[number].laws}
+    rows = [row for each in found for row in list_changes(pooled, table, found, each)]
+    listed = {_what(row) for row in rows}
+    changed = {place_of(law) for number in chosen for law, _ in table.groups[number].laws}
     for number, group in enumerate(table.groups):
-        if number in sure:
-            rows += list_changes(pooled, table, found, sure[number])
-        elif not group.laws and place_of(group.candidate) not in scaled:
-            beside = table.test((*chosen, number))
-            if is_told(table, beside[-1]):
-                rows += [replace(each, changed=False) for each in list_changes(pooled, table, beside, beside[-1])]
+        if number in chosen or group.laws or place_of(group.candidate) in changed:
+            continue
+        beside = table.test((*chosen, number))
+        if is_told(table, beside[-1]):
+            others = [each for each in list_changes(pooled, table, beside, beside[-1]) if _what(each) not in listed]
+            rows += [replace(each, changed=False) for each in others]
+            listed.update(_what(each) for each in others)
     return (*rows, *friction_changes(pooled, table, found))
+
+
+def _what(change: Change) -> tuple[str, tuple[int, ...], str]:
+    return change.effect, change.joints, change.parameter
 
 
 def is_told(table: ChangeTable, tested: Tested) -> bool:

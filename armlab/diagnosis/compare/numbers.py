@@ -8,9 +8,9 @@ from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.columns import place_of
+from armlab.diagnosis.compare.between_runs import scatter_between_runs
 from armlab.diagnosis.compare.changes import ChangeTable, Tested
 from armlab.diagnosis.compare.pooled import Pooled, is_body
-from armlab.diagnosis.compare.search import between_runs
 from armlab.effects.contract import Candidate, Value
 from armlab.effects.parameters import half_widths, parameter_slopes
 
@@ -102,7 +102,9 @@ def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], te
     """The scalar parameters of a group in the recordings."""
     _, covariance = between_ends(table, tested)
     if tested in found:
-        covariance = as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
+        covariance = as_wide_as_runs(
+            covariance, scatter_between_runs(table, [each.group for each in found], tested.group).variances()
+        )
     for law, own, spread in laws_of(pooled, table, found, tested):
         between = own[-1] - own[0]
         own_spread = covariance if spread is None else covariance[0, 0] * spread
@@ -164,9 +166,10 @@ def laws_of(
         for candidate, coefficients in group.laws:
             own = np.outer(1 + offsets[:, 0], coefficients)
             yield Law(candidate, known=True), own, np.outer(coefficients, coefficients)
-    elif group.shaped is not None:
-        own = np.array(group.candidate.shape) + offsets
-        yield Law(group.candidate, known=True, coefficients=group.shaped), own, None
+    elif group.whole_law:
+        size = group.candidate.size
+        level = common_values(table, found)[group.common[:size]] + _simulated(pooled, group.candidate)
+        yield Law(group.candidate, known=True), np.concatenate([level, group.candidate.shape]) + offsets, None
     elif _level_is_known(pooled, group.candidate):
         at_mean = common_values(table, found)
         mean = at_mean[group.common] + _simulated(pooled, group.candidate)
@@ -177,26 +180,30 @@ def laws_of(
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A law whose numbers change. known: whether they have a level. coefficients: given where its shape changes."""
+    """A law whose numbers change: its coefficients, and after them its nonlinear parameters where these change, too.
+
+    known: whether they have a level.
+    """
 
     candidate: Candidate
     known: bool
-    coefficients: Array | None = None
+
+    def shaped(self, numbers: Array) -> Candidate:
+        """The law with the nonlinear parameters among the numbers."""
+        shape = numbers[self.candidate.size :]
+        return self.candidate.with_shape(tuple(shape.tolist())) if len(shape) else self.candidate
+
+    def coefficients(self, numbers: Array) -> Array:
+        """The coefficients among the numbers."""
+        return numbers[: self.candidate.size]
 
     def parameters(self, numbers: Array) -> dict[str, Value]:
-        """Named parameters of the law with these coefficients, or this shape."""
-        if self.coefficients is None:
-            return self.candidate.parameters(numbers)
-        return self.candidate.with_shape(tuple(numbers.tolist())).parameters(self.coefficients)
+        """Named parameters of the law with these numbers."""
+        return self.shaped(numbers).parameters(self.coefficients(numbers))
 
     def slopes(self, numbers: Array) -> dict[str, Array]:
         """Derivatives (components, numbers) of the parameters."""
-        if self.coefficients is None:
-            return parameter_slopes(self.candidate, numbers, len(numbers))
-        shaped = self.candidate.with_shape(tuple(numbers.tolist()))
-        own = len(self.coefficients)
-        slopes = parameter_slopes(shaped, self.coefficients, own + len(numbers))
-        return {name: each[:, own:] for name, each in slopes.items()}
+        return parameter_slopes(self.shaped(numbers), self.coefficients(numbers), len(numbers))
 
 
 def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:

@@ -79,9 +79,12 @@ SEEN_EFFECTS = ("coulomb_friction", "viscous_friction", "payload", "torque_gain_
 def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     """What changed and by how much; and the smallest changes that would have been seen."""
     names = join_words(comparison.names)
+    seen = detectable_sentence(comparison)
+    if comparison.doubtful is not None:
+        phrase = change_phrase(comparison.arm, comparison.doubtful)
+        return f"No change between {names} is sure.", f"Perhaps {phrase}. {comparison.reason} {seen}"
     if comparison.status == "inconclusive":
         return f"{names} cannot be compared.", comparison.reason
-    seen = detectable_sentence(comparison)
     if comparison.status == "same":
         return f"Nothing changed between {names} that the recordings show.", seen
     arm = comparison.arm
@@ -205,6 +208,7 @@ def make_comparison_file(comparison: Comparison) -> ComparisonFile:
         recordings=comparison.names,
         level=ComparisonTuning().level,
         findings=tuple(_finding_entry(each) for each in comparison.named),
+        doubtful=None if comparison.doubtful is None else _finding_entry(comparison.doubtful),
         changes=tuple(_change_entry(each) for each in comparison.changes),
         smallest_detectable=tuple(_detectable_entry(each) for each in comparison.changes),
         notes=comparison.notes,

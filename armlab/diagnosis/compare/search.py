@@ -35,8 +35,7 @@ def _best_addition(table: ChangeTable, chosen: tuple[int, ...], banned: frozense
     sure = [each for each in tested if table.is_sure(each)]
     if not sure:
         return None
-    odds = [float(table.odds(np.array(each.evidence)) + table.prior_odds[each.group]) for each in sure]
-    return sure[int(np.argmax(odds))].group
+    return max(sure, key=table.log_odds).group
 
 
 def _settle(table: ChangeTable, chosen: tuple[int, ...], banned: frozenset[int]) -> tuple[int, ...]:
@@ -74,7 +73,7 @@ def _with_single_laws(table: ChangeTable, chosen: tuple[int, ...], banned: froze
         if not group.laws:
             continue
         laws = [place_of(law) for law, _ in group.laws]
-        plain = [(other, each) for other, each in enumerate(table.groups) if not each.laws and each.shaped is None]
+        plain = [(other, each) for other, each in enumerate(table.groups) if not each.laws and not each.whole_law]
         single = [other for other, each in plain if place_of(each.candidate) in laws and other not in banned]
         if set(single) & set(chosen):
             chosen = tuple(dict.fromkeys((*(each for each in chosen if each != number), *single)))
@@ -87,40 +86,6 @@ def find_rivals(table: ChangeTable, chosen: Sequence[int], tested: Tested) -> tu
     near = [int(each) for each in np.argsort(deficits) if deficits[each] < table.tuning.max_rival_deficit]
     others = [(each, float(max(deficits[each], 0.0))) for each in near if each != tested.group]
     return tuple(others[: table.tuning.max_rivals])
-
-
-def between_runs(table: ChangeTable, chosen: Sequence[int], number: int) -> Array:
-    """Variance of a change's coefficients by the scatter between the runs of a recording, (coefficients,).
-
-    What a run has more than the other runs of its recording, everything else held; zero where no recording has two.
-    """
-    mixed, group, width = table.mixed, table.groups[number], table.contrast.shape[1]
-    inside = table.columns_with(chosen)
-    values, _ = mixed.fit(inside)
-    count = len(group.columns) // width
-    runs = 1 + max(int(each.rows.runs.max()) for each in mixed.joints)
-    owner = np.zeros(runs, dtype=np.intp)
-    data, towards = np.zeros((runs, count, count)), np.zeros((runs, count))
-    for joint, each in enumerate(mixed.joints):
-        owner[each.rows.runs] = each.rows.members
-        place = np.flatnonzero(np.isin(each.rows.index, group.columns))
-        if not len(place):
-            continue
-        left = mixed.errors(joint, inside, values)
-        contrast = table.contrast[each.rows.members]
-        scaled = each.rows.columns[:, place].reshape(len(left), count, width)
-        own = np.einsum("rkw,rw->rk", scaled, contrast) / np.sum(contrast**2, axis=1)[:, None]
-        for run in range(runs):
-            rows = each.rows.runs == run
-            data[run] += own[rows].T @ own[rows] / each.variance
-            towards[run] += own[rows].T @ left[rows] / each.variance
-    prior = np.diag(group.scales[::width] ** -2.0)
-    apart = np.array([np.linalg.solve(data[run] + prior, towards[run]) for run in range(runs)])
-    sizes = [owner == recording for recording in (0, len(table.contrast) - 1)]
-    scatters = [np.var(apart[own], axis=0, ddof=1) for own in sizes if own.sum() > 1]
-    if not scatters:
-        return np.zeros(count)
-    return np.asarray(np.mean(scatters, axis=0) * sum(1 / own.sum() for own in sizes))
 
 
 def held_out_errors(table: ChangeTable, chosen: Sequence[int], number: int) -> tuple[list[Array], list[Array]]:

@@ -1,15 +1,16 @@
 """Changes that may be named: sure, allowed by physics in every recording, and helpful on held-out stretches."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.compare.between_runs import scatter_between_runs
 from armlab.diagnosis.compare.changes import ChangeTable, Tested
-from armlab.diagnosis.compare.numbers import as_wide_as_runs, between_ends, half_width_factor, laws_of, recording_values
+from armlab.diagnosis.compare.numbers import between_ends, half_width_factor, laws_of, recording_values
 from armlab.diagnosis.compare.pooled import Pooled, is_body
-from armlab.diagnosis.compare.search import between_runs, find_changes, held_out_errors, without_unsure
+from armlab.diagnosis.compare.search import find_changes, held_out_errors
 from armlab.diagnosis.fitted_model import inertial_parameters
 from armlab.effects.contract import Scene
 from armlab.effects.drive import ROTOR_INERTIA
@@ -19,37 +20,58 @@ from problem.motion import Motion
 INERTIA_STATES = 50  # a run
 
 
-def find_sound_changes(pooled: Pooled, table: ChangeTable) -> tuple[Tested, ...]:
-    """The changes that are sure, that physics allows in every recording, and that help on held-out stretches."""
+@dataclass(frozen=True)
+class SoundChanges:
+    """named: the changes, fitted together. doubtful: where there are none, the likeliest change of those by which the
+    runs of one recording differ as much, fitted alone.
+    """
+
+    named: tuple[Tested, ...]
+    doubtful: Tested | None = None
+
+
+def find_sound_changes(pooled: Pooled, table: ChangeTable) -> SoundChanges:
+    """The changes that are sure, that physics allows in every recording, that help on held-out stretches, and by which
+    the runs of one recording do not differ as much. What fails leaves its place to others.
+    """
     banned: frozenset[int] = frozenset()
+    varying: set[int] = set()
     while True:
         found = find_changes(table, banned)
-        wrong = {each.group for each in found if reason_impossible(pooled, table, found, each) is not None}
+        wrong = _impossible(pooled, table, found) or _least_helpful(table, found)
         if not wrong:
-            return _without_failures(table, found)
+            wrong = _within_runs(table, found)
+            varying |= wrong
+        if not wrong:
+            return SoundChanges(found, None if found else _likeliest_alone(pooled, table, varying))
         banned |= wrong
 
 
-def _without_failures(table: ChangeTable, found: tuple[Tested, ...]) -> tuple[Tested, ...]:
-    """The changes without those by which runs of one recording differ as much, and without those that do not help on
-    held-out stretches of every recording, the worst first.
-    """
-    while found:
-        chosen = [each.group for each in found]
-        failed = next((each.group for each in found if runs_differ_as_much(table, found, each)), None)
-        if failed is None:
-            failed = _least_helpful(table, chosen)
-        if failed is None:
-            break
-        found = table.test(without_unsure(table, tuple(each for each in chosen if each != failed)))
-    return found
+def _likeliest_alone(pooled: Pooled, table: ChangeTable, numbers: Iterable[int]) -> Tested | None:
+    """Of changes that are sure, possible and helpful even alone, the likeliest."""
+    tested = [table.test((each,))[0] for each in numbers]
+    alone = [each for each in tested if table.is_sure(each)]
+    sound = [each for each in alone if not _impossible(pooled, table, [each]) and not _least_helpful(table, [each])]
+    return max(sound, key=table.log_odds, default=None)
 
 
-def _least_helpful(table: ChangeTable, chosen: Sequence[int]) -> int | None:
+def _impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested]) -> set[int]:
+    """The changes that physics does not allow."""
+    return {each.group for each in found if reason_impossible(pooled, table, found, each) is not None}
+
+
+def _within_runs(table: ChangeTable, found: Sequence[Tested]) -> set[int]:
+    """Of the changes by which runs of one recording differ as much, the one of least evidence."""
+    alike = [each for each in found if runs_differ_as_much(table, found, each)]
+    return {min(alike, key=lambda each: each.evidence).group} if alike else set()
+
+
+def _least_helpful(table: ChangeTable, found: Sequence[Tested]) -> set[int]:
     """The change that helps least on held-out stretches, where one does not help enough."""
+    chosen = [each.group for each in found]
     errors = {each: held_out_errors(table, chosen, each) for each in chosen}
     failed = [each for each in chosen if not predicts_better(table, each, errors[each])]
-    return min(failed, key=lambda each: float(np.mean(held_out_gains(table, each, errors[each]))), default=None)
+    return set(sorted(failed, key=lambda each: float(np.mean(held_out_gains(table, each, errors[each]))))[:1])
 
 
 def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> str | None:
@@ -59,10 +81,11 @@ def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested
         return _reason_no_body(pooled, table, tested)
     _, covariance = between_ends(table, tested)
     for law, own, spread in laws_of(pooled, table, found, tested):
-        if not law.known or law.coefficients is not None:
+        if not law.known:
             continue
         doubt = covariance if spread is None else covariance[0, 0] * spread
-        reasons = (law.candidate.objection(each, doubt) for each in own)
+        size = law.candidate.size
+        reasons = (law.shaped(each).objection(law.coefficients(each), doubt[:size, :size]) for each in own)
         reason = next((each for each in reasons if each is not None), None)
         if reason is not None:
             return reason
@@ -73,9 +96,9 @@ def runs_differ_as_much(table: ChangeTable, found: Sequence[Tested], tested: Tes
     """Whether the runs of one recording differ by as much as two recordings do; more recordings are not asked."""
     if len(table.contrast) > 2:
         return False
-    difference, covariance = between_ends(table, tested)
-    wide = as_wide_as_runs(covariance, between_runs(table, [each.group for each in found], tested.group))
-    return bool(np.all(np.abs(difference) < half_width_factor(tested.degrees) * np.sqrt(np.diag(wide))))
+    difference, _ = between_ends(table, tested)
+    scatter = scatter_between_runs(table, [each.group for each in found], tested.group)
+    return half_width_factor(tested.degrees) * np.sqrt(scatter.variance_along(difference)) > 1
 
 
 def _reason_no_body(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:

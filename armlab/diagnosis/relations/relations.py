@@ -70,6 +70,8 @@ Relation = Callable[[Recording, Desk], tuple[bool | None, str]]
 
 
 def _no_change(found: Comparison) -> tuple[bool | None, str]:
+    if found.doubtful is not None:
+        return None, f"perhaps {found.doubtful.effect}@{found.doubtful.joint}: {found.reason}"
     if found.status == "inconclusive":
         return None, found.reason
     largest = max((abs(each.difference) / each.detectable for each in found.changes), default=0.0)
