@@ -94,7 +94,7 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     more = f", and {rest} more" if rest else ""
     numbers = f"{join_words(phrases)}{more}."
     whole = " ".join(_whole_friction(comparison))
-    second = f"{numbers[0].upper()}{numbers[1:]} {whole} Nothing else changed. {seen}"
+    second = f"{numbers[0].upper()}{numbers[1:]} {whole} No other change is sure. {seen}"
     return f"Between {names} this changed: {join_words(places)}.", " ".join(second.split())
 
 
