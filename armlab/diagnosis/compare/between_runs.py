@@ -78,9 +78,12 @@ def scatter_between_runs(table: ChangeTable, chosen: Sequence[int], number: int)
 
 
 def _runs_of_one_motion(table: ChangeTable, owner: NDArray[np.intp], ends: tuple[int, int]) -> NDArray[np.intp]:
-    rows = table.mixed.joints[0].rows
-    first_stretch = {run: int(rows.stretches[rows.runs == run].min(initial=-1 - run)) for run in range(len(owner))}
-    old, new = ({first_stretch[run]: run for run in np.flatnonzero(owner == each)} for each in ends)
-    if set(old) != set(new) or len(old) + len(new) < np.isin(owner, ends).sum():
+    """Pairs of runs of both recordings that share stretches of time; none where a run has not exactly one partner."""
+    present = np.zeros((len(owner), table.mixed.stretches), dtype=bool)
+    for joint in table.mixed.joints:
+        present[joint.rows.runs, joint.rows.stretches] = True
+    old, new = (np.flatnonzero(owner == each) for each in ends)
+    shared = (present[old].astype(np.intp) @ present[new].T) > 0
+    if np.any(shared.sum(axis=0) != 1) or np.any(shared.sum(axis=1) != 1):
         return np.empty((0, 2), dtype=np.intp)
-    return np.array([[old[stretch], new[stretch]] for stretch in sorted(old)], dtype=np.intp)
+    return np.column_stack([old, new[np.argmax(shared, axis=1)]])
