@@ -1,36 +1,51 @@
 """`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import refuse_existing, write_texts
+from armlab.common.report.words import join_words
 from armlab.identification.export import (
     SimulatorModel,
     build_simulator_model,
     mjcf_document,
     srdf_document,
+    unstated_limits,
     urdf_document,
 )
 from armlab.identification.model_file import read_model
-from armlab.identification.patch import Patched, UnreadableError, patched_mjcf, patched_urdf
+from armlab.identification.patch import Patched, Target, patched_urdf
+from armlab.identification.patch_mjcf import UnreadableError, patched_mjcf
 from problem.joint_words import joint_in_words
+from problem.kinematic_tree import KinematicTree
+from problem.locked_joints import read_lock_record
+from problem.mjcf import compile_mjcf, mjcf_tree
+from problem.urdf_document import read_urdf_root, urdf_tree
 
 FORMATS = (".urdf", ".xml")
 
 
-def export_model(path: Path, out: Path) -> ResultLines:
+def export_model(
+    path: Path, out: Path, into: Path | None = None, locks: Mapping[str, float] | None = None
+) -> ResultLines:
     """Writes the file and says what it does not hold.
 
     A model of a URDF becomes that URDF with other numbers, or an MJCF as MuJoCo reads the URDF; a model of an MJCF
-    becomes that MJCF; any other one becomes a chain of bodies without meshes. Raises InputError where the ending or
-    the model does not fit.
+    becomes that MJCF; any other one becomes a chain of bodies without meshes. Where joints of the robot are locked, the
+    file of the whole robot takes the numbers.
+
+    into: another robot file that takes them. locks: positions, rad or m, of joints that move in that file alone, where
+    the model's robot does not say them. Raises InputError where the ending or the model does not fit.
     """
     if out.suffix not in FORMATS:
         raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
+    if into is not None and into.suffix not in FORMATS:
+        raise InputError(f"--into {into}: the file should be a .urdf or .xml (MJCF) file")
     model = read_model(path)
-    simulated, source = build_simulator_model(model), Path(model.robot)
-    patched = _document(simulated, source, out)
+    simulated = build_simulator_model(model)
+    patched = _document(simulated, into, locks or {}, out)
     texts = {out.name: patched.text}
     missing, notes = list(simulated.missing), list(patched.notes)
     if out.suffix == ".urdf":
@@ -56,18 +71,61 @@ def export_model(path: Path, out: Path) -> ResultLines:
     return {"files": written, "not_in_the_file": missing, "thickened_links": simulated.thickened_links, "notes": notes}
 
 
-def _document(simulated: SimulatorModel, source: Path, out: Path) -> Patched:
-    if source.suffix not in FORMATS:
-        return Patched(_chain(simulated, out), ())
+def _document(simulated: SimulatorModel, into: Path | None, locks: Mapping[str, float], out: Path) -> Patched:
+    robot = Path(simulated.model.robot)
+    if into is None and robot.suffix not in FORMATS:
+        return _chain(simulated, out)
+    target, told = _choose_target(simulated, robot, into, locks)
+    source = target.path
     if source.suffix == ".xml" and out.suffix == ".urdf":
         keeps = f"a chain of bodies without meshes: only an .xml file keeps what {source.name} has"
-        return Patched(_chain(simulated, out), (keeps,))
+        return _chain(simulated, out, keeps)
     try:
-        made = patched_urdf(simulated, source, out.parent) if out.suffix == ".urdf" else patched_mjcf(simulated, source)
+        made = (patched_urdf if out.suffix == ".urdf" else patched_mjcf)(simulated, target, out.parent)
     except UnreadableError as error:
-        return Patched(_chain(simulated, out), (f"a chain of bodies without meshes: {error}",))
-    return Patched(made.text, (f"{source.name} with other numbers: its names, frames and meshes stay", *made.notes))
+        return _chain(simulated, out, f"a chain of bodies without meshes: {error}")
+    return Patched(
+        made.text, (f"{source.name} with other numbers: its names, frames and meshes stay", *told, *made.notes)
+    )
 
 
-def _chain(simulated: SimulatorModel, out: Path) -> str:
-    return urdf_document(simulated) if out.suffix == ".urdf" else mjcf_document(simulated)
+def _choose_target(
+    simulated: SimulatorModel, robot: Path, into: Path | None, locks: Mapping[str, float]
+) -> tuple[Target, tuple[str, ...]]:
+    """The file that takes the model, and a line on its locked joints where there are any."""
+    record = read_lock_record(robot) if robot.suffix in FORMATS else None
+    if into is None and record is not None and not record.original.is_file():
+        raise InputError(
+            f"{robot} has locked joints ({', '.join(record.positions)}), and the file of the whole robot, "
+            f"{record.original}, is not there: give it with --into, or --into {robot} to leave the joints fixed"
+        )
+    source = into or (record.original if record else robot)
+    tree = _read_tree(source)
+    moving = [joint.name for joint in tree.joints if joint.moves]
+    known = {} if record is None else {name: value for name, value in record.positions.items() if name in moving}
+    positions = {**known, **tree.locked_positions(None, locks)}
+    own = {joint.name for joint in simulated.model.arm.joints}
+    extra = [name for name in moving if name not in own and name not in positions]
+    if extra:
+        raise InputError(
+            f"{source} has joints that the model does not have, {', '.join(extra)}: say with --lock JOINT=VALUE where "
+            "they stood in the recording"
+        )
+    told: tuple[str, ...] = ()
+    if positions:
+        told = (f"{join_words(list(positions))}, locked in the recording, move in this file",)
+    elif record is not None:
+        told = (f"{join_words(list(record.positions))} are fixed in this file, as in the recording",)
+    return Target(source, positions), told
+
+
+def _read_tree(path: Path) -> KinematicTree:
+    if path.suffix == ".urdf":
+        return urdf_tree(read_urdf_root(path), path)
+    return mjcf_tree(compile_mjcf(path), path)
+
+
+def _chain(simulated: SimulatorModel, out: Path, *notes: str) -> Patched:
+    if out.suffix == ".xml":
+        return Patched(mjcf_document(simulated), notes)
+    return Patched(urdf_document(simulated), (*notes, *unstated_limits(simulated.model.arm)))

@@ -80,11 +80,11 @@ def test_the_torques_of_a_locked_mjcf_are_those_of_mujoco_with_still_fingers(mjc
 
 
 def test_what_names_a_locked_joint_goes_and_the_rest_stays(urdf: Path, mjcf: Path, tmp_path: Path) -> None:
-    text = lock_joints(urdf, "hand", {}, tmp_path).text
+    text = lock_joints(urdf, "hand", {}, tmp_path).document
     assert "by hand" in text
     assert "<transmission" not in text
     assert [line.strip() for line in text.splitlines() if "<joint name" in line][-1] == '<joint name="joint1" />'
-    text = lock_joints(mjcf, "hand", {}, tmp_path).text
+    text = lock_joints(mjcf, "hand", {}, tmp_path).document
     assert all(
         word in text for word in ('<general name="finger1" joint="joint1"/>', '<actuatorfrc actuator="finger1"/>')
     )
