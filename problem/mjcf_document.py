@@ -88,13 +88,18 @@ def body_nodes(document: XmlText, model: Any) -> dict[int, XmlNode]:
         parent, nodes = waiting.pop()
         numbers = [number for number in range(1, model.nbody) if model.body_parentid[number] == parent]
         names = [model.body(number).name for number in numbers]
-        own = dict(zip(numbers, nodes, strict=False))
-        if names != [node.attributes.get("name", "") for node in nodes]:  # an element makes further bodies
-            by_name = {node.attributes["name"]: node for node in nodes if "name" in node.attributes}
-            own = {number: by_name[name] for number, name in zip(numbers, names, strict=True) if name in by_name}
+        own = {numbers[place]: node for place, node in named_nodes(nodes, names).items()}
         found |= own
         waiting += [(number, list(_bodies_in(node))) for number, node in own.items()]
     return found
+
+
+def named_nodes(nodes: list[XmlNode], names: list[str]) -> dict[int, XmlNode]:
+    """Elements by the places of their names: in order, or by the names where there are more or fewer elements."""
+    if names == [node.attributes.get("name", "") for node in nodes]:
+        return dict(enumerate(nodes))
+    by_name = {node.attributes["name"]: node for node in nodes if "name" in node.attributes}
+    return {place: by_name[name] for place, name in enumerate(names) if name in by_name}
 
 
 def makers_of(document: XmlText) -> list[str]:

@@ -12,6 +12,7 @@ from armlab.common.errors import InputError
 MAX_BYTES = 10_000_000
 MAX_DEPTH = 200  # of elements inside each other
 INDENT = "  "
+ROUNDING = 1e-14  # of the largest of several numbers
 _HEAD = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
 _TAIL = re.compile(rb"</[^>]*>")
 _ATTRIBUTE = re.compile(r"\s+([^\s=]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
@@ -75,6 +76,10 @@ class XmlNode:
         kept = {**self.attributes, **attributes}
         self.attributes = {key: value for key, value in kept.items() if value is not None}
 
+    def set_numbers(self, attributes: Mapping[str, str | None]) -> None:
+        """Changes attributes of numbers as `set`; those that differ by rounding alone stay as written."""
+        self.set({key: value for key, value in attributes.items() if not _is_rounding(self.attributes.get(key), value)})
+
     def add(self, tag: str, attributes: Mapping[str, str], first: bool = False) -> "XmlNode":
         """A new element inside, after the others or before them, on a line of its own where the others have one."""
         if self.head.endswith("/>"):
@@ -100,6 +105,17 @@ class XmlNode:
         before = self.pieces[place - 1] if place else None
         if isinstance(before, str):
             self.pieces[place - 1] = before.rstrip()
+
+
+def _is_rounding(one: str | None, other: str | None) -> bool:
+    """Whether two texts hold the same numbers, but for the last digits."""
+    try:
+        numbers, others = ([float(word) for word in (text or "").split()] for text in (one, other))
+    except ValueError:
+        return False
+    size = max(map(abs, [*numbers, *others]), default=0.0)
+    alike = len(numbers) == len(others) > 0
+    return alike and all(abs(a - b) <= ROUNDING * size for a, b in zip(numbers, others, strict=True))
 
 
 @dataclass(eq=False)

@@ -25,12 +25,11 @@ from armlab.identification.export import (
     inertia_entries,
     link_inertias,
 )
+from armlab.identification.mjcf_edit import MAX_CHANGE, MAX_ERROR, same_inertia
 from problem.arm import Arm, link_poses
 from problem.urdf import UrdfChain, chain_of, link_inertia
 from problem.urdf_document import UrdfElement, lock_urdf, moved_urdf, parse_urdf_root, read_urdf_root
 
-MAX_CHANGE = 1e-9  # of a body's size: less is rounding, and the number stays as it is written
-MAX_ERROR = 1e-6  # of a body's size: how far the file that is written may be from the model
 MAX_FRAME_ERROR = 1e-4  # m, or of a turn: MuJoCo writes six digits
 
 
@@ -44,10 +43,11 @@ class Target:
 
 @dataclass(frozen=True)
 class Patched:
-    """A document, and what a person has to know of it, one line each."""
+    """A document, and what a person has to know of it, one line each. has_drives: it holds those of the model."""
 
     text: str
     notes: tuple[str, ...]
+    has_drives: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,12 +90,6 @@ def share_inertia(total: Array, own: Sequence[Carried], source: Path) -> Shares:
         f"{source}: {moving} on joints that were locked have more inertia than the model has from {own[0].name} on: "
         "correct their masses there, or export with --into and the robot file of the recording, where they are fixed"
     )
-
-
-def same_inertia(one: Array, other: Array, tolerance: float) -> bool:
-    """Whether two pseudo-inertias (4, 4) agree to a share of the larger one's size."""
-    size = max(np.abs(one).max(), np.abs(other).max())
-    return bool(np.abs(one - other).max() <= tolerance * size)
 
 
 def check_same_arm(simulated: SimulatorModel, arm: Arm, source: Path) -> None:
@@ -174,7 +168,7 @@ def _set_inertial(link: XmlNode, pseudo: Array) -> None:
         ("mass", {"value": repr(mass)}),
         ("inertia", dict(zip(INERTIA_NAMES, entries, strict=True))),
     ):
-        (inertial.find(tag) or inertial.add(tag, {})).set(numbers)
+        (inertial.find(tag) or inertial.add(tag, {})).set_numbers(numbers)
 
 
 def _remove_inertial(link: XmlNode) -> None:

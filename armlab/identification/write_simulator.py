@@ -1,7 +1,10 @@
 """`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
@@ -15,16 +18,24 @@ from armlab.identification.export import (
     unstated_limits,
     urdf_document,
 )
-from armlab.identification.model_file import read_model
+from armlab.identification.mjcf_edit import Drive
+from armlab.identification.model_file import model_of, read_model_file
 from armlab.identification.patch import Patched, Target, patched_urdf
 from armlab.identification.patch_mjcf import UnreadableError, patched_mjcf
-from problem.joint_words import joint_in_words
+from armlab.recordings.recording_file import ControllerEntry
+from problem.arm import Arm
+from problem.joint_words import joint_in_words, joints_in_words
 from problem.kinematic_tree import KinematicTree
 from problem.locked_joints import read_lock_record
 from problem.mjcf import compile_mjcf, mjcf_tree
 from problem.urdf_document import read_urdf_root, urdf_tree
 
 FORMATS = (".urdf", ".xml")
+DRIVE_WORDS = {
+    "ki": "integral gain",
+    "offset": "offset of the command",
+    "dead_band": "dead band",
+}  # of what no actuator of MJCF has
 
 
 def export_model(
@@ -43,9 +54,11 @@ def export_model(
         raise InputError(f"{out}: the file should end in .urdf or .xml (MJCF)")
     if into is not None and into.suffix not in FORMATS:
         raise InputError(f"--into {into}: the file should be a .urdf or .xml (MJCF) file")
-    model = read_model(path)
+    file = read_model_file(path)
+    model = model_of(file, path)
     simulated = build_simulator_model(model)
-    patched = _document(simulated, into, locks or {}, out)
+    drives = {} if file.controller is None else _drives_of(file.controller, len(model.arm))
+    patched = _document(simulated, into, locks or {}, out, drives)
     texts = {out.name: patched.text}
     missing, notes = list(simulated.missing), list(patched.notes)
     if out.suffix == ".urdf":
@@ -60,6 +73,8 @@ def export_model(
             notes.append(
                 "rotor inertias stand in the .srdf, which Pinocchio reads: URDF has no place for them, MJCF has"
             )
+    if file.controller is not None:
+        missing += _missing_of_drives(file.controller, model.arm, patched.has_drives)
     refuse_existing(out.parent / name for name in texts)
     written = write_texts(texts, out.parent)
     yield from map(str, written)
@@ -71,7 +86,35 @@ def export_model(
     return {"files": written, "not_in_the_file": missing, "thickened_links": simulated.thickened_links, "notes": notes}
 
 
-def _document(simulated: SimulatorModel, into: Path | None, locks: Mapping[str, float], out: Path) -> Patched:
+def _drives_of(controller: ControllerEntry, joints: int) -> dict[int, Drive]:
+    """The drives of the joints, from 0, as MuJoCo has them; none where the controller is that of some joints only."""
+    if len(controller.kp) != joints or len(controller.kd) != joints:
+        return {}
+    limits = controller.torque_limit or (None,) * joints
+    delays = np.broadcast_to(np.asarray(controller.delay, dtype=float), (joints,)).tolist()
+    return {
+        joint: Drive(kp, kd or 0.0, np.inf if limit is None else limit, delay)
+        for joint, (kp, kd, limit, delay) in enumerate(zip(controller.kp, controller.kd, limits, delays, strict=True))
+        if kp is not None
+    }
+
+
+def _missing_of_drives(controller: ControllerEntry, arm: Arm, has_drives: bool) -> list[str]:
+    """What the file does not hold of the drives, in words; their numbers stand in the model."""
+    if not has_drives:
+        return ["the gains of the drives"]
+    out = []
+    for name, words in DRIVE_WORDS.items():
+        values = getattr(controller, name) or ()
+        joints = [joint for joint, value in enumerate(values, 1) if value]
+        if joints:
+            out.append(f"{words} of {joints_in_words(arm, joints)}")
+    return out
+
+
+def _document(
+    simulated: SimulatorModel, into: Path | None, locks: Mapping[str, float], out: Path, drives: Mapping[int, Drive]
+) -> Patched:
     robot = Path(simulated.model.robot)
     if into is None and robot.suffix not in FORMATS:
         return _chain(simulated, out)
@@ -81,12 +124,14 @@ def _document(simulated: SimulatorModel, into: Path | None, locks: Mapping[str, 
         keeps = f"a chain of bodies without meshes: only an .xml file keeps what {source.name} has"
         return _chain(simulated, out, keeps)
     try:
-        made = (patched_urdf if out.suffix == ".urdf" else patched_mjcf)(simulated, target, out.parent)
+        if out.suffix == ".urdf":
+            made = patched_urdf(simulated, target, out.parent)
+        else:
+            made = patched_mjcf(simulated, target, out.parent, drives)
     except UnreadableError as error:
         return _chain(simulated, out, f"a chain of bodies without meshes: {error}")
-    return Patched(
-        made.text, (f"{source.name} with other numbers: its names, frames and meshes stay", *told, *made.notes)
-    )
+    stays = f"{source.name} with other numbers: its names, frames and meshes stay"
+    return replace(made, notes=(stays, *told, *made.notes))
 
 
 def _choose_target(

@@ -44,6 +44,12 @@ def test_changes_touch_their_own_places_alone() -> None:
     assert [node.line for node in parse_xml_text(ODD, "x").root.walk()] == [3, 4, 5, 6, 7, 9]
 
 
+def test_numbers_that_differ_by_rounding_stay_as_written() -> None:
+    document = parse_xml_text('<a x="0.10 2e0" y="1" z="q"/>', "x")
+    document.root.set_numbers({"x": "0.10000000000000002 2.0", "y": "1.1", "z": "3", "w": "4"})
+    assert document.text() == '<a x="0.10 2e0" y="1.1" z="3" w="4"/>'
+
+
 @given(st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff")))
 def test_any_value_of_an_attribute_is_read_back(value: str) -> None:
     document = parse_xml_text('<a><b c="1" d="2"/></a>', "x")

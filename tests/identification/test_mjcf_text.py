@@ -5,9 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from numpy.testing import assert_allclose
+from refusals import refusal
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.motion import servo_plugin
 from armlab.effects.friction import ViscousFriction
 from armlab.effects.springs import LinearSpring
 from armlab.identification.model import Model
@@ -177,3 +180,44 @@ def test_a_body_that_the_text_does_not_have_is_written_by_mujoco_and_that_is_tol
     )
     motion = Motion(*np.random.default_rng(4).uniform(-2, 2, (3, 20, 2)))
     assert_allclose(mujoco_torque(out, motion), read_model(model).torque(motion), atol=1e-4)
+
+
+CONTROLLER = {"type": "pd", "kp": [40.0, 1 / 3], "kd": [0.5, 0.0], "torque_limit": [None, 7.0], "delay": [0.0, 0.011]}
+
+
+@pytest.mark.parametrize(
+    "drive",
+    [
+        '<position name="servo" joint="elbow" kp="30"/>',
+        '<position name="servo" joint="elbow" kp="30" dampratio="1" forcerange="-1 1"/>',
+        '<general name="servo" joint="elbow" gainprm="30" biastype="affine" biasprm="0 -30 0"/>',
+    ],
+)
+def test_the_drives_of_a_model_of_motion_go_into_the_actuators(tmp_path: Path, drive: str) -> None:
+    source = tmp_path / "two.xml"
+    source.write_text(PLAIN.replace('<position name="servo" joint="elbow" kp="30"/>', f"<!-- ours -->{drive}"))
+    model = model_of(source)
+    content = yaml.safe_load(model.read_text()) | {"controller": CONTROLLER | {"dead_band": [0.0, 0.02]}}
+    model.write_text(yaml.safe_dump(content))
+    lines = list(export_model(model, tmp_path / "out.xml"))
+    assert lines[-1] == "not in the file: dead band of elbow"
+    assert "<!-- ours --><" in (tmp_path / "out.xml").read_text()
+    read = mujoco.MjModel.from_xml_path(str(tmp_path / "out.xml"))
+    assert [read.actuator(number).name for number in range(2)] == ["servo", "servo-shoulder"]
+    assert_allclose(read.actuator_gainprm[:, 0], [1 / 3, 40.0], rtol=1e-15)
+    assert_allclose(read.actuator_biasprm[:, :3], [[0, -1 / 3, 0], [0, -40, -0.5]], rtol=1e-15)
+    assert read.actuator_forcelimited.tolist() == [True, False]
+    assert_allclose(read.actuator_forcerange[0], [-7, 7])
+    assert_allclose(read.actuator_delay, [0.011, 0.0])
+    assert_allclose(read.dof_solimp, [servo_plugin.STICKING] * 2)  # a copy of the plug-in stands alone
+    lines = list(export_model(model, tmp_path / "out.urdf"))
+    assert lines[-1].endswith("the gains of the drives")
+
+
+def test_an_actuator_that_is_no_position_servo_is_not_made_one(tmp_path: Path) -> None:
+    source = tmp_path / "two.xml"
+    source.write_text(PLAIN.replace('<position name="servo" joint="elbow" kp="30"/>', '<motor joint="elbow"/>'))
+    model = model_of(source)
+    model.write_text(yaml.safe_dump(yaml.safe_load(model.read_text()) | {"controller": CONTROLLER}))
+    told = refusal(lambda: list(export_model(model, tmp_path / "out.xml")))
+    assert told == "two.xml, line 19: <motor> is no position servo, which the model has there"
