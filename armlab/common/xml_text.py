@@ -14,6 +14,7 @@ MAX_DEPTH = 200  # of elements inside each other
 INDENT = "  "
 ROUNDING = 1e-14  # of the largest of several numbers
 _HEAD = re.compile(rb"<[^\s/>]+(?:\s+[^\s=]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
+_COMMENT = re.compile(rb"<!--(.*?)-->", re.DOTALL)
 _TAIL = re.compile(rb"</[^>]*>")
 _ATTRIBUTE = re.compile(r"\s+([^\s=]+)\s*=\s*(?:\"[^\"]*\"|'[^']*')")
 _DECLARED = re.compile(rb"<\?xml[^>]*?\sencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
@@ -147,13 +148,18 @@ def parse_xml_text(text: str, where: str) -> XmlText:
         raise InputError(f"{where}: too large, or with XML entities, for a robot file")
     reader = _Reader(content, where)
     try:
-        reader.parser.Parse(content, True)
+        reader.parser.Parse(_COMMENT.sub(_without_hyphens, content), True)
     except expat.ExpatError as error:
         raise InputError(f"{where} is not valid XML: {error}") from None
     root = reader.top.children[0]
     place = reader.top.pieces.index(root)
     before, after = ("".join(map(str, part)) for part in (reader.top.pieces[:place], reader.top.pieces[place + 1 :]))
     return XmlText(root, before, after + content[reader.position :].decode())
+
+
+def _without_hyphens(comment: re.Match[bytes]) -> bytes:
+    """A comment of the same length: MuJoCo takes two hyphens in a row there, which XML does not have."""
+    return b"<!--" + comment[1].replace(b"-", b"=") + b"-->"
 
 
 def _in_utf8(content: bytes, path: Path) -> str:

@@ -29,6 +29,11 @@ def test_a_text_that_is_not_changed_stays_as_it_is() -> None:
     assert parse_xml_text(ODD, "x").text() == ODD
 
 
+def test_two_hyphens_in_a_comment_are_taken_as_mujoco_takes_them() -> None:
+    text = "<a><!-- ---- links ---- --><b/></a>"
+    assert parse_xml_text(text, "x").text() == text
+
+
 def test_changes_touch_their_own_places_alone() -> None:
     document = parse_xml_text(ODD, "x")
     document.root.set({"a": '1 < "2"', "q": None, "new": "v"})
