@@ -1,5 +1,7 @@
 """One arm out of a robot file with grippers, mimic fingers or several arms: the other joints are locked."""
 
+import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,25 +10,40 @@ from typing import Any
 import numpy as np
 
 from armlab.common.errors import InputError
+from armlab.common.xml_text import parse_xml_text, read_xml_text
 from problem.arm import Arm
 from problem.kinematic_tree import KinematicTree
 from problem.mjcf import MOVING_KINDS, arm_of, compile_mjcf, import_mujoco, mjcf_tree, written_mjcf
+from problem.mjcf_document import UneditableError, moved_mjcf, read_mjcf_document
 from problem.robot_file import check_arm
 from problem.urdf import chain_of
-from problem.urdf_document import lock_urdf, move_urdf, read_urdf_root, urdf_text, urdf_tree
+from problem.urdf_document import lock_urdf, moved_urdf, read_urdf_root, urdf_text, urdf_tree
+
+RECORD_MARK = "armlab: locked joints"
+MINUS = "\\u002d"  # in JSON: an XML comment has no two hyphens in a row
+_RECORD = re.compile(rf"\s*<!-- {RECORD_MARK} (\{{.*?\}}) -->", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class LockRecord:
+    """What a file with locked joints says of itself: the whole robot's file, and positions by joint, rad or m."""
+
+    original: Path
+    positions: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
 class LockedRobot:
     """A robot file with one arm.
 
-    text: of the file, in the format of its source. positions: of the joints that are locked, rad or m; their links
-    belong to the link that carries them, so no mass is lost.
+    document: its text, in the format of its source. positions: of the joints that are locked, rad or m; their links
+    belong to the link that carries them, so no mass is lost. original: the file of the whole robot.
     """
 
     arm: Arm
-    text: str
+    document: str
     positions: Mapping[str, float]
+    original: Path
 
     @property
     def words(self) -> str:
@@ -34,20 +51,65 @@ class LockedRobot:
         locked = ", ".join(f"{name} at {position:g}" for name, position in self.positions.items())
         return f"{len(self.arm)} moving joint{'s' * (len(self.arm) > 1)}; locked: {locked or 'none'}"
 
+    def text(self, original: str) -> str:
+        """The document with a comment that says what is locked. original: the whole robot's file beside this text."""
+        if not self.positions:
+            return self.document
+        record = json.dumps({"original": original, "positions": dict(self.positions)})
+        document = parse_xml_text(self.document, str(self.original))
+        comment = f"<!-- {RECORD_MARK} {record.replace('--', MINUS * 2)} -->"
+        document.root.pieces.insert(0, f"\n  {comment}")
+        return document.text()
+
+
+def read_lock_record(path: Path) -> LockRecord | None:
+    """What a robot file says of its locked joints; None where it says nothing. InputError for a damaged comment."""
+    try:
+        found = _RECORD.search(path.read_text(encoding="utf-8", errors="replace"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from None
+    if found is None:
+        return None
+    try:
+        content = json.loads(found[1])
+        positions = {str(name): float(position) for name, position in content["positions"].items()}
+        original = path.parent / str(content["original"])
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise InputError(f"{path}: the comment '{RECORD_MARK}' is damaged: lock the joints again") from None
+    if not np.isfinite(list(positions.values())).all():
+        raise InputError(f"{path}: the comment '{RECORD_MARK}' should hold finite positions")
+    return LockRecord(original, positions)
+
 
 def lock_joints(path: Path, tip: str | None, given: Mapping[str, float], folder: Path) -> LockedRobot:
     """A URDF or MJCF file with one arm: names, frames, meshes and the drives of moving joints stay.
 
     tip: the link where the arm ends, so that every joint that is not on the way to it is locked. given: positions of
     joints to lock, rad or m; the others stand at zero, or at the limit next to it. folder: where the file will stand,
-    for the paths of its meshes; those of MJCF are made absolute. Without joints to lock the file stays as it is.
-    Raises InputError for another kind of file, for unknown names, and where what is left is no single chain.
+    for the paths of its meshes; those of an MJCF with locked joints are made absolute. Joints that the file names as
+    locked already are locked in what is made of it. Raises InputError for another kind of file, for unknown names, and
+    where what is left is no single chain.
+    """
+    if path.suffix not in (".urdf", ".xml"):
+        raise InputError(f"{path}: only joints of a URDF or MJCF (.xml) file can be locked")
+    arm, text, positions = (_lock_urdf if path.suffix == ".urdf" else _lock_mjcf)(path, tip, given, folder)
+    record = read_lock_record(path)
+    if record is None:
+        return LockedRobot(arm, text, positions, path)
+    return LockedRobot(arm, _RECORD.sub("", text), {**record.positions, **positions}, record.original)
+
+
+def robot_text(path: Path, folder: Path) -> str:
+    """The text of a URDF or MJCF file as it is to stand in another folder, with what it includes.
+
+    The paths of meshes lead from there. An MJCF that is no well-formed XML is written by MuJoCo.
     """
     if path.suffix == ".urdf":
-        return _lock_urdf(path, tip, given, folder)
-    if path.suffix == ".xml":
-        return _lock_mjcf(path, tip, given)
-    raise InputError(f"{path}: only joints of a URDF or MJCF (.xml) file can be locked")
+        return moved_urdf(read_xml_text(path).text(), path, folder)
+    try:
+        return moved_mjcf(read_mjcf_document(path)[0].text(), path, folder)
+    except UneditableError:
+        return written_mjcf(import_mujoco().MjSpec.from_file(str(path)), path)
 
 
 def parse_locks(given: tuple[str, ...]) -> dict[str, float]:
@@ -67,27 +129,39 @@ def parse_locks(given: tuple[str, ...]) -> dict[str, float]:
     return positions
 
 
-def _lock_urdf(path: Path, tip: str | None, given: Mapping[str, float], folder: Path) -> LockedRobot:
+def _lock_urdf(
+    path: Path, tip: str | None, given: Mapping[str, float], folder: Path
+) -> tuple[Arm, str, dict[str, float]]:
     root = read_urdf_root(path)
     positions = urdf_tree(root, path).locked_positions(tip, given)
     lock_urdf(root, path, positions)
     arm = check_arm(chain_of(root, path).arm, str(path))
-    move_urdf(root, path, folder)
-    return LockedRobot(arm, urdf_text(root), positions)
+    return arm, moved_urdf(urdf_text(root), path, folder) if positions else robot_text(path, folder), positions
 
 
-def _lock_mjcf(path: Path, tip: str | None, given: Mapping[str, float]) -> LockedRobot:
-    model, mujoco = compile_mjcf(path), import_mujoco()
-    tree = mjcf_tree(model, path)
-    positions = tree.locked_positions(tip, given)
-    if not positions and len(mujoco.mju_getXMLDependencies(str(path))) == 1:
-        return LockedRobot(check_arm(arm_of(model, path), str(path)), path.read_text(encoding="utf-8"), positions)
-    spec = mujoco.MjSpec.from_file(str(path))
-    spec.compile()
-    _remove_what_names(spec, set(positions))
-    _stand_still(spec, model, positions, tree)
+def _lock_mjcf(
+    path: Path, tip: str | None, given: Mapping[str, float], folder: Path
+) -> tuple[Arm, str, dict[str, float]]:
+    model = compile_mjcf(path)
+    positions = mjcf_tree(model, path).locked_positions(tip, given)
+    if not positions:
+        return check_arm(arm_of(model, path), str(path)), robot_text(path, folder), positions
+    spec = import_mujoco().MjSpec.from_file(str(path))
+    locked = lock_spec(spec, path, positions)
     text = written_mjcf(spec, path)
-    return LockedRobot(check_arm(arm_of(spec.compile(), path), str(path)), text, positions)
+    return check_arm(arm_of(locked, path), str(path)), text, positions
+
+
+def lock_spec(spec: Any, path: Path, positions: Mapping[str, float]) -> Any:
+    """The mujoco.MjModel of a mujoco.MjSpec with joints at positions (rad or m); takes them out of the spec.
+
+    What names them (tendons, drives, sensors, constraints, keyframes) goes. Bodies keep their numbers. path: of the
+    file, for messages.
+    """
+    model = spec.compile()
+    _remove_what_names(spec, set(positions))
+    _stand_still(spec, model, positions, mjcf_tree(model, path))
+    return spec.compile()
 
 
 def _stand_still(spec: Any, model: Any, positions: Mapping[str, float], tree: KinematicTree) -> None:

@@ -1,6 +1,6 @@
 """Reads MJCF, the format of MuJoCo, as an arm. MuJoCo compiles the file: defaults and includes count as it has them."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,8 +33,17 @@ def compile_mjcf(path: Path) -> Any:
     mujoco = import_mujoco()
     if not path.is_file():
         raise InputError(f"cannot read {path}: no such file")
+    return _compiled(mujoco.MjModel.from_xml_path, str(path), path)
+
+
+def compile_mjcf_text(text: str, path: Path) -> Any:
+    """The mujoco.MjModel of a text with absolute paths of meshes; path: of its file, for messages. Errors as above."""
+    return _compiled(import_mujoco().MjModel.from_xml_string, text, path)
+
+
+def _compiled(read: Callable[[str], Any], given: str, path: Path) -> Any:
     try:
-        return mujoco.MjModel.from_xml_path(str(path))
+        return read(given)
     except ValueError as error:
         reason = " ".join(str(error).split())
         hint = "; remove visual meshes that are not at hand" if "mesh" in reason.lower() else ""
@@ -153,9 +162,9 @@ def carried_bodies(model: Any) -> tuple[tuple[CarriedBody, ...], ...]:
     groups: list[list[CarriedBody]] = []
     for body, carrier, pose in _walk_bodies(model):
         if model.body_jntnum[body]:
-            groups.append([CarriedBody(body, _pseudo_inertia(model, body))])
+            groups.append([CarriedBody(body, body_inertia(model, body))])
         elif carrier:
-            groups[carrier - 1].append(CarriedBody(body, transform_pseudo_inertia(_pseudo_inertia(model, body), pose)))
+            groups[carrier - 1].append(CarriedBody(body, transform_pseudo_inertia(body_inertia(model, body), pose)))
     return tuple(tuple(own) for own in groups)
 
 
@@ -179,7 +188,7 @@ def _joint(model: Any, body: int, pose: Array, path: Path) -> Joint:
     return Joint(name, MOVING_KINDS[kind], pose @ frame, inverse(frame), Limits(position=bounds))  # type: ignore[arg-type]
 
 
-def _pseudo_inertia(model: Any, body: int) -> Array:
+def body_inertia(model: Any, body: int) -> Array:
     """Pseudo-inertia (4, 4) of a body about its own frame."""
     xx, yy, zz = model.body_inertia[body].tolist()
     link = Link(float(model.body_mass[body]), (0.0, 0.0, 0.0), (xx, yy, zz, 0.0, 0.0, 0.0))

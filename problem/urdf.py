@@ -128,7 +128,7 @@ def _assemble(
             carrier, origin = len(moving), np.eye(4)
         carried[child] = carrier, origin
         if carrier:
-            seen = transform_pseudo_inertia(_inertia(links[child]), origin)
+            seen = transform_pseudo_inertia(link_inertia(links[child]), origin)
             groups[carrier - 1].append(CarriedLink(links[child].node, seen))
     sums = [np.sum([each.seen for each in own], axis=0) for own in groups]
     known = any(np.any(inertia) for inertia in sums)
@@ -143,8 +143,11 @@ def _joint(joint: UrdfElement, origin: Array) -> Joint:
     return Joint(joint.name, kind, origin @ turn, inverse(turn), joint.limits)  # type: ignore[arg-type]
 
 
-def _inertia(link: UrdfElement) -> Array:
-    """Pseudo-inertia of a URDF link about its own frame; zero where the file has none."""
+def link_inertia(link: UrdfElement) -> Array:
+    """Pseudo-inertia of a URDF link about its own frame; zero where the file has none.
+
+    Raises InputError for numbers that no body has.
+    """
     if link.node.find("inertial") is None:
         return np.zeros((4, 4))
     entries = [

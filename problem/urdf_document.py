@@ -10,6 +10,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.xml_text import parse_xml_text
 from problem.arm import Limits
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.transforms import inverse, roll_pitch_yaw, rotation_z, translation, turn_z_to
@@ -92,6 +93,12 @@ def read_urdf_root(path: Path) -> ElementTree.Element:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from None
+    return parse_urdf_root(content, path)
+
+
+def parse_urdf_root(content: str | bytes, path: Path) -> ElementTree.Element:
+    """The outermost element of a URDF text, comments included; path: of its file, for messages. Errors as above."""
+    content = content.encode() if isinstance(content, str) else content
     if len(content) > MAX_URDF_BYTES or b"<!ENTITY" in content.replace(b"\0", b""):  # also in UTF-16
         raise InputError(f"{path}: too large, or with XML entities, for a URDF file")
     try:
@@ -169,12 +176,17 @@ def lock_urdf(root: ElementTree.Element, path: Path, positions: Mapping[str, flo
                 drives.remove(node)
 
 
-def move_urdf(root: ElementTree.Element, source: Path, folder: Path) -> None:
-    """Rewrites relative paths of meshes for a URDF document that will stand in another folder. source: its file."""
-    for node in root.iter():
-        name = node.get("filename") if isinstance(node.tag, str) else None
-        if name and "://" not in name and not os.path.isabs(name):
-            node.set("filename", Path(os.path.relpath(source.parent / name, folder)).as_posix())
+def moved_urdf(text: str, source: Path, folder: Path) -> str:
+    """The text of a URDF as it is to stand in another folder: relative paths of meshes still lead to their files.
+
+    source: the file that names them.
+    """
+    document = parse_xml_text(text, str(source))
+    for node in document.root.walk():
+        name = node.attributes.get("filename")
+        if name and "://" not in name and not os.path.isabs(name) and folder.resolve() != source.parent.resolve():
+            node.set({"filename": Path(os.path.relpath(source.parent / name, folder)).as_posix()})
+    return document.text()
 
 
 def urdf_text(root: ElementTree.Element) -> str:

@@ -35,6 +35,7 @@ from click.testing import CliRunner
 from gripper_robots import GRIPPER_MJCF, GRIPPER_URDF
 
 from armlab.cli.main import main as armlab
+from problem.locked_joints import lock_joints
 from problem.robot_file import BUILT_IN_FOLDER
 
 OUTCOMES = Path(__file__).with_name("hostile_outcomes.csv")
@@ -51,6 +52,7 @@ HOSTILE_WORDS = (
 )
 HOSTILE_CELLS = ("", "nan", "inf", "1e307", "-1e307", "1e400", "x", "1;2", '"', "0x10", "\u0663", "1,5", "\x00")
 LINK = {"mass": 2.0, "first_moment": [0.01, 0.02, 0.1], "inertia": [0.1, 0.1, 0.1, 0, 0, 0]}
+HEAVY_LINK = {"mass": 20.0, "first_moment": [0.01, 0.02, 0.1], "inertia": [5.0, 5.0, 5.0, 0, 0, 0]}
 EXPERIMENT = {
     "name": "h",
     "problem": ["sphere"],
@@ -161,6 +163,18 @@ def shared_results() -> dict[str, str]:
 
 
 @cache
+def locked_robots() -> dict[str, str]:
+    """Files of the robots with a gripper whose fingers are locked."""
+    with TemporaryDirectory() as name:
+        texts = {}
+        for suffix, text in ((".urdf", GRIPPER_URDF), (".xml", GRIPPER_MJCF)):
+            whole = Path(name) / f"toy{suffix}"
+            whole.write_text(text)
+            texts[f"locked{suffix}"] = lock_joints(whole, "hand", {}, whole.parent).text(whole.name)
+        return texts
+
+
+@cache
 def exported_record() -> tuple[dict[str, Any], dict[str, Any]]:
     """The problem of the exported record, and a file of records that has this one alone."""
     content = json.loads((Path(__file__).parents[1] / "results" / "best_known.json").read_text(encoding="utf-8"))
@@ -258,6 +272,11 @@ def _write_inputs(folder: Path, rng: random.Random, damaged: str) -> None:
         (folder / name).write_text(text)
     for name, text in (("toy.urdf", GRIPPER_URDF), ("toy.xml", GRIPPER_MJCF)):
         (folder / name).write_text(damage_xml(text, rng) if name.endswith(damaged) else text)
+    for name, text in locked_robots().items():
+        (folder / name).write_text(damage_xml(text, rng) if damaged == f"locked {Path(name).suffix}" else text)
+        joints = 3 if name.endswith(".urdf") else 2
+        model = MODEL | {"robot": name, "links": [HEAVY_LINK] * joints}
+        (folder / f"{Path(name).suffix[1:]}-model.yaml").write_text(yaml.safe_dump(model))
     (folder / "servo").mkdir()
     servo = mutate(SERVO_RECORDING, rng) if damaged == "servo" else SERVO_RECORDING
     (folder / "servo" / "recording.yaml").write_text(yaml.safe_dump(servo))
@@ -292,6 +311,9 @@ COMMANDS = {
     "--unit position=rad --unit torque=N.m --unit time=s",
     "lock-urdf": "lock-joints toy.urdf out.urdf --tip hand --lock finger1=0.02",
     "lock-mjcf": "lock-joints toy.xml out.xml --tip hand --lock finger1=0.2",
+    "export-whole-urdf": "export-model urdf-model.yaml out.urdf",
+    "export-whole-mjcf": "export-model xml-model.yaml out.xml",
+    "export-into": "export-model urdf-model.yaml out.xml --into toy.urdf --lock finger1=0.01",
     "base-urdf": "base toy.urdf",
     "import-gripper": "recording import rec/run.csv --robot toy.urdf --tip hand --lock finger1=0.02 --position q* "
     "--torque u* --time t --out new --unit position=rad --unit torque=N.m --unit time=s",
@@ -361,6 +383,12 @@ KINDS = (
     Kind("lock-urdf", "words", 15),
     Kind("lock-mjcf", "xml", 40),
     Kind("lock-mjcf", "words", 10),
+    Kind("export-whole-urdf", "urdf", 30),
+    Kind("export-whole-urdf", "locked .urdf", 15),
+    Kind("export-whole-mjcf", "xml", 30),
+    Kind("export-whole-mjcf", "locked .xml", 10),
+    Kind("export-into", "urdf", 15),
+    Kind("export-into", "words", 15),
     Kind("base-urdf", "urdf", 10),
     Kind("confusability", "table", 4),
     Kind("next", "verdict", 4),

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armlab.cli.options import FiniteNumber, OutputPath
+from armlab.cli.options import FiniteNumber, OutputPath, lock_option
 from armlab.cli.output import prints_lines, prints_result, tell_progress
 from armlab.cli.safety_options import safety_options
 from armlab.common.documents import ResultLines
@@ -172,15 +172,23 @@ def tuning(out: Path | None) -> ResultLines:
 @click.command("export-model")
 @click.argument("model", type=click.Path(path_type=Path))
 @click.argument("out", type=click.Path(path_type=Path))
+@click.option(
+    "--into",
+    type=click.Path(path_type=Path),
+    help="Robot file that takes the numbers [default: that of the model, the whole one where joints are locked].",
+)
+@lock_option
 @prints_result
-def export_model(model: Path, out: Path) -> ResultLines:
+def export_model(model: Path, out: Path, into: Path | None, lock: tuple[str, ...]) -> ResultLines:
     """Export MODEL as URDF or MJCF.
 
-    MODEL: a model.yaml with links. OUT: a .urdf file, or an .xml file for MJCF.
+    MODEL: a model.yaml with links. OUT: a .urdf file, or an .xml file for MJCF. Where the joints of a gripper were
+    locked for the recording, they move in OUT; --lock says where they stood if the file of MODEL does not.
     """
     from armlab.identification.write_simulator import export_model as write
+    from problem.locked_joints import parse_locks
 
-    return write(model, out)
+    return write(model, out, into, parse_locks(lock))
 
 
 @click.command()

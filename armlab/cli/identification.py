@@ -1,5 +1,6 @@
 """The commands of identification and the studies of it: options only, no logic."""
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -197,6 +198,7 @@ def lock_joints(robot: Path, out: Path, tip: str | None, lock: tuple[str, ...]) 
     locked = lock_in_file(robot, tip, parse_locks(lock), out.parent)
     if out.suffix != robot.suffix:
         raise InputError(f"{out}: the file should end in {robot.suffix}, as {robot} does")
-    write_whole(out, locked.text)
+    original = Path(os.path.relpath(locked.original, out.parent)).as_posix()
+    write_whole(out, locked.text(original))
     yield f"{out}: {locked.words}"
     return {"files": [out], "joints": [joint.name for joint in locked.arm.joints], "locked": locked.positions}

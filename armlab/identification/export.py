@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.effects.contract import Candidate
+from armlab.effects.words import component_in_words
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel, joint_fields
 from problem.arm import Arm
@@ -33,6 +34,7 @@ from problem.transforms import inverse, turn_z_to
 
 MIN_EXTENT_SHARE = 1e-12  # of a body's size: simulators refuse points, rods and plates
 MAX_FLAT_SHARE = 1e-9  # of a link's size: below it a point or a rod cannot be distinguished from rounding
+ROUNDING_SHARE = 1e-15  # of the largest of several numbers
 SPRING_FIELDS = ("stiffness", "springref")
 
 
@@ -41,7 +43,7 @@ class SimulatorModel:
     """What a simulator can hold of a model.
 
     model: links with the bodies that were added, gravity as tilted. fields: of the joints, (joints,) each. missing:
-    labels of the named effects without a place. thickened_links: links, from 1, that were points or rods, which no
+    the named effects without a place, in words. thickened_links: links, from 1, that were points or rods, which no
     simulator takes, and have been given a little extent.
     """
 
@@ -75,7 +77,7 @@ def build_simulator_model(known: TorqueModel) -> SimulatorModel:
             x, y, z = gravity.tolist()
             arm = replace(arm, gravity=(x, y, z))
         elif not candidate.joint_fields(values) and number not in known.unclaimed:
-            missing.append(candidate.label)
+            missing.append(component_in_words(known.arm, candidate, known.component_parameters(number)))
     thickened: tuple[int, ...] = ()
     if inertial is not None:
         inertial, thickened = _thicken_links(arm, inertial)
@@ -165,11 +167,18 @@ def has_extent(pseudo: Array) -> bool:
 
 
 def body_numbers(pseudo: Array) -> tuple[float, Array, Array]:
-    """Mass, centre (3,) and inertia (3, 3) about it, in the frame of a pseudo-inertia (4, 4)."""
+    """Mass, centre (3,) and inertia (3, 3) about it, in the frame of a pseudo-inertia (4, 4).
+
+    What is only rounding beside the largest number is zero.
+    """
     mass = float(pseudo[3, 3])
     centre = pseudo[:3, 3] / mass
     spread = pseudo[:3, :3] - mass * np.outer(centre, centre)
-    return mass, centre, np.trace(spread) * np.eye(3) - spread
+    return mass, _without_rounding(centre), _without_rounding(np.trace(spread) * np.eye(3) - spread)
+
+
+def _without_rounding(values: Array) -> Array:
+    return np.where(np.abs(values) > ROUNDING_SHARE * np.abs(values).max(), values, 0.0)
 
 
 def inertia_entries(inertia: Array) -> Array:
@@ -226,11 +235,37 @@ def _add_link(root: ElementTree.Element, body: Body, parent: str, name: str) -> 
     _add_ends(joint, parent, name, body.origin)
     ElementTree.SubElement(joint, "axis", xyz="0 0 1")
     ElementTree.SubElement(joint, "dynamics", damping=repr(body.damping), friction=repr(body.friction))
-    limit = {"effort": _format_finite(body.effort), "velocity": _format_finite(body.velocity)}
+    limit = {"effort": body.effort, "velocity": body.velocity}
     if kind != "continuous":
-        limit |= {"lower": _format_finite(body.limits[0]), "upper": _format_finite(body.limits[1])}
-    ElementTree.SubElement(joint, "limit", limit)
+        limit |= {"lower": body.limits[0], "upper": body.limits[1]}
+    if kind != "continuous" or np.any(np.isfinite(list(limit.values()))):
+        ElementTree.SubElement(joint, "limit", {key: _format_finite(value) for key, value in limit.items()})
     return name
+
+
+def unstated_limits(arm: Arm) -> list[str]:
+    """Limits for which a URDF of an arm has a number that the arm does not have, one line each.
+
+    urdfdom, which ROS and Pinocchio use, refuses a joint between two positions, and a limit, without torque or speed.
+    A joint that turns freely needs no limit: it has none where nothing is known of it.
+    """
+    missing: dict[str, list[str]] = {"torque": [], "speed": [], "positions": []}
+    for joint in arm.joints:
+        limits = joint.limits
+        positions = bool(np.all(np.isfinite(limits.position)))
+        known = {"torque": np.isfinite(limits.torque), "speed": np.isfinite(limits.velocity)}
+        if joint.kind == "prismatic":
+            known["positions"] = positions
+        elif not positions and not any(known.values()):
+            continue
+        for name, has in known.items():
+            if not has:
+                missing[name].append(joint.name)
+    return [
+        f"the robot has no limit of {name} for {', '.join(joints)}: URDF wants one, {UNLIMITED:g} stands for none"
+        for name, joints in missing.items()
+        if joints
+    ]
 
 
 def inertial_element(mass: float, centre: Array, inertia: Array) -> ElementTree.Element:

@@ -1,205 +1,199 @@
-"""Writes a model into a copy of the user's own URDF or MJCF: names, frames, meshes and actuators stay as they are.
+"""Writes a model into a copy of the user's own URDF: only the numbers that the model has otherwise change.
 
-A joint may carry several bodies that do not move against each other. The data tell their sum alone: the body right
-after the joint takes what is new, the others keep what they have. Where that would be no body, it takes the whole, and
-the others lose their inertia.
+A joint may carry several bodies that do not move against each other, or that were locked in the recording. The data
+tell their sum alone: the body right after the joint takes what is new, the others keep what they have. Where that would
+be no body, it takes what the others on fixed joints had, too; what moves against it always keeps its own inertia.
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.common.report.words import join_words
+from armlab.common.xml_text import XmlNode, read_xml_text
 from armlab.identification.export import (
-    SPRING_FIELDS,
+    INERTIA_NAMES,
     SimulatorModel,
     body_numbers,
+    format_numbers,
     has_extent,
     inertia_entries,
-    inertial_element,
     link_inertias,
 )
-from problem.mjcf import carried_bodies, compile_mjcf, import_mujoco, written_mjcf
-from problem.urdf import read_urdf_chain
-from problem.urdf_document import move_urdf, read_urdf_root, urdf_text
+from armlab.identification.mjcf_edit import MAX_CHANGE, MAX_ERROR, same_inertia
+from problem.arm import Arm, link_poses
+from problem.urdf import UrdfChain, chain_of, link_inertia
+from problem.urdf_document import UrdfElement, lock_urdf, moved_urdf, parse_urdf_root, read_urdf_root
 
-MESH_SUFFIXES = (".stl", ".obj", ".msh")  # that MuJoCo reads
+MAX_FRAME_ERROR = 1e-4  # m, or of a turn: MuJoCo writes six digits
 
 
-class UnreadableError(InputError):
-    """MuJoCo is missing, or refuses a URDF."""
+@dataclass(frozen=True)
+class Target:
+    """A robot file that takes a model. positions: of its joints that the model's robot has locked, rad or m."""
+
+    path: Path
+    positions: Mapping[str, float]
 
 
 @dataclass(frozen=True)
 class Patched:
-    """A document, and what a person has to know of it, one line each."""
+    """A document, and what a person has to know of it, one line each. has_drives: it holds those of the model."""
 
     text: str
     notes: tuple[str, ...]
+    has_drives: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """A body that a joint carries. seen: pseudo-inertia (4, 4) about the frame of the first. moves: against that."""
+
+    name: str
+    seen: Array
+    moves: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """What the first body that a joint carries takes, (4, 4), and whether the others keep theirs."""
+    """What the first body that a joint carries takes, (4, 4), and the places of those that lose their inertia."""
 
     first: Array
-    others_stay: bool
+    emptied: tuple[int, ...] = ()
+
+    def note(self, own: Sequence[Carried]) -> list[str]:
+        """A line where bodies lose their inertia."""
+        if not self.emptied:
+            return []
+        others = ", ".join(own[place].name for place in self.emptied)
+        return [f"{own[0].name} has the whole inertia of what its joint carries; none is left to {others}"]
 
 
-def share_inertia(total: Array, seen: Sequence[Array]) -> Shares:
-    """Shares of the bodies that a joint carries; total, seen: pseudo-inertias (4, 4) about the frame of the first."""
-    own = total - np.sum([np.zeros((4, 4)), *seen[1:]], axis=0)
-    return Shares(own, True) if has_extent(own) else Shares(total, False)
+def share_inertia(total: Array, own: Sequence[Carried], source: Path) -> Shares:
+    """Shares of the bodies that a joint carries; total: pseudo-inertia (4, 4) about the frame of the first.
+
+    Raises InputError where the bodies that move against the first have more than the whole. source: for messages.
+    """
+    rest = total - np.sum([np.zeros((4, 4)), *(each.seen for each in own[1:])], axis=0)
+    if has_extent(rest):
+        return Shares(rest)
+    rest = total - np.sum([np.zeros((4, 4)), *(each.seen for each in own[1:] if each.moves)], axis=0)
+    if has_extent(rest):
+        return Shares(rest, tuple(place for place, each in enumerate(own) if place and not each.moves))
+    moving = join_words([each.name for each in own if each.moves])
+    raise InputError(
+        f"{source}: {moving} on joints that were locked have more inertia than the model has from {own[0].name} on: "
+        "correct their masses there, or export with --into and the robot file of the recording, where they are fixed"
+    )
 
 
-def patched_urdf(simulated: SimulatorModel, source: Path, folder: Path) -> Patched:
+def check_same_arm(simulated: SimulatorModel, arm: Arm, source: Path) -> None:
+    """Raises InputError where a file has another arm than the model: joints, or their places."""
+    own = simulated.model.arm
+    names = [joint.name for joint in own.joints]
+    if [joint.name for joint in arm.joints] != names:
+        raise InputError(
+            f"{source} has the joints {', '.join(joint.name for joint in arm.joints)}, the model {', '.join(names)}"
+        )
+    for position in np.stack([np.zeros(len(own)), np.linspace(0.3, 1.1, len(own))]):
+        poses = zip(names, link_poses(own, position), link_poses(arm, position), strict=True)
+        for name, one, other in poses:
+            if np.abs(one - other).max() > MAX_FRAME_ERROR:
+                raise InputError(f"{source}: joint '{name}' stands or moves otherwise than in the robot of the model")
+
+
+def patched_urdf(simulated: SimulatorModel, target: Target, folder: Path) -> Patched:
     """A URDF with the links and joint dynamics of a model; folder: where it will stand, for the paths of its meshes.
 
     Raises InputError where the file has another arm than the model, or where the model has no links.
     """
-    chain, notes = read_urdf_chain(source), list[str]()
-    _check_same_arm(simulated, [joint.name for joint in chain.arm.joints], source)
-    for own, total in zip(chain.carried, link_inertias(simulated), strict=True):
-        shares = share_inertia(total, [each.seen for each in own])
-        _set_inertial(own[0].node, shares.first)
-        if not shares.others_stay:
-            for each in own[1:]:
-                _remove(each.node, "inertial")
-            notes.append(_lumped_note(str(own[0].node.get("name")), [str(each.node.get("name")) for each in own[1:]]))
-    for number, joint in enumerate(chain.joints):
-        dynamics = joint.find("dynamics")
-        if dynamics is None:
-            dynamics = ElementTree.SubElement(joint, "dynamics")
-        for key, field in (("damping", "damping"), ("friction", "frictionloss")):
-            dynamics.set(key, repr(float(simulated.field(field)[number])))
-    move_urdf(chain.root, source, folder)
+    source = target.path
+    chain = _chain(read_urdf_root(source), target)
+    check_same_arm(simulated, chain.arm, source)
+    document, notes = read_xml_text(source), list[str]()
+    links = {child.attributes.get("name"): child for child in document.root.children if child.tag == "link"}
+    joints = {child.attributes.get("name"): child for child in document.root.children if child.tag == "joint"}
+    joint_before = {end.attributes.get("link"): joint for joint in joints.values() if (end := joint.find("child"))}
+    for carried, total in zip(chain.carried, link_inertias(simulated), strict=True):
+        names = [str(each.node.get("name")) for each in carried]
+        own = [
+            Carried(name, each.seen, _moves_against(name, names[0], joint_before, target))
+            for name, each in zip(names, carried, strict=True)
+        ]
+        shares = share_inertia(total, own, source)
+        if not same_inertia(own[0].seen, shares.first, MAX_CHANGE):
+            _set_inertial(links[own[0].name], shares.first)
+        for place in shares.emptied:
+            _remove_inertial(links[own[place].name])
+        notes += shares.note(own)
+    for number, joint in enumerate(simulated.model.arm.joints):
+        _set_dynamics(joints[joint.name], simulated, number)
+    text = document.text()
+    _check_urdf(simulated, text, target)
     gravity = np.asarray(simulated.model.arm.gravity)
     if not np.allclose(gravity, chain.arm.gravity):
         notes.append(f"set gravity to {np.round(gravity, 4).tolist()} m/s2 in your simulator: URDF has no place for it")
-    return Patched(urdf_text(chain.root), tuple(notes))
+    return Patched(moved_urdf(text, source, folder), tuple(notes))
 
 
-def patched_mjcf(simulated: SimulatorModel, source: Path) -> Patched:
-    """An MJCF with the links, gravity and joint fields of a model; paths of meshes are made absolute.
-
-    source: of an MJCF, or of a URDF, which MuJoCo reads. Raises InputError where the file has another arm than the
-    model, where the model has no links, or where MuJoCo refuses the result; UnreadableError where it refuses a URDF.
-    """
-    spec, notes = _spec_of_urdf(source) if source.suffix == ".urdf" else _spec_of_mjcf(source)
-    compiled = spec.compile()  # numbers the bodies and joints of the spec, too
-    _check_same_arm(simulated, [compiled.joint(number).name for number in range(compiled.njnt)], source)
-    bodies = {each.id: each for each in spec.bodies}
-    for own, total in zip(carried_bodies(compiled), link_inertias(simulated), strict=True):
-        shares = share_inertia(total, [each.seen for each in own])
-        _set_body(bodies[own[0].number], shares.first)
-        if not shares.others_stay:
-            for each in own[1:]:
-                _empty_body(bodies[each.number])
-            names = [bodies[each.number].name for each in own]
-            notes.append(_lumped_note(names[0], names[1:]))
-    for joint in spec.joints:
-        _set_joint(joint, simulated, spec.compiler.degree)
-    spec.option.gravity = simulated.model.arm.gravity
-    guess = import_mujoco().mjtInertiaFromGeom
-    unstated = guess.mjINERTIAFROMGEOM_FALSE if source.suffix == ".urdf" else guess.mjINERTIAFROMGEOM_AUTO
-    spec.compiler.inertiafromgeom = unstated
-    spec.compiler.settotalmass = -1
-    return Patched(written_mjcf(spec, source), tuple(notes))
+def _chain(root: ElementTree.Element, target: Target) -> UrdfChain:
+    """The chain of a URDF with the joints of a target locked."""
+    lock_urdf(root, target.path, target.positions)
+    return chain_of(root, target.path)
 
 
-def _spec_of_mjcf(source: Path) -> tuple[Any, list[str]]:
-    compile_mjcf(source)
-    return import_mujoco().MjSpec.from_file(str(source)), []
+def _moves_against(link: str, first: str, joint_before: Mapping[str | None, XmlNode], target: Target) -> bool:
+    """Whether one of the joints from a link to another one before it is locked in the model alone."""
+    while link != first:
+        joint = joint_before[link]
+        if joint.attributes.get("name") in target.positions:
+            return True
+        parent = joint.find("parent")
+        assert parent is not None
+        link = parent.attributes["link"]
+    return False
 
 
-def _spec_of_urdf(source: Path) -> tuple[Any, list[str]]:
-    """A mujoco.MjSpec of a URDF with the frames of fixed joints, and what a person has to know of it.
-
-    Meshes that are not at hand, or that MuJoCo cannot read, are left out. Raises UnreadableError.
-    """
-    root, left_out = read_urdf_root(source), list[str]()
-    for link in root.findall("link"):
-        for shape in [*link.findall("visual"), *link.findall("collision")]:
-            mesh = shape.find("geometry/mesh")
-            if mesh is None:
-                continue
-            path = _mesh_path(str(mesh.get("filename")), source)
-            if path is None:
-                left_out.append(str(mesh.get("filename")))
-                link.remove(shape)
-            else:
-                mesh.set("filename", str(path))
-    for own in root.findall("mujoco"):
-        root.remove(own)
-    keep = dict.fromkeys(("strippath", "fusestatic", "discardvisual", "inertiafromgeom"), "false")
-    ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler", {**keep, "balanceinertia": "true"})
-    try:
-        spec = import_mujoco().MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
-        spec.compile()
-    except (InputError, ValueError) as error:
-        raise UnreadableError(f"MuJoCo cannot read {source.name}: {' '.join(str(error).split())}") from None
-    names = ", ".join(sorted(set(left_out)))
-    return spec, [f"left out, since they are not at hand as STL or OBJ: {names}"] if names else []
-
-
-def _mesh_path(name: str, source: Path) -> Path | None:
-    """The file of a mesh as a URDF names it; packages are looked for in the folders above the URDF."""
-    package, mark, inner = name.removeprefix("file://").partition("package://")
-    choices = [folder / inner for folder in source.resolve().parents] if mark else [source.resolve().parent / package]
-    found = [path for path in choices if path.is_file() and path.suffix.lower() in MESH_SUFFIXES]
-    return found[0] if found else None
-
-
-def _check_same_arm(simulated: SimulatorModel, joints: list[str], source: Path) -> None:
-    names = [joint.name for joint in simulated.model.arm.joints]
-    if joints != names:
-        raise InputError(f"{source} has the joints {', '.join(joints)}, the model {', '.join(names)}")
-
-
-def _lumped_note(first: str, others: list[str]) -> str:
-    return f"{first} has the whole inertia of what its joint carries; none is left to {', '.join(others)}"
-
-
-def _remove(node: ElementTree.Element, tag: str) -> None:
-    for child in node.findall(tag):
-        node.remove(child)
-
-
-def _set_inertial(link: ElementTree.Element, pseudo: Array) -> None:
-    """Replaces the inertia of a URDF link, at the place that it has in the file."""
-    children = list(link)
-    place = next((index for index, child in enumerate(children) if child.tag == "inertial"), 0)
-    _remove(link, "inertial")
-    link.insert(place, inertial_element(*body_numbers(pseudo)))
-
-
-def _set_body(body: Any, pseudo: Array) -> None:
+def _set_inertial(link: XmlNode, pseudo: Array) -> None:
     mass, centre, inertia = body_numbers(pseudo)
-    body.explicitinertial = True
-    body.inertia = np.zeros(3)  # MuJoCo takes the diagonal or the full matrix, not both
-    body.mass, body.ipos, body.iquat = mass, centre, (1.0, 0.0, 0.0, 0.0)
-    body.fullinertia = inertia_entries(inertia)
+    inertial = link.find("inertial") or link.add("inertial", {}, first=True)
+    entries = map(repr, inertia_entries(inertia).tolist())
+    for tag, numbers in (
+        ("origin", {"xyz": format_numbers(centre), "rpy": "0 0 0"}),
+        ("mass", {"value": repr(mass)}),
+        ("inertia", dict(zip(INERTIA_NAMES, entries, strict=True))),
+    ):
+        (inertial.find(tag) or inertial.add(tag, {})).set_numbers(numbers)
 
 
-def _empty_body(body: Any) -> None:
-    """A body without inertia; MuJoCo takes that of its geoms where none is stated, so they are made weightless."""
-    body.explicitinertial = False
-    body.mass, body.inertia, body.fullinertia = 0.0, np.zeros(3), np.full(6, np.nan)
-    for geom in body.geoms:
-        geom.mass = 0.0
+def _remove_inertial(link: XmlNode) -> None:
+    inertial = link.find("inertial")
+    if inertial is not None:
+        link.remove(inertial)
 
 
-def _set_joint(joint: Any, simulated: SimulatorModel, degrees: bool) -> None:
-    number = joint.id
-    joint.damping[0] = float(simulated.field("damping")[number])
-    joint.frictionloss = float(simulated.field("frictionloss")[number])
-    joint.armature = float(simulated.field("armature")[number])
-    stiffness, rest = (float(simulated.field(name)[number]) for name in SPRING_FIELDS)
-    joint.stiffness[0] = stiffness
-    turns = joint.type == import_mujoco().mjtJoint.mjJNT_HINGE
-    joint.springref = np.degrees(rest) if degrees and turns else rest
+def _set_dynamics(joint: XmlNode, simulated: SimulatorModel, number: int) -> None:
+    dynamics = joint.find("dynamics")
+    for key, name in (("damping", "damping"), ("friction", "frictionloss")):
+        wanted = float(simulated.field(name)[number])
+        stated = "" if dynamics is None else dynamics.attributes.get(key, "")
+        if float(stated or 0) != wanted:
+            dynamics = dynamics or joint.add("dynamics", {})
+            dynamics.set({key: repr(wanted)})
+
+
+def _check_urdf(simulated: SimulatorModel, text: str, target: Target) -> None:
+    """Raises InputError where a text does not have the links of a model, or another link is no body."""
+    root = parse_urdf_root(text, target.path)
+    for node in root.findall("link"):
+        link_inertia(UrdfElement(node, f"{target.path}, link '{node.get('name')}'"))
+    chain = _chain(root, target)
+    for carried, total in zip(chain.carried, link_inertias(simulated), strict=True):
+        if not same_inertia(np.sum([each.seen for each in carried], axis=0), total, MAX_ERROR):
+            name = carried[0].node.get("name")
+            raise InputError(f"{target.path}, link '{name}': its inertia cannot be changed in the text of the file")

@@ -204,7 +204,7 @@ def test_the_exported_mjcf_replays_as_the_found_servos(diagnosis: MotionDiagnosi
     values = diagnosis.servos.values.copy()
     values[:, place("delay")] = 0.0
     path = tmp_path / "found.xml"
-    path.write_text(mjcf_text(diagnosis.simulation, Servos(values)))
+    path.write_text(mjcf_text(diagnosis.simulation, Servos(values))[0])
     model = mujoco.MjModel.from_xml_path(str(path))
     command = commands(7, 8.0)
     ours = simulate(path.read_text(), command)
@@ -218,7 +218,7 @@ def test_the_exported_mjcf_replays_as_the_found_servos(diagnosis: MotionDiagnosi
     )
     assert np.abs(again[0].error[50:]).max() < 1e-3  # both start apart by the speed that an encoder gives
     assert model.actuator_gainprm[0, 0] == pytest.approx(float(diagnosis.servos.get("kp")[0]), rel=1e-5)
-    delayed = mujoco.MjModel.from_xml_string(mjcf_text(diagnosis.simulation, diagnosis.servos))
+    delayed = mujoco.MjModel.from_xml_string(mjcf_text(diagnosis.simulation, diagnosis.servos)[0])
     np.testing.assert_allclose(delayed.actuator_delay, diagnosis.servos.get("delay"), rtol=1e-5)
 
 

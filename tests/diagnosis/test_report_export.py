@@ -89,7 +89,8 @@ def test_effects_without_a_place_in_the_simulator_are_named_in_one_line(tmp_path
     stribeck = component("stribeck_friction", 1, level=2.0, static_level=3.0, velocity=0.1, exponent=2.0)
     path = model_with(tmp_path, stribeck, component("time_delay", None, seconds=0.004))
     lines = list(export_model(path, tmp_path / "arm.xml"))
-    assert lines[1] == "not in the file: stribeck_friction (0.1, 2), joint 1; time_delay (0.004)"
+    stribeck_words = "Stribeck friction at joint 1 (exponent 2, level 2, static level 3, velocity 0.1)"
+    assert lines[1] == f"not in the file: {stribeck_words}; time delay of the whole robot (0.004)"
 
 
 def test_a_model_read_again_adds_each_effect_once(tmp_path: Path) -> None:

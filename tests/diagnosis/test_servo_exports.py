@@ -5,7 +5,7 @@ The names stand in `simulator_fields.yaml`, with source and version. The laws ar
 
 import sys
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass, make_dataclass
+from dataclasses import dataclass, make_dataclass, replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -116,9 +116,23 @@ def test_isaac_lab_computes_the_torque_of_the_law(simulation: ServoSimulation, t
     assert SOURCES["isaaclab"]["units"]["min_delay"] == "physics time-steps"
 
 
+def test_the_simulation_keeps_the_text_of_the_file_and_takes_a_payload(
+    simulation: ServoSimulation, tmp_path: Path
+) -> None:
+    own = tmp_path / "own.xml"
+    own.write_text(simulation.path.read_text().replace("<worldbody>", "<!-- ours --><worldbody>"))
+    loaded = replace(simulation, path=own, payload=0.2)
+    text, notes = mjcf_text(loaded, make_servos(**NUMBERS))
+    assert "<!-- ours --><worldbody>" in text
+    assert notes == ()
+    np.testing.assert_allclose(
+        mujoco.MjModel.from_xml_string(text).body_inertia, loaded.model().body_inertia, rtol=1e-9, atol=1e-15
+    )
+
+
 def test_mjlab_computes_the_torque_of_the_law(simulation: ServoSimulation, tmp_path: Path) -> None:
     servos = make_servos(**NUMBERS)
-    (tmp_path / "simulation.xml").write_text(mjcf_text(simulation, servos))
+    (tmp_path / "simulation.xml").write_text(mjcf_text(simulation, servos)[0])
     names = mjlab_names(mjlab_text(simulation, servos, STEP_S), tmp_path)
     spec = names["make_spec"]()
     assert not list(spec.actuators)

@@ -1,5 +1,7 @@
 """Exported files, read by MuJoCo and Pinocchio, which share no code with this project."""
 
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,11 +15,14 @@ from armlab.identification.export import (
     build_simulator_model,
     mjcf_document,
     srdf_document,
+    unstated_limits,
     urdf_document,
 )
 from armlab.identification.model import Model
+from armlab.identification.model_file import read_model
 from armlab.identification.structure import Structure
 from armlab.identification.write_simulator import export_model
+from problem.arm import Limits
 from problem.motion import Motion
 from problem.pseudo_inertia import parameters_of, regular_nominal
 from problem.robot_file import load_arm
@@ -125,6 +130,29 @@ def test_export_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
     path = model_of("irb120-arm", (*SMOOTH, "torque_offset")).save(tmp_path / "model.yaml")
     lines = list(export_model(path, tmp_path / "arm.urdf"))
     assert lines[:2] == [str(tmp_path / "arm.urdf"), str(tmp_path / "arm.srdf")]
-    assert "URDF has no place for them" in lines[2]
-    assert "torque_offset, joint 1" in lines[3]
-    assert "rotor_inertia" not in lines[3]
+    assert "URDF has no place for them" in lines[-2]
+    offset = read_model(path).component_parameters(6)[0].value
+    assert lines[-1].startswith(f"not in the file: torque offset at joint 1 ({offset:.3g} N m); ")
+    assert "rotor" not in lines[-1]
+
+
+def test_a_urdf_has_a_limit_that_the_robot_lacks_only_where_urdf_wants_one_and_that_is_told() -> None:
+    known, free = Limits((-1.0, 1.0), velocity=2.0), Limits(velocity=3.0)
+    arm = load_arm("irb120-arm")
+    limits = (known, Limits(), free)
+    joints = tuple(replace(joint, limits=each) for joint, each in zip(arm.joints, limits, strict=True))
+    arm = replace(arm, joints=joints)
+    structure = Structure(arm, ())
+    inertial = parameters_of(regular_nominal(arm))
+    model = Model("irb120-arm", structure, structure.base.values(inertial), inertial=inertial)
+    document = urdf_document(build_simulator_model(model))
+    names = [joint.name for joint in joints]
+    found = {node.get("name"): node.find("limit") for node in ElementTree.fromstring(document).iter("joint")}
+    assert found[names[0]].attrib == {"effort": "1000000000.0", "velocity": "2.0", "lower": "-1.0", "upper": "1.0"}
+    assert found[names[1]] is None
+    assert found[names[2]].attrib == {"effort": "1000000000.0", "velocity": "3.0"}
+    assert unstated_limits(arm) == [
+        f"the robot has no limit of torque for {names[0]}, {names[2]}: URDF wants one, 1e+09 stands for none"
+    ]
+    pin = pytest.importorskip("pinocchio")
+    assert pin.buildModelFromXML(document).njoints == 4

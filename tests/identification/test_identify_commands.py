@@ -68,7 +68,7 @@ def test_physical_links_go_all_the_way_to_a_simulator_file(recording: Path, tmp_
     pytest.importorskip("cvxpy")
     invoke(identify, recording, "--out", tmp_path / "out", "--method", "physical", "--tolerance", "0.5")
     text = invoke(export_model, tmp_path / "out" / "model.yaml", tmp_path / "arm.xml")
-    assert "torque_offset" in text
+    assert "torque offset at joint 1 (0.4 N m); " in text
     assert "<mujoco" in (tmp_path / "arm.xml").read_text()
 
 

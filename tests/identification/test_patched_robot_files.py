@@ -159,7 +159,7 @@ def test_mujoco_finds_the_models_torque_in_the_users_mjcf_with_its_actuators(
     mujoco = pytest.importorskip("mujoco")
     model, out, motion = model_of(mjcf, change), tmp_path / "new" / "two.xml", states()
     list(export_model(model, out))
-    assert_allclose(mujoco_torque(out, motion), predicted(model, motion), atol=1e-4)  # MuJoCo writes six digits
+    assert_allclose(mujoco_torque(out, motion), predicted(model, motion), atol=1e-9)
     read = mujoco.MjModel.from_xml_path(str(out))
     assert [read.body(number).name for number in range(1, read.nbody)] == ["upper", "lower", "gripper"]
     assert (read.actuator(0).name, read.geom(0).name, read.site(0).name) == ("servo", "arm", "tip")
@@ -181,7 +181,7 @@ def test_a_urdf_becomes_an_mjcf_with_its_names_frames_and_the_meshes_at_hand(
     lines = list(export_model(model, out))
     assert lines[1] == "two.urdf with other numbers: its names, frames and meshes stay"
     assert "left out, since they are not at hand as STL or OBJ: meshes/upper.stl" in lines
-    assert_allclose(mujoco_torque(out, motion), predicted(model, motion), atol=1e-4)  # MuJoCo writes six digits
+    assert_allclose(mujoco_torque(out, motion), predicted(model, motion), atol=1e-9)
     read = mujoco.MjModel.from_xml_path(str(out))
     assert [read.body(number).name for number in range(1, read.nbody)] == [
         "base_link",

@@ -80,11 +80,11 @@ def test_the_torques_of_a_locked_mjcf_are_those_of_mujoco_with_still_fingers(mjc
 
 
 def test_what_names_a_locked_joint_goes_and_the_rest_stays(urdf: Path, mjcf: Path, tmp_path: Path) -> None:
-    text = lock_joints(urdf, "hand", {}, tmp_path).text
+    text = lock_joints(urdf, "hand", {}, tmp_path).document
     assert "by hand" in text
     assert "<transmission" not in text
     assert [line.strip() for line in text.splitlines() if "<joint name" in line][-1] == '<joint name="joint1" />'
-    text = lock_joints(mjcf, "hand", {}, tmp_path).text
+    text = lock_joints(mjcf, "hand", {}, tmp_path).document
     assert all(
         word in text for word in ('<general name="finger1" joint="joint1"/>', '<actuatorfrc actuator="finger1"/>')
     )
@@ -162,3 +162,25 @@ def test_a_robot_with_a_gripper_is_refused_with_the_link_where_its_arm_ends(urdf
             load_arm(str(path))
         assert f"locked: hand ({joints} joints)" in str(raised.value)
         assert raised.value.choices == ("hand",)
+
+
+def test_an_mjcf_that_is_not_locked_keeps_its_text_and_finds_its_files_from_another_folder(tmp_path: Path) -> None:
+    mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
+    own, new = tmp_path / "own", tmp_path / "new"
+    (own / "parts" / "shapes").mkdir(parents=True)
+    new.mkdir()
+    corners = "\n".join(f"v {x} {y} {z}" for x in (0, 1) for y in (0, 1) for z in (0, 1))
+    (own / "parts" / "shapes" / "cube.obj").write_text(corners + "\nf 1 2 3\nf 5 6 7\nf 2 4 8\n")
+    (own / "parts" / "inner.xml").write_text('<x><geom name="inner" type="mesh" mesh="cube" mass="0.123456789"/></x>')
+    (own / "parts" / "outer.xml").write_text('<x><!-- outer --><joint/><include file="parts/inner.xml"/></x>')
+    (own / "arm.xml").write_text(
+        '<mujoco><compiler assetdir="parts"/><!-- -- ours -- --><compiler meshdir="parts/shapes"/>'
+        '<asset><mesh file="cube.obj"/></asset>'
+        '<worldbody><body><include file="parts/outer.xml"/></body></worldbody></mujoco>'
+    )
+    locked = lock_joints(own / "arm.xml", None, {}, new)
+    assert all(word in locked.document for word in ("<!-- -- ours -- -->", "<!-- outer -->", "0.123456789"))
+    (new / "arm.xml").write_text(locked.text("unused"))
+    read = [mujoco.MjModel.from_xml_path(str(folder / "arm.xml")) for folder in (own, new)]
+    np.testing.assert_array_equal(read[0].body_inertia, read[1].body_inertia)
+    assert read[1].nmesh == 1

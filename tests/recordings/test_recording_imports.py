@@ -20,6 +20,7 @@ from armlab.recordings.imports.plan import plan_import
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.load import load_recording
+from problem.locked_joints import read_lock_record
 
 OPTIONS = {
     "robot": "irb120-arm",
@@ -192,6 +193,9 @@ def test_a_recording_of_a_robot_with_a_gripper_holds_a_robot_file_of_its_arm(tmp
     shutil.move(tmp_path / "recording", tmp_path / "elsewhere")
     (tmp_path / "toy.urdf").unlink()
     assert [joint.name for joint in load_recording(tmp_path / "elsewhere").arm.joints] == ["joint1", "joint2", "joint3"]
+    record = read_lock_record(tmp_path / "elsewhere" / "toy.urdf")
+    assert record is not None
+    assert record.original.read_text() == GRIPPER_URDF
 
 
 @pytest.mark.parametrize(

@@ -61,13 +61,13 @@ from armlab.diagnosis.report.words import (
     effect_in_words,
     format_probability,
     parameter_rows,
-    place_in_words,
     rival_in_words,
 )
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.diagnosis.verdict_files import check_output_folder
 from armlab.effects.library import effect_named
+from armlab.effects.words import place_in_words
 from armlab.recordings.load import load_recording
 from problem.arm import Arm
 from problem.joint_words import joint_in_words

@@ -31,8 +31,9 @@ from armlab.diagnosis.confusability.card import (
     confusability_card,
     read_planned_motions,
 )
-from armlab.diagnosis.report.words import effect_in_words, place_in_words
+from armlab.diagnosis.report.words import effect_in_words
 from armlab.effects.library import library
+from armlab.effects.words import place_in_words
 from problem.arm import Arm
 from problem.joint_words import joint_at_start, joint_in_words
 from problem.robot_file import load_arm

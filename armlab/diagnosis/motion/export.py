@@ -7,38 +7,52 @@ the motion better. The friction loss gets a `solimpfriction` that sticks: with M
 
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
-from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Servos
-from armlab.diagnosis.motion.servo_plugin import NUMBERS, STICKING
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Key, Servos
+from armlab.diagnosis.motion.servo_plugin import NUMBERS
 from armlab.diagnosis.motion.simulation import ServoSimulation
-from problem.mjcf import written_mjcf
+from armlab.identification.mjcf_edit import Drive, Meant, edit_mjcf, edit_mjcf_file, stated_fields
+from problem.mjcf import body_inertia, compile_mjcf, compile_mjcf_text
+from problem.mjcf_document import moved_mjcf
 
+JOINT_FIELDS: dict[str, Key] = {"damping": "damping", "armature": "armature", "frictionloss": "friction"}
 MAX_DELAY_ERROR = 0.01  # of a delay: what rounding to whole steps may change without a line
 
 
-def mjcf_text(simulation: ServoSimulation, servos: Servos) -> str:
-    """The simulation with the numbers of servos, as MJCF; paths of meshes are made absolute.
+def mjcf_text(simulation: ServoSimulation, servos: Servos) -> tuple[str, tuple[str, ...]]:
+    """The simulation with the numbers of servos, as MJCF, and what a person has to know of it, one line each.
 
-    Raises InputError where MuJoCo cannot write the model.
+    The text of the robot's MJCF stays but for the numbers; paths of meshes are made absolute. Raises InputError where
+    MuJoCo does not read the numbers.
     """
-    spec = simulation.spec()
-    names = {actuator.target: actuator for actuator in spec.actuators}
-    for row, place in enumerate(simulation.joints):
-        joint = spec.joint(simulation.arm.joints[place].name)
-        joint.damping[0], joint.armature = float(servos.get("damping")[row]), float(servos.get("armature")[row])
-        joint.frictionloss = float(servos.get("friction")[row])
-        joint.solimp_friction = list(STICKING)
-        actuator = names[joint.name]
-        actuator.set_to_position(kp=float(servos.get("kp")[row]), kv=float(servos.get("kd")[row]))
-        limit = float(servos.get("limit")[row])
-        actuator.forcelimited = limit < INFINITE_LIMIT
-        actuator.forcerange = [-limit, limit]
-        delay = float(servos.get("delay")[row])
-        if delay > 0:
-            actuator.delay = delay
-            actuator.nsample = math.ceil(delay / spec.option.timestep) + 1
-    return written_mjcf(spec, simulation.path)
+    path, text = simulation.path, simulation.document
+    before = compile_mjcf(path) if text is None else compile_mjcf_text(text, path)
+    with_payload = simulation.model()
+    stated = stated_fields(before, simulation.joints)
+    rows = {place: row for row, place in enumerate(simulation.joints)}
+    numbers = {name: servos.get(key) for name, key in JOINT_FIELDS.items()}
+    meant = Meant(
+        inertias={number: body_inertia(with_payload, number) for number in range(1, before.nbody)},
+        joints=simulation.joints,
+        fields={**stated, **numbers},
+        gravity=before.opt.gravity,
+        drives={place: _drive(servos.of_joint(row), float(servos.get("delay")[row])) for place, row in rows.items()},
+    )
+    if text is not None:
+        return edit_mjcf(text, path, before, meant), ()
+    edited, notes = edit_mjcf_file(path, before, meant)
+    return moved_mjcf(edited, path, None), notes
+
+
+def _drive(servo: Mapping[str, float | None], delay: float) -> Drive:
+    limit = servo["limit"]
+    return Drive(
+        kp=servo["kp"] or 0.0,
+        kv=servo["kd"] or 0.0,
+        limit=math.inf if limit is None or limit >= INFINITE_LIMIT else limit,
+        delay=max(delay, 0.0),
+    )
 
 
 def lines_without_field(simulation: ServoSimulation, servos: Servos, with_field: Sequence[str] = ()) -> Iterator[str]:

@@ -22,7 +22,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, Key, Servos
 from armlab.diagnosis.motion.simulation import ServoSimulation
-from armlab.identification.export import build_simulator_model, urdf_document
+from armlab.identification.export import build_simulator_model, unstated_limits, urdf_document
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
 
@@ -49,7 +49,8 @@ def ros_urdf_text(simulation: ServoSimulation, servos: Servos) -> str:
     rigid = TorqueModel(arm.name, structure, structure.base.values(arm.parameters), inertial=arm.parameters)
     fields = {name: _over_arm(simulation, servos.get(key)) for name, key in URDF_FIELDS.items()}
     root = ElementTree.fromstring(urdf_document(replace(build_simulator_model(rigid), fields=fields)))
-    lacking = "".join(f"\n  - {line.replace('--', '-')}" for line in _lines_without_field(simulation, servos))
+    lacking_lines = [*_lines_without_field(simulation, servos), *unstated_limits(arm)]
+    lacking = "".join(f"\n  - {line.replace('--', '-')}" for line in lacking_lines)
     root.insert(0, ElementTree.Comment(f" Written by armlab. What URDF and ros2_control do not hold:{lacking}\n"))
     control = ElementTree.SubElement(root, "ros2_control", name="servos", type="system")
     hardware = ElementTree.SubElement(control, "hardware")

@@ -42,12 +42,12 @@ def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
         simulation, servos = diagnosis.simulation, diagnosis.servos
         step = float(simulation.model().opt.timestep)
         texts[MODEL] = model_text(diagnosis, folder)
-        texts[SIMULATION] = mjcf_text(simulation, servos)
+        texts[SIMULATION], notes = mjcf_text(simulation, servos)
         texts["isaaclab_actuators.py"] = isaac_lab_text(simulation, servos, step)
         texts["mjlab_actuators.py"] = mjlab_text(simulation, servos, step)
         texts["servos.json"] = servos_json(simulation, servos)
         texts["servo_plugin.py"] = Path(servo_plugin.__file__).read_text(encoding="utf-8")
-        missing = list(lines_without_field(simulation, servos))
+        missing = [*lines_without_field(simulation, servos), *(f"{SIMULATION}: {note}" for note in notes)]
         try:
             texts["robot.urdf"] = ros_urdf_text(simulation, servos)
             texts["controllers.yaml"] = controllers_text(simulation, servos, step)

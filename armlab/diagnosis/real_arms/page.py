@@ -18,12 +18,12 @@ from armlab.diagnosis.report.words import (
     effect_in_words,
     finding_in_words,
     joint_unit,
-    place_in_words,
     rival_in_words,
     variable_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR
+from armlab.effects.words import place_in_words
 from armlab.identification.real.looks import LOOKS_FILE
 from armlab.identification.real.study import describe_study
 from problem.joint_words import joint_in_words

@@ -21,13 +21,13 @@ from armlab.diagnosis.report.words import (
     is_doubtful,
     is_negative_load,
     may_be_zero,
-    place_in_words,
 )
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import Interval, ParameterValue
+from armlab.effects.words import place_in_words
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 

@@ -1,7 +1,6 @@
 """Words and numbers of a diagnosis: effects, places, and values with units and intervals."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from string import Formatter
 
@@ -13,8 +12,9 @@ from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.effects.parameters import ParameterValue
+from armlab.effects.words import place_in_words
 from problem.arm import Arm
-from problem.joint_words import joint_in_words, links_in_words
+from problem.joint_words import joint_in_words
 
 SOMETHING_UNKNOWN = "something unknown"
 LESS_MASS = "less mass than modelled"
@@ -28,16 +28,6 @@ VALUE_DIGITS = 3  # of a value with its interval
 def effect_in_words(effect: str) -> str:
     """The name of an effect in a sentence; ValueError for an id that no effect has."""
     return effect_named(effect).words
-
-
-def place_in_words(arm: Arm, effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
-    """Where an effect is: a joint, a link, a coupling, or the whole robot."""
-    if joint is None:
-        return "the whole robot"
-    if effect_named(effect).where == "link":
-        return links_in_words(arm, (joint,))
-    driver = f" from {joint_in_words(arm, joints[1])}" if len(joints) > 1 else ""
-    return f"{joint_in_words(arm, joint)}{driver}"
 
 
 def finding_in_words(arm: Arm, claim: Claim) -> str:

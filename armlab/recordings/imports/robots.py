@@ -8,7 +8,7 @@ from armlab.common.errors import InputError
 from armlab.recordings.imports.questions import Options
 from armlab.recordings.recording_file import FILE_NAME
 from problem.arm import Arm
-from problem.locked_joints import LockedRobot, lock_joints, parse_locks
+from problem.locked_joints import LockedRobot, lock_joints, parse_locks, robot_text
 from problem.robot_file import built_in_arms, load_arm
 
 
@@ -29,13 +29,20 @@ class ImportedRobot:
         return f"robot{Path(name).suffix}" if name == FILE_NAME else name
 
     def copies(self, folder: Path) -> dict[str, str | bytes]:
-        """Content of the robot file for a folder, by its name; none of a built-in robot."""
+        """Content of the robot file for a folder, by its name; none of a built-in robot.
+
+        Where joints are locked, the file of the whole robot stands beside it, for what is made of a diagnosis.
+        """
         path = Path(self.source)
         if self.source in built_in_arms():
             return {}
-        if path.suffix in (".urdf", ".xml"):
-            return {self.name: lock_joints(path, self.tip, self.locks, folder).text}
-        return {self.name: path.read_bytes()}
+        if path.suffix not in (".urdf", ".xml"):
+            return {self.name: path.read_bytes()}
+        locked = lock_joints(path, self.tip, self.locks, folder)
+        if not locked.positions or not locked.original.is_file():
+            return {self.name: locked.text(str(locked.original.resolve()))}
+        whole = f"whole-{self.name}"
+        return {self.name: locked.text(whole), whole: robot_text(locked.original, folder)}
 
 
 def read_robot(options: Options) -> ImportedRobot | None:
