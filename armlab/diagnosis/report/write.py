@@ -36,13 +36,17 @@ from problem.joint_words import joint_at_start
 def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> str:
     """HTML text. gallery: None where nothing was fitted."""
     more = {} if gallery is None else _details(diagnosis, gallery)
+    verdict, story = verdict_sentences(diagnosis), content.story_text(diagnosis)
     return render_page(
         __package__,
         "report.html",
         f"Diagnosis of {diagnosis.recording.name} ({diagnosis.simulation.arm.name})",
         status=diagnosis.status,
-        verdict=verdict_sentences(diagnosis),
-        story=content.story_text(diagnosis),
+        verdict=verdict,
+        verdict_is_long=bool(story) and len(verdict[0].split()) > content.MAX_WORDS_IN_SIGHT,
+        finding_count=content.finding_count_text(diagnosis),
+        story=story,
+        share_note=content.SHARE_NOTE,
         setup=content.setup_part(diagnosis),
         joints=measured.joint_table(diagnosis) if diagnosis.claims else None,
         bodies=measured.body_sentences(diagnosis),
