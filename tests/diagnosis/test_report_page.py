@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ from armlab.diagnosis.report.gallery import draw_gallery
 from armlab.diagnosis.report.measured import body_sentences, joint_table
 from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
 from armlab.diagnosis.report.torque_pictures import evidence_variable
-from armlab.diagnosis.report.verdict import gain_sentence, verdict_lines
+from armlab.diagnosis.report.verdict import first_screen, gain_sentence, verdict_lines
 from armlab.diagnosis.report.words import effect_in_words, format_gap, format_measured, format_share, shorten_name
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
@@ -417,3 +418,19 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     assert palette.PURPLE in texts["figures/arm.svg"]
     assert f"Something that no known effect explains acts at {escape(f'j1{HOSTILE}')}." in texts["report.html"]
     assert "40 % of the held-out error variance depends on time" in texts["report.html"]
+
+
+def test_a_wrong_reading_is_the_headline_and_nothing_is_told_twice(found: Diagnosis) -> None:
+    answer: Any = SimpleNamespace(sentence="The recording is read wrongly: joint 1 counts the other way round.")
+    shown = first_screen(replace(found, setup=answer))
+    assert shown.headline == answer.sentence
+    assert shown.paragraphs[0].startswith("Of the recording read rightly: ")
+    assert " ".join((shown.headline, *shown.paragraphs)).count("% of the error comes from") == 1
+
+
+def test_many_findings_in_words_are_folded(found: Diagnosis) -> None:
+    assert first_screen(found).folded == ""
+    many = replace(found, claims=found.claims * 12)
+    shown = first_screen(many)
+    assert " lacks " in shown.folded
+    assert shown.paragraphs[0].startswith(f"{len(many.claims)} findings: ")

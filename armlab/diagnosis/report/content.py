@@ -25,7 +25,7 @@ from armlab.diagnosis.report.words import (
     variable_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis, Rival
-from armlab.diagnosis.story import claims_by_share, story_sentence, tell_story
+from armlab.diagnosis.story import claims_by_share, tell_story
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
@@ -37,9 +37,6 @@ SHARE_NOTE = (
     "Shares are of the squared error above the noise, of all joints together, each in units of its own torque. Errors "
     "in N m (N) are root mean squares of measured less predicted torque at one joint. All on held-out data."
 )
-
-
-MAX_WORDS_IN_SIGHT = 80  # of all findings in sentences on the first screen; more are folded
 
 
 @dataclass(frozen=True)
@@ -75,20 +72,6 @@ class SetupPart:
     table: Table
 
 
-def story_text(diagnosis: Diagnosis) -> str:
-    """The causes of the error in a sentence; empty without findings."""
-    chapters = tell_story(diagnosis)
-    return story_sentence(chapters, diagnosis.simulation.arm) if chapters else ""
-
-
-def finding_count_text(diagnosis: Diagnosis) -> str:
-    """What stands on the first screen in the place of many findings."""
-    return (
-        f"{count_of(len(diagnosis.claims), 'finding')}: each joint beside the drawing has its own, those that explain "
-        "most first; their numbers stand in the table below."
-    )
-
-
 def cause_table(diagnosis: Diagnosis) -> Table | None:
     """The causes with their findings, the largest first; None without findings."""
     rows = []
@@ -118,8 +101,8 @@ def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
     headings = ["read wrongly", "held-out error as it is → read rightly", "fits as well", "to tell"]
     text = (
         f"{setup.looks} readings of the recording and of the robot file were compared on blocks of time that were held "
-        f"out of the runs that identify. {CORRECTED_FOLDER}/ beside this page holds both as they should be; everything "
-        "below is of the recording read rightly."
+        f"out of the runs that identify. {CORRECTED_FOLDER}/ beside this page holds both as they should be; all other "
+        "numbers of this page are of the recording read rightly."
     )
     return SetupPart(text, Table(headings, rows, (0, 1, 2, 3), stacked=True))
 

@@ -1,11 +1,12 @@
 """The verdict for a reader in a hurry: what is missing and what that gains, and the lines for the terminal."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from textwrap import wrap
 
 import numpy as np
 
-from armlab.common.report.numbers import format_number
+from armlab.common.report.numbers import count_of, format_number
 from armlab.common.report.words import join_words
 from armlab.diagnosis.report.residuals import (
     ShownResiduals,
@@ -30,7 +31,7 @@ from armlab.diagnosis.report.words import (
 )
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
 from armlab.diagnosis.simulation import Simulation
-from armlab.diagnosis.story import claims_by_share
+from armlab.diagnosis.story import claims_by_share, story_sentence, tell_story
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.recordings.reading.answer import SetupFinding
@@ -38,13 +39,15 @@ from problem.arm import Arm
 from problem.joint_words import joint_in_table, joint_in_words
 
 MAX_NAMED_FINDINGS = 4  # differences that the verdict names; the others are counted
+MAX_WORDS_IN_SIGHT = 80  # of all findings in sentences on the first screen; more are folded
 
 
 def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
     """What is missing, and how much better the model is with it."""
     setup = diagnosis.setup.sentence if diagnosis.setup else ""
     if setup:
-        return setup, diagnosis.summary.removeprefix(setup).strip()
+        physics = " ".join(_findings_and_gain(diagnosis))
+        return setup, physics if diagnosis.claims else diagnosis.summary.removeprefix(setup).strip()
     if diagnosis.status == "inconclusive":
         return "These recordings allow no verdict.", diagnosis.summary
     worst = max(diagnosis.fit, key=lambda each: each.after, default=None)
@@ -53,8 +56,50 @@ def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
         size = "" if worst is None else _largest_error_text(worst, simulation.arm)
         left = f"The largest error on held-out data is {size}." if size else ""
         return f"Nothing is missing: {model_in_words(simulation)} explains the recordings down to their noise.", left
+    return _findings_and_gain(diagnosis)
+
+
+def _findings_and_gain(diagnosis: Diagnosis) -> tuple[str, str]:
+    """All that is missing, and what it gains; nothing without findings."""
     claims = [claim for claim, _ in claims_by_share(diagnosis)]
-    return findings_in_sentences(claims, simulation, MAX_NAMED_FINDINGS), gain_sentence(diagnosis)
+    if not claims:
+        return "", ""
+    return findings_in_sentences(claims, diagnosis.simulation, MAX_NAMED_FINDINGS), gain_sentence(diagnosis)
+
+
+@dataclass(frozen=True)
+class FirstScreen:
+    """What a reader sees first: a headline, paragraphs below it, and all findings in words where these are folded."""
+
+    headline: str
+    paragraphs: tuple[str, ...]
+    folded: str = ""
+
+
+def first_screen(diagnosis: Diagnosis) -> FirstScreen:
+    """A mistake of the reading first, else where the error comes from, else the verdict itself."""
+    first, second = verdict_sentences(diagnosis)
+    chapters = tell_story(diagnosis)
+    if not chapters:
+        return FirstScreen(first, (second,) if second else ())
+    setup = diagnosis.setup.sentence if diagnosis.setup else ""
+    findings, gain = _findings_and_gain(diagnosis)
+    folded = findings if len(findings.split()) > MAX_WORDS_IN_SIGHT else ""
+    shown = _count_sentence(diagnosis) if folded else findings
+    story = story_sentence(chapters, diagnosis.simulation.arm)
+    if setup:
+        return FirstScreen(
+            setup, (f"Of the recording read rightly: {story[0].lower()}{story[1:]}", shown, gain), folded
+        )
+    return FirstScreen(story, (shown, gain), folded)
+
+
+def _count_sentence(diagnosis: Diagnosis) -> str:
+    """What stands on the first screen in the place of many findings."""
+    return (
+        f"{count_of(len(diagnosis.claims), 'finding')}: each joint beside the drawing has its own, those that explain "
+        "most first; their numbers stand in the table below."
+    )
 
 
 def _largest_error_text(worst: JointFit, arm: Arm) -> str:
