@@ -261,7 +261,7 @@ def carrying_table(seconds: float = 8.0, **factors: float) -> pd.DataFrame:
     [
         ({}, ("time=s", "position=deg", "torque=N.m"), None, "--unit position=rad?"),
         ({}, ("time=s", "position=rad", "torque=mN.m"), None, "another unit (--unit torque=N.m)"),
-        ({"tau": 1 / 100}, ("time=s", "position=rad", "torque=N.m"), None, "torque of the motors (--gear-ratio)"),
+        ({"tau": 1 / 100}, ("time=s", "position=rad", "torque=N.m"), None, "torque of the motors (--gear-ratio with"),
         ({"tau": 1 / 4}, ("time=s", "position=rad", "torque=mA"), "4,4,4", "--unit torque=A"),
         ({"tau": 1 / 4000}, ("time=s", "position=rad", "torque=mA"), "4,4,4", "--unit torque=A?"),
         ({"tau": 500}, ("time=s", "position=rad", "torque=N.m"), None, "another unit (--unit torque=mN.m)"),

@@ -118,7 +118,7 @@ def _torque_advice(names: Sequence[str], ratio: float, is_geared: bool) -> str:
     if is_geared:
         causes.append("torque of the joints (then --motor-side position)")
     elif ratio < 1:
-        causes.append("torque of the motors (--gear-ratio)")
+        causes.append("torque of the motors (--gear-ratio with --motor-side torque)")
     if ratio < 1:
         causes.append("torque without gravity")
     return " or ".join(causes or ["another robot"]) + "?"
