@@ -17,6 +17,7 @@ from armlab.recordings.imports.questions import Question
 from armlab.recordings.imports.sources import read_sources
 from bench.errors import StoppedError
 
+MAX_NAME_WIDTH = 18  # letters, those of `reference_position`; the path of a file may be longer
 FLAGS = {"units": "--unit"}  # of options whose flag is not their name
 
 
@@ -61,9 +62,10 @@ def command_of(files: Sequence[Path], options: Mapping[str, Any]) -> str:
 
 def _show(plan: ImportPlan) -> None:
     """The table of what was recognised, and how to answer."""
-    width, name_width = shutil.get_terminal_size().columns, max(len(name) for name, _ in describe_plan(plan))
+    rows, width = describe_plan(plan), shutil.get_terminal_size().columns
+    name_width = max((len(name) for name, _ in rows if len(name) <= MAX_NAME_WIDTH), default=MAX_NAME_WIDTH)
     click.echo("Recognised:")
-    for name, text in describe_plan(plan):
-        indent = f"  {name.ljust(name_width)}  "
-        click.echo(textwrap.fill(text, width, initial_indent=indent, subsequent_indent=" " * len(indent)))
+    for name, text in rows:
+        start, after = f"  {name.ljust(name_width)}  ", " " * (name_width + 4)
+        click.echo(textwrap.fill(text, width, initial_indent=start, subsequent_indent=after))
     click.echo("Still open; Enter takes the proposal in brackets, Ctrl-C stops and writes nothing.")

@@ -125,17 +125,24 @@ def conceal(
 
 @click.command()
 @click.argument("folder", type=_FOLDER)
-@click.option("--verdicts", type=_FOLDER, required=True, help="Folder with a verdict.json a case.")
+@click.option("--verdicts", type=_FOLDER, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
 @click.option("--out", type=OutputPath(), help="Folder for the score [default: VERDICTS/score].")
 @prints_result
-def score(folder: Path, verdicts: Path, manifest: str | None, out: Path | None) -> ResultLines:
+def score(folder: Path, verdicts: Path | None, manifest: str | None, out: Path | None) -> ResultLines:
     """Score verdicts against the sealed answers of FOLDER.
 
-    FOLDER: a concealed set.
+    FOLDER: a concealed set. Without --verdicts a folder with a score, whose
+    page score.md is written again from the tables beside it.
     """
-    from armlab.concealed.score.scoring import format_lines, score_set
+    from armlab.concealed.score.scoring import PAGE_FILE, format_lines, score_set, write_page_again
 
+    if verdicts is None:
+        if manifest or out:
+            raise click.UsageError("--manifest and --out need --verdicts, the folder with a verdict.json a case")
+        document = write_page_again(folder)
+        yield f"{folder / PAGE_FILE}: written again, nothing was judged anew"
+        return document
     document = score_set(folder, verdicts, manifest, out or verdicts / "score")
     yield from format_lines(document)
     return document

@@ -114,6 +114,17 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")
 @click.option("--gains", metavar="NUMBERS", help="Gain of each channel, N.m per A or V.")
+@click.option(
+    "--gear-ratio",
+    metavar="NUMBERS",
+    help="For signals of the motors: turns of the motor in one turn of the joint, one a joint, with its sign.",
+)
+@click.option(
+    "--motor-side",
+    type=click.Choice(["both", "position", "torque"]),
+    help="With --gear-ratio: what was measured at the motors (velocities and commands go with the position). "
+    "[default: both]",
+)
 @click.option("--joints", metavar="NAMES", help="Motion only: joints of the robot in the order of the columns.")
 @click.option("--validate", multiple=True, type=click.Path(path_type=Path), help="File with role validate.")
 @click.option("--separator", help="Separator of a text file: a character or a word (tab, blank).")

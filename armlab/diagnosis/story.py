@@ -124,7 +124,9 @@ def story_sentence(chapters: Sequence[Chapter], arm: Arm) -> str:
     first, *others = chapters
     most = 100 - max(round(100 * sum(each.share for each in others)), 1) if others else 100
     share = min(round(100 * first.share), most)
-    sentence = f"{share or 'Less than 1'} % of the error comes from {_cause_in_words(first, arm)}"
+    is_told_alone = all(each.share < MIN_TOLD_SHARE for each in others)
+    more = "More than " if is_told_alone and share < round(100 * first.share) else ""
+    sentence = f"{more}{share or 'Less than 1'} % of the error comes from {_cause_in_words(first, arm)}"
     for each in others:
         longer = f"{sentence}, {100 * each.share:.0f} % from {_cause_in_words(each, arm)}"
         if each.share < MIN_TOLD_SHARE or len(longer.split()) > MAX_WORDS:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from armlab.common.report.words import join_words
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.report.sentences import findings_in_sentences
-from armlab.diagnosis.report.words import effect_in_words
+from armlab.diagnosis.report.words import effect_in_words, joint_unit
 from armlab.diagnosis.result import Claim, JointFit
 from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.tuning import ClaimTuning
@@ -22,7 +22,11 @@ def summarise(status: Status, claims: Sequence[Claim], fits: Sequence[JointFit],
         return f"Nothing is missing: the simulation explains the recording down to its noise (at most {worst:.3g} N m)."
     best = max(fits, key=lambda each: each.before - each.after)
     where = joint_in_words(simulation.arm, best.joint)
-    gain = f"On held-out data the error of {where} falls from {best.before:.3g} to {best.after:.3g} N m."
+    size = joint_unit(simulation.arm, best.joint - 1)
+    gain = (
+        f"On held-out data the error of {where} falls from {best.before:.3g} {size} (rigid body refitted) "
+        f"to {best.after:.3g} {size}."
+    )
     return f"{findings_in_sentences(claims, simulation, MAX_NAMED_FINDINGS)} {gain}"
 
 

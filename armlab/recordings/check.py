@@ -18,7 +18,13 @@ from armlab.recordings.motion import (
     with_motion_runs,
 )
 from armlab.recordings.motion_check import check_answers
-from armlab.recordings.possible import LIMIT_TOLERANCE_FACTOR, has_usual_position
+from armlab.recordings.possible import (
+    LIMIT_TOLERANCE_FACTOR,
+    MIN_SLOPE_CORRELATION,
+    block_means,
+    correlation,
+    has_usual_position,
+)
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.signs import compare_standstill
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -28,7 +34,6 @@ from problem.arm import Arm
 from problem.joint_words import joint_in_words
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
-MIN_SLOPE_CORRELATION = 0.9  # correlation of a velocity channel with the slope of its position
 
 
 def check_channels(run: MotionRun, arm: Arm) -> tuple[Finding, ...]:
@@ -101,7 +106,7 @@ def _find_limit_violations(run: MotionRun, arm: Arm, joint: int) -> list[Finding
             f"{limits.position[0]:.4g} and {limits.position[1]:.4g}: another unit, zero or robot?"
         )
         found += _joint_warning("beyond_limits", joint, text)
-    fastest = float(np.abs(_block_means(np.gradient(run.position[:, [joint]], run.time, axis=0))).max())
+    fastest = float(np.abs(block_means(np.gradient(run.position[:, [joint]], run.time, axis=0))).max())
     if fastest > LIMIT_TOLERANCE_FACTOR * limits.velocity:
         text = f"{own} moves at {fastest:.4g}, its limit is {limits.velocity:.4g}: another unit or clock?"
         found += _joint_warning("beyond_limits", joint, text)
@@ -116,9 +121,9 @@ def _check_velocity(run: MotionRun, arm: Arm, joint: int) -> list[Finding]:
     """Compares a velocity channel with the slope of the position; averages remove the steps of the encoder."""
     if run.velocity is None or np.ptp(run.velocity[:, joint]) == 0:
         return []
-    slopes = _block_means(np.gradient(run.position, run.time, axis=0))
-    velocity = _block_means(run.velocity[:, joint : joint + 1])[:, 0]
-    likeness = np.array([_correlation(velocity, slope) for slope in slopes.T])
+    slopes = block_means(np.gradient(run.position, run.time, axis=0))
+    velocity = block_means(run.velocity[:, joint : joint + 1])[:, 0]
+    likeness = np.array([correlation(velocity, slope) for slope in slopes.T])
     if likeness[joint] >= MIN_SLOPE_CORRELATION:
         return _check_velocity_scale(velocity, slopes[:, joint], arm, joint)
     if np.ptp(slopes[:, joint]) == 0:
@@ -140,19 +145,6 @@ def _check_velocity_scale(velocity: Array, slope: Array, arm: Arm, joint: int) -
     own = joint_in_words(arm, joint + 1)
     text = f"velocity of {own} is {scale:.4g} times its position's slope: another unit or gear?"
     return _joint_warning("velocity_mismatch", joint, text)
-
-
-def _block_means(signal: Array) -> Array:
-    """Means over stretches of about a hundredth of the run."""
-    length = max(len(signal) // 100, 1)
-    whole = len(signal) // length * length
-    return np.asarray(signal[:whole].reshape(-1, length, signal.shape[1]).mean(axis=1))
-
-
-def _correlation(first: Array, second: Array) -> float:
-    first, second = first - first.mean(), second - second.mean()
-    scale = float(np.linalg.norm(first) * np.linalg.norm(second))
-    return float(first @ second) / scale if scale > 0 else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,7 @@ OUTLIER_SHARE = 0.01  # of the rows, at each end
 MOVING_SHARE = 0.1  # of the rows: a speed that is kept for so long is no wrap of an encoder
 MAX_BLOCK_ROWS = 50
 MIN_ROWS = 20  # for a speed
+MIN_SLOPE_CORRELATION = 0.9  # of a velocity channel with the slope of its position
 
 
 def can_have_step(step: float) -> bool:
@@ -99,3 +100,37 @@ def is_creeping(position: Array, step: float) -> bool:
     low, high = position_range(position)
     fastest = np.quantile(np.abs(np.diff(position, axis=0)), 1 - OUTLIER_SHARE, axis=0) / step
     return bool(np.any(high - low > MIN_CREEP_RANGE) and np.all(fastest <= MAX_CREEP))
+
+
+def velocity_scales(time: Array, position: Array, velocity: Array) -> Array:
+    """Recorded velocity over the slope of the position, (joints,), in their own units; NaN where the two are not alike.
+
+    time: (rows,); position, velocity: (rows, joints), rows may hold NaN. Averages remove the steps of the encoder.
+    """
+    whole = np.isfinite(time) & np.isfinite(position).all(axis=1) & np.isfinite(velocity).all(axis=1)
+    time, position, velocity = time[whole], position[whole], velocity[whole]
+    rises = np.concatenate([[True], np.diff(time) > 0])[: len(time)]
+    if rises.sum() < MIN_ROWS or np.any(np.diff(time[rises]) <= 0):
+        return np.full(position.shape[1], np.nan)
+    slopes = block_means(np.gradient(position[rises], time[rises], axis=0))
+    pairs = zip(block_means(velocity[rises]).T, slopes.T, strict=True)
+    return np.array(
+        [
+            float(own @ slope / (slope @ slope)) if correlation(own, slope) >= MIN_SLOPE_CORRELATION else np.nan
+            for own, slope in pairs
+        ]
+    )
+
+
+def block_means(signal: Array) -> Array:
+    """Means over stretches of about a hundredth of the run; signal: (rows, channels)."""
+    length = max(len(signal) // 100, 1)
+    whole = len(signal) // length * length
+    return np.asarray(signal[:whole].reshape(-1, length, signal.shape[1]).mean(axis=1))
+
+
+def correlation(first: Array, second: Array) -> float:
+    """Of two signals (rows,); zero where one of them is constant."""
+    first, second = first - first.mean(), second - second.mean()
+    scale = float(np.linalg.norm(first) * np.linalg.norm(second))
+    return float(first @ second) / scale if scale > 0 else 0.0

@@ -1,6 +1,7 @@
 """What became of each case, the page of a score, and the gallery."""
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from click.testing import CliRunner
 from made_answers import COULOMB, NULL, OUTSIDE, effect, judged, scored, truth
 from made_verdicts import finding, perfect, verdict
 
+from armlab.cli.main import main
 from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
 from armlab.concealed.formats import Truth
@@ -23,8 +26,9 @@ from armlab.concealed.score.gallery import CASES_PER_GROUP, choose_items, tally_
 from armlab.concealed.score.held_out import Gap, HeldOut, filter_held_out_run, measure_gap_closed, rms
 from armlab.concealed.score.measures import Measure, arm_table, compute_measures, confusion_table
 from armlab.concealed.score.outcomes import OUTCOME_GROUPS, list_misses, list_outcomes
-from armlab.concealed.score.page import format_measure, judge_measure, render_page
+from armlab.concealed.score.page import SHOWN_MISS_COLUMNS, format_measure, judge_measure, render_page
 from armlab.concealed.score.rows import make_rows
+from armlab.concealed.score.scoring import ROW_TABLES, write_page_again
 from armlab.concealed.score.words import describe_hidden, describe_said
 from armlab.concealed.simulate import rigid_torque
 from problem.motion import Motion
@@ -256,3 +260,19 @@ def test_a_verdict_without_a_prediction_has_a_picture_too(friction: JudgedCase, 
     write_gallery([silent], make_rows([silent]), tmp_path)
     assert (tmp_path / "gallery" / "friction-joint-1.png").is_file()
     assert "### Not named: 1 of 1 clean" in (tmp_path / "gallery.md").read_text(encoding="utf-8")
+
+
+def test_a_page_is_written_again_from_the_tables_of_a_score(tmp_path: Path) -> None:
+    rows = scored((COULOMB, perfect(COULOMB)), (NULL, verdict()), (OUTSIDE, verdict()))
+    for name in ROW_TABLES:
+        getattr(rows, name).to_csv(tmp_path / f"{name}.csv", index=False)
+    missed = pd.DataFrame(columns=[*SHOWN_MISS_COLUMNS])
+    missed.to_csv(tmp_path / "misses.csv", index=False)
+    tiers = {"clean": [asdict(each) for each in compute_measures(rows, "clean")]}
+    result = {"development": True, "cases": 3, "seed": 1, "manifest": "0" * 64, "tiers": tiers}
+    (tmp_path / "score.json").write_text(json.dumps(result))
+    result = CliRunner().invoke(main, ["score", str(tmp_path)])
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "score.md").read_text() == render_page(rows, write_page_again(tmp_path), missed, [])
+    (tmp_path / "claims.csv").unlink()
+    assert "holds no whole score" in CliRunner().invoke(main, ["score", str(tmp_path)]).output

@@ -7,6 +7,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,8 +33,8 @@ from armlab.diagnosis.report.gallery import draw_gallery
 from armlab.diagnosis.report.measured import body_sentences, joint_table
 from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
 from armlab.diagnosis.report.torque_pictures import evidence_variable
-from armlab.diagnosis.report.verdict import verdict_lines
-from armlab.diagnosis.report.words import format_gap, format_measured, shorten_name
+from armlab.diagnosis.report.verdict import first_screen, gain_sentence, verdict_lines
+from armlab.diagnosis.report.words import effect_in_words, format_gap, format_measured, format_share, shorten_name
 from armlab.diagnosis.report.write import report_texts, write_report
 from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts
@@ -156,8 +157,60 @@ def test_the_verdict_stands_in_two_sentences_with_the_joint_and_the_gain(browser
     page, _ = opened(browser, address, 1200)
     verdict = page.locator(".verdict").inner_text()
     assert " lacks " in verdict
-    assert " on held-out data falls from " in verdict
+    assert " on held-out data falls most at " in verdict
+    assert re.search(r": from [\d.]+ N m \(simulation as given\) to [\d.]+ N m; the noise floor there is ", verdict)
     page.close()
+
+
+CUT_CELLS = """() => [...document.querySelectorAll('th, td')].filter(cell =>
+  cell.textContent.trim() && cell.closest('thead, .stacked') === null
+  && cell.getBoundingClientRect().right > cell.closest('.wide').getBoundingClientRect().right + 1
+).map(cell => cell.textContent)"""
+
+
+def test_no_cell_of_a_table_is_cut_on_a_phone(browser: Any, address: str) -> None:
+    page, _ = opened(browser, address, 390)
+    assert page.evaluate(CUT_CELLS) == []
+    assert page.evaluate("[...document.querySelectorAll('.stacked')].every(it => it.scrollWidth <= innerWidth - 32)")
+    page.close()
+
+
+def test_the_story_stands_beside_the_arm_on_a_wide_screen_and_above_it_on_a_phone(browser: Any, address: str) -> None:
+    for width, is_beside in ((1280, True), (390, False)):
+        page, _ = opened(browser, address, width)
+        story, arm = (page.locator(each).first.bounding_box() for each in (".verdict", ".beside svg"))
+        assert (arm["x"] > story["x"] + story["width"] and arm["y"] < story["y"] + story["height"]) == is_beside
+        assert story["width"] <= 44 * 16
+        page.close()
+
+
+def test_the_arm_drawing_names_every_finding_of_every_joint(found: Diagnosis) -> None:
+    picture = draw_gallery(found, select_residuals(found)).arm  # type: ignore[arg-type]
+    said = " ".join(re.findall(r"<text[^>]*>([^<]*)</text>", str(picture)))
+    for claim in found.claims:
+        assert effect_in_words(claim.effect) in said
+    assert " more" not in said
+
+
+def test_what_is_left_is_told_in_one_way_on_the_whole_page(found: Diagnosis) -> None:
+    slow = replace(found, final=np.cumsum(np.ones_like(found.final), axis=0) / len(found.final) + found.final)
+    slow = replace(slow, fit=tuple(replace(each, noise_floor=0.5 * each.after) for each in found.fit))
+    first = gain_sentence(slow)
+    assert "changes more slowly than noise" in first
+    assert "the recorded motion does not predict it" in first
+    joint = int(re.findall(r" at j(\d)", first)[0]) + 1
+    unknown = replace(slow, unexplained=(Unexplained(joint, 0.9, (f"velocity_{joint}",)),))
+    assert "90 % of the variance that is left there depends on velocity" in gain_sentence(unknown)
+    assert "more slowly" not in gain_sentence(unknown)
+
+
+def test_a_share_of_nearly_all_is_not_called_all() -> None:
+    assert [format_share(value) for value in (1.0, 0.9997, 0.5, 0.0002)] == [
+        "100.0 %",
+        "above 99.9 %",
+        "50.0 %",
+        "below 0.1 %",
+    ]
 
 
 def test_every_finding_has_its_equation_numbers_and_evidence(found: Diagnosis, texts: dict[str, str]) -> None:
@@ -365,3 +418,19 @@ def test_an_unknown_is_shown_with_its_surrogate_over_what_it_depends_on_and_mark
     assert palette.PURPLE in texts["figures/arm.svg"]
     assert f"Something that no known effect explains acts at {escape(f'j1{HOSTILE}')}." in texts["report.html"]
     assert "40 % of the held-out error variance depends on time" in texts["report.html"]
+
+
+def test_a_wrong_reading_is_the_headline_and_nothing_is_told_twice(found: Diagnosis) -> None:
+    answer: Any = SimpleNamespace(sentence="The recording is read wrongly: joint 1 counts the other way round.")
+    shown = first_screen(replace(found, setup=answer))
+    assert shown.headline == answer.sentence
+    assert shown.paragraphs[0].startswith("Of the recording read rightly: ")
+    assert " ".join((shown.headline, *shown.paragraphs)).count("% of the error comes from") == 1
+
+
+def test_many_findings_in_words_are_folded(found: Diagnosis) -> None:
+    assert first_screen(found).folded == ""
+    many = replace(found, claims=found.claims * 12)
+    shown = first_screen(many)
+    assert " lacks " in shown.folded
+    assert shown.paragraphs[0].startswith(f"{len(many.claims)} findings: ")

@@ -49,6 +49,14 @@ def test_one_of_several_causes_never_explains_all() -> None:
     )
 
 
+def test_a_cause_that_is_told_alone_explains_more_than_99_percent() -> None:
+    chapters = [
+        Chapter("transmission", (2,), 0.9997, (0,), ("backlash",)),
+        Chapter("drive", (2,), 0.0003, (1,), ("torque offset",)),
+    ]
+    assert story_sentence(chapters, ARM) == "More than 99 % of the error comes from backlash at joint 2."
+
+
 def test_the_sentence_names_joints_as_the_robot_file_does_and_doubts_what_may_be_nothing() -> None:
     names = ("shoulder_pan", "shoulder_lift", "elbow")
     arm = replace(ARM, joints=tuple(replace(one, name=name) for one, name in zip(ARM.joints, names, strict=True)))

@@ -190,3 +190,22 @@ def test_units_are_proposed_by_the_size_of_the_values() -> None:
     assert propose_unit("position", POSITION, 57.3 * values, sliding=False) == "deg"
     assert propose_unit("position", POSITION, values, sliding=True) == "m"
     assert propose_unit("torque", ["current_1"], values, sliding=False) == "A"
+
+
+def test_the_table_has_one_row_a_signal_in_80_columns(tmp_path: Path) -> None:
+    names = ["timestamp_ns", *(f"q{n}_rad" for n in (1, 2, 3)), *(f"tau{n}_Nm" for n in (1, 2, 3))]
+    table = frame()
+    table["t"] *= 1e9
+    (tmp_path / "a folder with a long name").mkdir()
+    log = tmp_path / "a folder with a long name" / "log.csv"
+    table.set_axis(names, axis=1).to_csv(log, index=False)
+    session = TerminalSession(["recording", "import", str(log)], tmp_path)
+    shown = session.wait_for("Still open")
+    session.interrupt()
+    for signal, text in (
+        ("time", "timestamp_ns [ns] (a usual name; unit from _ns)"),
+        ("position", "q1_rad, q2_rad, q3_rad [rad] (usual names; unit from _rad)"),
+        ("torque", "tau1_Nm, tau2_Nm, tau3_Nm [N.m] (usual names; unit from _Nm)"),
+    ):
+        assert len([line for line in shown.splitlines() if line.strip().startswith(signal)]) == 1
+        assert text in shown

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from recording_folders import POSITION, TORQUE, folder_with, frame
 from refusals import refusal
 
-from armlab.recordings.imports.files import import_files
+from armlab.recordings.imports.files import import_files, list_columns
 from armlab.recordings.imports.text import read_odd_csv
 from armlab.recordings.load import load_recording
 
@@ -54,21 +54,21 @@ def bracketed(stem: str) -> tuple[str, ...]:
         (
             ("timestamp_ns", *(f"actual_q_{n}" for n in range(3)), *bracketed("x")),
             {"torque": "x*", "units": ("torque=Nm",)},
-            {"time": "a usual name of stamps", "position": "named as in UR's RTDE", "torque": "given with --torque"},
-            {"time": "the column's name ends in _ns", "position": "as in UR's RTDE", "torque": "given with --unit"},
+            {"time": "a usual name", "position": "named as in UR's RTDE", "torque": "given with --torque"},
+            {"time": "from _ns", "position": "as in UR's RTDE", "torque": "given with --unit"},
         ),
         (
             ("t", *(f"position_{n}" for n in JOINT_NAMES), *(f"effort_{n} [N.m]" for n in JOINT_NAMES)),
             {},
             {
-                "time": "a usual name of stamps",
+                "time": "a usual name",
                 "position": "named as in ROS joint states, joints matched by name",
                 "torque": "named as in ROS joint states, joints matched by name",
             },
             {
-                "time": "the steps make 200 Hz, a usual rate",
+                "time": "by its steps, 200 Hz",
                 "position": "as in ROS joint states",
-                "torque": "the header names it",
+                "torque": "from the header",
             },
         ),
     ],
@@ -80,8 +80,16 @@ def test_what_was_recognised_has_a_reason_each(
     path = write_log(tmp_path / "log.csv", names, stamps)
     imported = import_files([path], tmp_path / "new", {**NOTHING, "robot": write_robot(tmp_path), **change})
     assert imported.document["reasons"] == {"columns": columns, "units": units}
-    assert f"position columns: {columns['position']}" in imported.lines
-    assert f"time unit: {imported.plan.units['time']}: {units['time']}" in imported.lines
+    shown = f"({columns['time']}; unit {units['time']})"
+    assert f"time: {names[0]} [{imported.plan.units['time']}] {shown}" in imported.lines
+    assert sum(line.startswith("position") for line in imported.lines) == 1
+
+
+def test_columns_that_count_up_are_listed_by_the_first_and_the_last() -> None:
+    assert list_columns([f"q{n}_rad" for n in range(1, 7)]) == "q1_rad ... q6_rad"
+    assert list_columns(["q1", "q2", "q4", "q5"]) == "q1, q2, q4, q5"
+    assert list_columns(["elbow", "wrist_1", "wrist_2", "wrist_3"]) == "elbow, wrist_1, wrist_2, wrist_3"
+    assert list_columns(["q1", "q2", "q3"]) == "q1, q2, q3"
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,9 @@ from armlab.recordings.load import load_recording
 from armlab.recordings.possible import can_have_position, can_have_speed, can_have_step, can_have_torque, is_creeping
 from armlab.recordings.public import PUBLIC_RECORDINGS, fetch_recording
 from problem.arm import Joint, Limits
-from problem.robot_file import BUILT_IN_FOLDER
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
+from problem.robot_file import BUILT_IN_FOLDER, load_arm
 
 OPTIONS: dict[str, Any] = {
     **dict.fromkeys(("gains", "separator", "decimal", "topic")),
@@ -54,8 +56,8 @@ def write_log(path: Path, factors: dict[str, float]) -> Path:
 @pytest.mark.parametrize(
     ("factors", "units", "message"),
     [
-        ({"q": 180 / np.pi}, (), "its limits are -2.88 and 2.88 rad: --unit position=deg?"),
-        ({"q": 180 / np.pi, "t": 1e3}, ("time=ms",), "--unit position=deg?"),
+        ({"q": 180 / np.pi}, (), "its limits are -2.88 and 2.88 rad: --unit position=deg, or angles of the motors"),
+        ({"q": 180 / np.pi, "t": 1e3}, ("time=ms",), "--unit position=deg, or"),
         ({"q": 180 / np.pi}, ("position=rev",), "as rev that is 51.2 turns"),
         ({"t": 1e3}, (), "the rows are 5 s apart with time in s, and joint"),
         ({"t": 1e3}, (), "--unit time=ms?"),
@@ -67,7 +69,7 @@ def write_log(path: Path, factors: dict[str, float]) -> Path:
         ({}, ("time=ns",), "--unit time=s?"),
         ({"t": 1e3}, ("time=us",), "--unit time=ms?"),
         ({"tau": 1e3}, (), "its limit is 60: --unit torque=mN.m?"),
-        ({"q": 180 / np.pi, "t": 1e3, "tau": 1e3}, (), "--unit position=deg?; torque of joint"),
+        ({"q": 180 / np.pi, "t": 1e3, "tau": 1e3}, (), "which need --gear-ratio?; torque of joint"),
     ],
 )
 def test_numbers_that_cannot_be_in_their_unit_are_refused_with_the_right_one(
@@ -150,7 +152,9 @@ def test_no_recording_of_a_real_arm_is_refused(tmp_path: Path, name: str) -> Non
     for run in recording.runs:
         columns = [f"{signal}{joint}" for signal in ("q", "tau") for joint in range(run.joints)]
         table = pd.DataFrame(np.column_stack([run.time, run.position, run.torque]), columns=["t", *columns])
-        assert plan_of(tmp_path, table, recording.robot, units).questions == ()
+        plan = plan_of(tmp_path, table, recording.robot, units)
+        assert plan.questions == ()
+        assert plan.doubts == ()
 
 
 def spun(turns: float, seconds: float, wrapped: bool = False) -> pd.DataFrame:
@@ -239,3 +243,147 @@ def test_a_motion_creeps_where_rows_are_rare_and_no_joint_is_fast(reach: float, 
 @pytest.mark.parametrize(("step", "possible"), [(900.0, True), (1100.0, False), (2e-6, True), (1e-7, False)])
 def test_rows_are_a_microsecond_to_a_thousand_seconds_apart(step: float, possible: bool) -> None:
     assert can_have_step(step) == possible
+
+
+def carrying_table(seconds: float = 8.0, **factors: float) -> pd.DataFrame:
+    """A run whose torque is about what the links of the three-joint arm need. factors: by the letters of columns."""
+    table = frame(seconds=seconds)
+    arm = load_arm("irb120-arm")
+    position = table[POSITION].to_numpy()
+    table[TORQUE] = rigid_body_torque(arm, Motion(position, 0 * position, 0 * position)) + 0.3
+    for name in table:
+        table[name] *= factors.get(name.rstrip("123"), 1.0)
+    return table
+
+
+@pytest.mark.parametrize(
+    ("factors", "units", "gains", "doubt"),
+    [
+        ({}, ("time=s", "position=deg", "torque=N.m"), None, "--unit position=rad?"),
+        ({}, ("time=s", "position=rad", "torque=mN.m"), None, "another unit (--unit torque=N.m)"),
+        ({"tau": 1 / 100}, ("time=s", "position=rad", "torque=N.m"), None, "torque of the motors (--gear-ratio with"),
+        ({"tau": 1 / 4}, ("time=s", "position=rad", "torque=mA"), "4,4,4", "--unit torque=A"),
+        ({"tau": 1 / 4000}, ("time=s", "position=rad", "torque=mA"), "4,4,4", "--unit torque=A?"),
+        ({"tau": 500}, ("time=s", "position=rad", "torque=N.m"), None, "another unit (--unit torque=mN.m)"),
+    ],
+)
+def test_numbers_too_small_for_their_unit_are_doubtful_and_the_import_says_which_unit_fits(
+    tmp_path: Path, factors: dict[str, float], units: tuple[str, ...], gains: str | None, doubt: str
+) -> None:
+    path = tmp_path / "log.csv"
+    carrying_table(**factors).to_csv(path, index=False)
+    imported = import_files([path], tmp_path / "new", {**OPTIONS, "units": units, "gains": gains})
+    assert any(doubt in text for text in imported.plan.doubts), imported.plan.doubts
+    assert any(line.startswith("doubtful: ") for line in imported.lines)
+    assert imported.document["doubts"] == imported.plan.doubts
+
+
+def test_numbers_in_their_right_unit_are_not_doubtful(tmp_path: Path) -> None:
+    for units, factors in (
+        (OPTIONS["units"], {}),
+        (("time=s", "position=deg", "torque=mN.m"), {"q": 180 / np.pi, "tau": 1e3}),
+    ):
+        plan = plan_of(tmp_path, carrying_table(**factors), "irb120-arm", units)
+        assert (plan.questions, plan.doubts) == ((), ())
+
+
+def test_torque_is_judged_by_the_limits_where_the_links_are_unknown(tmp_path: Path) -> None:
+    robot = changed_arm(tmp_path, {"torque_limit": 60.0})
+    text = yaml.safe_load(Path(robot).read_text())
+    text.pop("links", None)
+    Path(robot).write_text(yaml.safe_dump(text))
+    plan = plan_of(tmp_path, carrying_table(tau=1e-5), robot, OPTIONS["units"])
+    assert ["its limit is 60" in text for text in plan.doubts] == [True]
+
+
+@pytest.mark.parametrize(
+    ("factors", "change", "right"),
+    [
+        ({"v": 180 / np.pi}, (), "--unit velocity=deg/s?"),
+        ({"v": 30 / np.pi}, (), "--unit velocity=rpm?"),
+        ({}, ("position=deg",), "--unit position=rad?"),
+    ],
+)
+def test_a_velocity_that_is_no_slope_of_its_position_is_refused_with_the_unit_that_makes_it_one(
+    tmp_path: Path, factors: dict[str, float], change: tuple[str, ...], right: str
+) -> None:
+    table = frame()
+    for name in POSITION:
+        table[name.replace("q", "v")] = np.gradient(table[name], table["t"]) * factors.get("v", 1.0)
+    table.to_csv(tmp_path / "log.csv", index=False)
+    options = {**OPTIONS, "velocity": "v1,v2,v3", "units": (*OPTIONS["units"], "velocity=rad/s", *change)}
+    message = refusal(import_files, [tmp_path / "log.csv"], tmp_path / "new", options)
+    assert " times the slope of its position in " in message
+    assert message.endswith(right)
+
+
+RATIOS = np.array([100.0, -80.0, 50.0])
+
+
+def motor_table() -> pd.DataFrame:
+    """The run as the motors show it."""
+    table = frame()
+    table[POSITION] *= RATIOS
+    table[TORQUE] /= RATIOS
+    return table
+
+
+def test_signals_of_motors_become_those_of_joints_by_their_gear_ratios(tmp_path: Path) -> None:
+    motor_table().to_csv(tmp_path / "log.csv", index=False)
+    options = {**OPTIONS, "gear_ratio": "100,-80,50"}
+    imported = import_files([tmp_path / "log.csv"], tmp_path / "new", options)
+    run = load_recording(tmp_path / "new").runs[0]
+    np.testing.assert_allclose(run.position, frame()[POSITION])
+    np.testing.assert_allclose(run.torque, frame()[TORQUE])
+    assert "gear ratio: positions divided and torques multiplied by 100, -80, 50" in imported.lines
+
+
+@pytest.mark.parametrize("side", ["position", "torque"])
+def test_one_side_of_a_gear_may_be_measured_at_the_joints(tmp_path: Path, side: str) -> None:
+    table = motor_table()
+    measured_at_joints = TORQUE if side == "position" else POSITION
+    table[measured_at_joints] = frame()[measured_at_joints]
+    table.to_csv(tmp_path / "log.csv", index=False)
+    options = {**OPTIONS, "gear_ratio": "100,-80,50", "motor_side": side}
+    import_files([tmp_path / "log.csv"], tmp_path / "new", options)
+    run = load_recording(tmp_path / "new").runs[0]
+    np.testing.assert_allclose(run.position, frame()[POSITION])
+    np.testing.assert_allclose(run.torque, frame()[TORQUE])
+
+
+def test_angles_of_motors_are_refused_with_the_option_that_they_need(tmp_path: Path) -> None:
+    motor_table().to_csv(tmp_path / "log.csv", index=False)
+    message = refusal(import_files, [tmp_path / "log.csv"], tmp_path / "new", OPTIONS)
+    assert "angles of the motors, which need --gear-ratio?" in message
+
+
+def test_a_gear_ratio_of_signals_of_the_joints_is_doubtful(tmp_path: Path) -> None:
+    options = {**OPTIONS, "gear_ratio": "100,100,100", "motor_side": "position", "out": str(tmp_path / "new")}
+    carrying_table().to_csv(tmp_path / "log.csv", index=False)
+    (doubt,) = plan_import([tmp_path / "log.csv"], options).doubts
+    assert "leave --gear-ratio out" in doubt
+
+
+def test_a_motor_turns_where_its_joint_slides(tmp_path: Path) -> None:
+    arm = yaml.safe_load((BUILT_IN_FOLDER / "emps.yaml").read_text())
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump(arm))
+    table = frame()[["t", "q1", "tau1"]]
+    table["q1"] *= 300.0
+    table.to_csv(tmp_path / "log.csv", index=False)
+    options = {**OPTIONS, "robot": str(tmp_path / "arm.yaml"), "position": "q1", "torque": "tau1"}
+    import_files([tmp_path / "log.csv"], tmp_path / "new", {**options, "gear_ratio": "300"})
+    np.testing.assert_allclose(load_recording(tmp_path / "new").runs[0].position[:, 0], frame()["q1"])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"gear_ratio": "100,50"}, "--gear-ratio holds 2 numbers for 3 columns of position"),
+        ({"gear_ratio": "100,0,50"}, "not zero"),
+        ({"gear_ratio": "a,b,c"}, "one number a joint"),
+        ({"motor_side": "torque"}, "needs the gears: give --gear-ratio"),
+    ],
+)
+def test_a_wrong_gear_ratio_is_refused(tmp_path: Path, options: dict[str, str], message: str) -> None:
+    path = write_log(tmp_path / "log.csv", {})
+    assert message in refusal(import_files, [path], tmp_path / "new", {**OPTIONS, **options})

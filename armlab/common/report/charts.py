@@ -5,6 +5,7 @@ levels.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from textwrap import wrap
 
 import numpy as np
 from markupsafe import Markup
@@ -46,8 +47,18 @@ def svg_picture(content: str, width: float, height: float, title: str) -> Markup
 
 def shorten_text(text: str, width: float, size: float = 11.0) -> str:
     """A text that fits into a width, its end left out where it does not."""
-    letters = max(int(width / (LETTER_WIDTH * size)), 4)
+    letters = _letters_in(width, size)
     return text if len(text) <= letters else text[: letters - 1].rstrip() + "…"
+
+
+def wrap_text(text: str, width: float, size: float = 11.0) -> list[str]:
+    """A text in lines that fit into a width; a word that is longer is shortened."""
+    lines = wrap(text, _letters_in(width, size), break_long_words=False, break_on_hyphens=False)
+    return [shorten_text(line, width, size) for line in lines]
+
+
+def _letters_in(width: float, size: float) -> int:
+    return max(int(width / (LETTER_WIDTH * size) + 1e-6), 4)  # a text fits into its own `text_width`
 
 
 def text_width(text: str, size: float = 11.0) -> float:

@@ -3,9 +3,12 @@
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
-from armlab.common.files import all_or_none
+import pandas as pd
+
+from armlab.common.errors import InputError
+from armlab.common.files import all_or_none, write_texts
 from armlab.concealed.formats import SetManifest
 from armlab.concealed.score.cases import JudgedCase, read_cases
 from armlab.concealed.score.figures import draw_figures
@@ -18,11 +21,12 @@ from armlab.concealed.score.measures import (
     detection_table_by_effect,
 )
 from armlab.concealed.score.outcomes import list_misses
-from armlab.concealed.score.page import format_measure, render_page
+from armlab.concealed.score.page import CAPTIONS, format_measure, render_page
 from armlab.concealed.score.rows import ScoreRows, make_rows
 from armlab.concealed.sets import read_checked_manifest
 
-SCORE_FILE = "score.json"
+SCORE_FILE, PAGE_FILE, MISSES_FILE = "score.json", "score.md", "misses.csv"
+ROW_TABLES = ("cases", "effects", "claims", "parameters")
 
 
 def score_set(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> dict[str, Any]:
@@ -35,13 +39,34 @@ def score_set(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> di
     missed = list_misses(cases, table)
     with all_or_none(out) as draft:
         (draft / SCORE_FILE).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-        missed.to_csv(draft / "misses.csv", index=False)
+        missed.to_csv(draft / MISSES_FILE, index=False)
         _write_tables(table, sorted(result["tiers"]), draft)
         shown = write_gallery(cases, table, draft)
         drawn = [path.stem for path in draw_figures(table, draft)]
-        (draft / "score.md").write_text(render_page(table, result, missed, drawn), encoding="utf-8")
+        (draft / PAGE_FILE).write_text(render_page(table, result, missed, drawn), encoding="utf-8")
     remove_other_pictures(out, shown)
     return result
+
+
+def write_page_again(folder: Path) -> dict[str, Any]:
+    """Writes score.md of a score again, from score.json and the tables beside it; returns what score.json holds.
+
+    Nothing is judged anew. Raises InputError where a file of the score is missing or is none.
+    """
+    try:
+        result = json.loads((folder / SCORE_FILE).read_text(encoding="utf-8"))
+        table = ScoreRows(*(_read_table(folder / f"{name}.csv") for name in ROW_TABLES))
+        drawn = [name for name in CAPTIONS if (folder / f"{name}.svg").is_file()]
+        page = render_page(table, result, _read_table(folder / MISSES_FILE), drawn)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{folder} holds no whole score ({error}): score its set again with --verdicts") from None
+    write_texts({PAGE_FILE: page}, folder)
+    return cast(dict[str, Any], result)
+
+
+def _read_table(path: Path) -> pd.DataFrame:
+    """A table of a score; `null` is a kind of cases, not a missing number."""
+    return pd.read_csv(path, dtype={"case": str}, keep_default_na=False, na_values=[""])
 
 
 def compute_score(
@@ -75,7 +100,7 @@ def format_lines(result: dict[str, Any]) -> list[str]:
 
 
 def _write_tables(table: ScoreRows, tiers: list[str], out: Path) -> None:
-    for name in ("cases", "effects", "claims", "parameters"):
+    for name in ROW_TABLES:
         getattr(table, name).to_csv(out / f"{name}.csv", index=False)
     detection_table_by_effect(table).to_csv(out / "detection_by_effect.csv", index=False)
     for tier in tiers:

@@ -20,6 +20,8 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
     """HTML text of the page. command: that repeats the diagnosis."""
     known = diagnosis.servos is not None
     first, _, rest = summary_of(diagnosis).partition(". ")
+    pictures = _pictures(diagnosis) if known else []
+    shown = _most_telling_row(diagnosis) if known else 0
     return render_page(
         __package__,
         "motion.html",
@@ -31,7 +33,8 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         steps=_next_recordings(diagnosis),
         errors=_error_table(diagnosis) if known else None,
         tool=_tool_text(diagnosis),
-        pictures=_pictures(diagnosis) if known else [],
+        replayed=pictures[shown : shown + 1],
+        pictures=[*pictures[:shown], *pictures[shown + 1 :]],
         findings=[finding_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.findings],
         numbers=_number_table(diagnosis) if known else None,
         missing=_missing_fields(diagnosis),
@@ -77,6 +80,13 @@ def _tool_text(diagnosis: MotionDiagnosis) -> str:
         return ""
     before, after = diagnosis.tool
     return "" if before is None else f"At the tool: {1e3 * before:.3g} mm before, {1e3 * after:.3g} mm after."
+
+
+def _most_telling_row(diagnosis: MotionDiagnosis) -> int:
+    """The row of the joint whose replay error over held-out runs falls most, or is largest."""
+    falls = [(each.replay_before or 2 * each.replay_after) - each.replay_after for each in diagnosis.errors]
+    row = int(np.argmax(falls)) if falls else 0
+    return diagnosis.errors[row].joint - 1 if falls else 0
 
 
 def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:

@@ -76,7 +76,10 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
         f"{place} {'' if before is None else f'from {1e3 * before:.3g} to '}{1e3 * after:.3g} {unit}"
         for place, before, after, unit in places
     ]
-    return f" Replay error of held-out runs: {', '.join(words)}."
+    known = all(before is not None for _, before, _, _ in places)
+    start = "with the simulation as given and with what was found" if known else "with what was found"
+    text = f" Replay error, rms of the position over held-out runs, {start}: {', '.join(words)}."
+    return text if known else f"{text} The simulation as given has no drive to replay with."
 
 
 def _silent_sentence(diagnosis: MotionDiagnosis) -> str:

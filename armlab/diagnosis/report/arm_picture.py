@@ -9,18 +9,23 @@ from markupsafe import Markup
 from armlab.common.arrays import Array
 from armlab.common.report import palette
 from armlab.common.report.charts import (
+    CHART_WIDTH,
     shorten_text,
     svg_element,
     svg_picture,
     svg_text,
+    wrap_text,
 )
 from problem.arm import Arm
 from problem.joint_words import joint_in_words
 
-PICTURE_WIDTH, ROW_HEIGHT = 412.0, 17.0
-MARK_HEIGHT = 13.0  # px: of the line under a joint's name that says what was found there
-ARM_WIDTH = 168.0  # px: width of the arm itself; the names stand beside it
+PICTURE_WIDTH = CHART_WIDTH
+NAME_SIZE, ROW_HEIGHT = 11.5, 18.0  # px: letters of a joint's name, and the height of its row
+CAUSE_SIZE, CAUSE_HEIGHT = 11.0, 14.0  # px: the same of a line that says what was found there
+ARM_WIDTH = 128.0  # px: width of the arm itself; the names stand beside it
+NAMES_START = ARM_WIDTH + 12  # px
 BOLD = 1.1  # width of bold letters over that of others, about
+MIN_ARM_HEIGHT, MARGIN = 170.0, 8.0  # px
 ELEVATION = np.deg2rad(18)
 AXLE_SHARE = 0.045  # of the arm's size: half the length of a joint's axle
 MIN_LENGTH = 1e-9
@@ -28,10 +33,15 @@ MIN_LENGTH = 1e-9
 
 @dataclass(frozen=True)
 class JointMark:
-    """What is said of a joint. unknown: no effect of the library explains all of it."""
+    """What was found at a joint, the largest cause first. unknown: no effect of the library explains all of it."""
 
-    text: str
+    causes: tuple[str, ...]
     unknown: bool = False
+
+    @property
+    def text(self) -> str:
+        """All causes in their order."""
+        return ", ".join(self.causes)
 
     @property
     def color(self) -> str:
@@ -71,10 +81,13 @@ def clearest_posture(arm: Arm, positions: Array) -> Array:
 def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: Sequence[str] = ()) -> Markup:
     """The arm as SVG. marks: by joint, from 1. whole: what concerns the robot as a whole."""
     bones = arm_skeleton(arm, position)
-    rows = ROW_HEIGHT * (len(arm) + len(whole)) + MARK_HEIGHT * len(marks)
-    height = max(230.0, 46.0 + rows)
+    lines = {joint: _cause_lines(mark) for joint, mark in marks.items()}
+    notes = [line for text in whole for line in wrap_text(f"whole robot: {text}", PICTURE_WIDTH - 12, CAUSE_SIZE)]
+    names_height = ROW_HEIGHT * len(arm) + CAUSE_HEIGHT * sum(map(len, lines.values()))
+    room = max(MIN_ARM_HEIGHT, names_height)
+    height = room + CAUSE_HEIGHT * len(notes) + 2 * MARGIN
     flat = _project_skeleton(bones, np.asarray(arm.gravity))
-    scale, shift = _fit_to_picture(flat.path, height)
+    scale, shift = _fit_to_picture(flat.path, room)
     content = _draw_base(flat.path[0] * scale + shift) + _draw_links(flat.path * scale + shift)
     content += "".join(
         _draw_joint(
@@ -85,7 +98,8 @@ def draw_arm(arm: Arm, position: Array, marks: Mapping[int, JointMark], whole: S
         )
         for index in reversed(range(len(arm)))
     )
-    content += _draw_names(arm, flat.centres * scale + shift, marks, height) + _draw_whole_robot(whole, height)
+    first_row = MARGIN + NAME_SIZE + (room - names_height) / 2
+    content += _draw_names(arm, flat.centres * scale + shift, marks, lines, first_row) + _draw_notes(notes, height)
     named = [f"{joint_in_words(arm, joint)}: {mark.text}" for joint, mark in sorted(marks.items())]
     guilty = ", ".join(named) or "no joint is marked"
     return svg_picture(content, PICTURE_WIDTH, height, f"The arm {arm.name} as a line drawing; {guilty}")
@@ -122,12 +136,12 @@ def _largest_extent(path: Array) -> float:
 
 
 def _fit_to_picture(path: Array, height: float) -> tuple[float, Array]:
-    """Scale and shift that bring the arm into the left part of the picture."""
-    room = np.array([ARM_WIDTH - 50, height - 80])
+    """Scale and shift that bring the arm into the left part of the picture, of that height, below the margin."""
+    room = np.array([ARM_WIDTH - 42, height - 40])
     span = np.maximum(np.ptp(path, axis=0), MIN_LENGTH)
     scale = float(np.min(room / span)) if np.max(np.ptp(path, axis=0)) > MIN_LENGTH else 1.0
     middle = (path.max(axis=0) + path.min(axis=0)) / 2
-    return scale, np.array([ARM_WIDTH / 2 + 6, height / 2]) - middle * scale
+    return scale, np.array([ARM_WIDTH / 2, MARGIN + height / 2]) - middle * scale
 
 
 def _draw_base(point: Array) -> str:
@@ -175,40 +189,43 @@ def _draw_joint(centre: Array, axis: Array, mark: JointMark | None, size: float)
     return out
 
 
-def _draw_names(arm: Arm, centres: Array, marks: Mapping[int, JointMark], height: float) -> str:
-    """One row a joint beside the arm, from the highest to the lowest, with a line to the joint.
+def _cause_lines(mark: JointMark) -> list[str]:
+    """The causes at a joint in lines that fit beside the arm."""
+    return wrap_text(mark.text, PICTURE_WIDTH - NAMES_START - 2, CAUSE_SIZE)
 
-    What is said of a joint stands under its name.
+
+def _draw_names(
+    arm: Arm, centres: Array, marks: Mapping[int, JointMark], lines: Mapping[int, Sequence[str]], first_row: float
+) -> str:
+    """The joints beside the arm, from the highest to the lowest, each with a line to it and its causes below its name.
+
+    lines: the causes by joint, from 1. first_row: where the first name stands, px from above.
     """
-    order = np.lexsort((np.arange(len(arm)), centres[:, 1]))
-    steps = [ROW_HEIGHT + MARK_HEIGHT * (int(index) + 1 in marks) for index in order]
-    rows = 30 + np.cumsum([0.0, *steps[:-1]]) + max(0.0, (height - 46 - sum(steps)) / 2)
-    out = ""
-    for row, index in zip(rows, order, strict=True):
-        mark = marks.get(int(index) + 1)
+    out, row = "", first_row
+    for index in np.lexsort((np.arange(len(arm)), centres[:, 1])).tolist():
+        mark = marks.get(index + 1)
         color, weight = (mark.color, "600") if mark else (palette.PALE, "400")
         x, y = centres[index]
-        start = ARM_WIDTH + 12
         out += svg_element(
             "path",
-            d=f"M{x:.1f} {y:.1f}L{start - 3:.1f} {row - 4:.1f}",
+            d=f"M{x:.1f} {y:.1f}L{NAMES_START - 3:.1f} {row - 4:.1f}",
             fill="none",
             stroke=color,
             stroke_width=1.2 if mark else 0.6,
             stroke_dasharray="none" if mark else "1 3",
         )
-        room = (PICTURE_WIDTH - start - 2) / (BOLD if mark else 1.0)
-        name = shorten_text(joint_in_words(arm, int(index) + 1), room, 10.5)
-        out += svg_text(name, start, row, 10.5, fill=color, font_weight=weight)
-        if mark:
-            out += svg_text(shorten_text(mark.text, room, 10.5), start, row + MARK_HEIGHT, 10.5, fill=color)
+        room = (PICTURE_WIDTH - NAMES_START - 2) / (BOLD if mark else 1.0)
+        name = shorten_text(joint_in_words(arm, index + 1), room, NAME_SIZE)
+        out += svg_text(name, NAMES_START, row, NAME_SIZE, fill=color, font_weight=weight)
+        for line in lines.get(index + 1, ()):
+            row += CAUSE_HEIGHT
+            out += svg_text(line, NAMES_START, row, CAUSE_SIZE)
+        row += ROW_HEIGHT
     return out
 
 
-def _draw_whole_robot(texts: Sequence[str], height: float) -> str:
-    rows = [height - 8 - ROW_HEIGHT * index for index in range(len(texts))][::-1]
-    pairs = zip(rows, texts, strict=True)
-    return "".join(
-        svg_text(shorten_text(f"whole robot: {text}", PICTURE_WIDTH - 12), 6, row, 11, fill=palette.DARK_VERMILION)
-        for row, text in pairs
-    )
+def _draw_notes(lines: Sequence[str], height: float) -> str:
+    """What concerns the robot as a whole, below the arm."""
+    rows = [height - MARGIN - CAUSE_HEIGHT * index for index in range(len(lines))][::-1]
+    pairs = zip(rows, lines, strict=True)
+    return "".join(svg_text(line, 6, row, CAUSE_SIZE, fill=palette.DARK_VERMILION) for row, line in pairs)

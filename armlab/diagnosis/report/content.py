@@ -12,9 +12,11 @@ from armlab.common.report.words import join_words
 from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.diagnosis.report.words import (
+    compared_in_words,
     effect_in_words,
     finding_in_words,
     format_gap,
+    format_growth,
     format_probability,
     format_share,
     joint_unit,
@@ -23,13 +25,18 @@ from armlab.diagnosis.report.words import (
     variable_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis, Rival
-from armlab.diagnosis.story import claims_by_share, story_sentence, tell_story
+from armlab.diagnosis.story import claims_by_share, tell_story
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from problem.arm import Arm
 from problem.joint_words import joint_at_start, joint_in_table, joint_in_words
+
+SHARE_NOTE = (
+    "Shares are of the squared error above the noise, of all joints together, each in units of its own torque. Errors "
+    "in N m (N) are root mean squares of measured less predicted torque at one joint. All on held-out data."
+)
 
 
 @dataclass(frozen=True)
@@ -65,12 +72,6 @@ class SetupPart:
     table: Table
 
 
-def story_text(diagnosis: Diagnosis) -> str:
-    """The causes of the error in a sentence; empty without findings."""
-    chapters = tell_story(diagnosis)
-    return story_sentence(chapters, diagnosis.simulation.arm) if chapters else ""
-
-
 def cause_table(diagnosis: Diagnosis) -> Table | None:
     """The causes with their findings, the largest first; None without findings."""
     rows = []
@@ -78,7 +79,8 @@ def cause_table(diagnosis: Diagnosis) -> Table | None:
         names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
         joints = ", ".join(joint_in_table(diagnosis.simulation.arm, joint) for joint in each.joints) or "all"
         rows.append([each.cause, joints, format_share(each.share), join_words(list(names))])
-    return Table(["cause", "joints", "share of the error", "findings"], rows, (0, 1, 3)) if rows else None
+    headings = ["cause", "joints", "share of the error", "findings"]
+    return Table(headings, rows, (0, 1, 3), stacked=True) if rows else None
 
 
 def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
@@ -99,8 +101,8 @@ def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
     headings = ["read wrongly", "held-out error as it is → read rightly", "fits as well", "to tell"]
     text = (
         f"{setup.looks} readings of the recording and of the robot file were compared on blocks of time that were held "
-        f"out of the runs that identify. {CORRECTED_FOLDER}/ beside this page holds both as they should be; everything "
-        "below is of the recording read rightly."
+        f"out of the runs that identify. {CORRECTED_FOLDER}/ beside this page holds both as they should be; all other "
+        "numbers of this page are of the recording read rightly."
     )
     return SetupPart(text, Table(headings, rows, (0, 1, 2, 3), stacked=True))
 
@@ -126,17 +128,17 @@ def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> Table:
 
 
 def whiteness_text(diagnosis: Diagnosis, data: ShownResiduals) -> str:
-    """Whether what is left is noise: a floor that remembers itself holds structure too."""
+    """Whether what is left changes as fast as noise does: a floor that remembers itself holds structure too."""
     joints = [joint for joint in range(len(diagnosis.fit)) if not is_white(data.final[:, joint], joint, data.observed)]
     times = [1e3 * correlation_seconds(data.final[:, joint], joint, data.observed) for joint in joints]
     arm = diagnosis.simulation.arm
     tied = [f"{joint_in_words(arm, joint + 1)} ({each:.0f} ms)" for joint, each in zip(joints, times, strict=True)]
     if not tied:
-        return "What is left is as white as noise through this filter would be."
+        return "What is left changes as fast as noise through the filter of the torque would."
     filtered = 1e3 * filter_correlation_seconds(data.observed)
     return (
-        f"What is left is not white at {join_words(tied)}: it is tied to itself for longer than noise through "
-        f"this filter ({filtered:.0f} ms), so the noise floor there holds structure too."
+        f"What is left at {join_words(tied)} changes more slowly than noise through the filter of the torque would "
+        f"({filtered:.0f} ms): it holds something that these signals do not show, and so does the noise floor there."
     )
 
 
@@ -150,18 +152,19 @@ def finding_details(diagnosis: Diagnosis, gallery: Gallery) -> list[FindingDetai
 
 def _finding_detail(diagnosis: Diagnosis, claim: Claim, picture: Markup, share: float) -> FindingDetail:
     evidence, arm = claim.evidence, diagnosis.simulation.arm
-    size = joint_unit(arm, evidence.joint)
+    size, where = joint_unit(arm, evidence.joint), joint_in_words(arm, evidence.joint + 1)
     before, after = format_number(evidence.rms_before), format_number(evidence.rms_after)
-    where = joint_at_start(arm, evidence.joint + 1)
     gain = (
-        f"{where} on held-out data: {before} {size} without it, {after} {size} with it (whitened, "
-        f"its variance is {format_number(1 + evidence.gain)} times as large without it). "
-        f"p-value {format_probability(evidence.corrected)} after correction for everything that was compared."
+        f"Tested on held-out data of {where}, all other findings kept: the error is {before} {size} without it and "
+        f"{after} {size} with it (whitened, its variance is {format_number(1 + evidence.gain)} times as large without "
+        f"it). p-value {format_probability(evidence.corrected)} after correction for everything that was compared. "
+        f"The test has a fit of its own; the model found leaves "
+        f"{format_number(diagnosis.fit[evidence.joint].after)} {size} there."
     )
     return FindingDetail(
         title=_finding_at_start(arm, claim),
         share=format_share(share),
-        error=f"{joint_in_words(arm, evidence.joint + 1)}: {before} → {after} {size}",
+        error=f"without it the error of {where} is {format_growth(evidence.rms_before, evidence.rms_after)}",
         about=effect_named(claim.effect).meaning,
         equation=claim.equation,
         picture=picture,
@@ -201,7 +204,7 @@ def unexplained_lines(diagnosis: Diagnosis) -> list[str]:
     return [
         f"{joint_at_start(arm, each.joint)}: {100 * each.share:.0f} % of the held-out error variance depends on "
         f"{join_words([variable_in_words(arm, name) for name in each.depends_on])}, and no effect of the library has "
-        "that form. A surrogate of these variables is in the errors above, not in model.yaml."
+        "that form. Neither model.yaml nor the errors of the model found hold it."
         for each in diagnosis.unexplained
     ]
 
@@ -216,7 +219,8 @@ def located_table(diagnosis: Diagnosis) -> Table:
         stretch = "–" if each.time is None else f"{format_number(each.time[0])} to {format_number(each.time[1])} s"
         joint, runs = joint_in_table(arm, each.joint), ", ".join(each.runs) or "–"
         rows.append([joint, format_share(each.share), where, runs, stretch])
-    return Table(["joint", "share of the excess error", "where", "runs", "stretch of time"], rows, (2, 3, 4))
+    headings = ["joint", "share of the excess error", "where", "runs", "stretch of time"]
+    return Table(headings, rows, (2, 3, 4), stacked=True)
 
 
 def next_steps(diagnosis: Diagnosis) -> list[str]:
@@ -279,16 +283,11 @@ def method_text(diagnosis: Diagnosis, held_out_blocks: bool) -> str:
 def origin_of(diagnosis: Diagnosis, command: str) -> Origin:
     """Where the data come from, and the command that repeats it."""
     recording, simulation = diagnosis.recording, diagnosis.simulation
-    compared = {
-        "nominal": "simulation as given",
-        "refit": "rigid body refitted",
-        "simulated": "torque simulated elsewhere",
-    }
     name = recording.simulation.name if recording.simulation else f"links of {recording.robot}"
     rows = [
         ["recording", recording.name],
         ["robot", f"{simulation.arm.name}, {count_of(len(simulation.arm), 'joint')}"],
-        ["compared with", compared[simulation.kind] + (f" ({name})" if simulation.kind == "nominal" else "")],
+        ["compared with", compared_in_words(simulation) + (f" ({name})" if simulation.kind == "nominal" else "")],
         *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
         *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),
         *(["warning", each.text] for each in diagnosis.signs),

@@ -80,19 +80,13 @@ def draw_gallery(diagnosis: Diagnosis, data: ShownResiduals) -> Gallery:
 
 
 def joint_marks(diagnosis: Diagnosis) -> dict[int, JointMark]:
-    """What is said of each joint in the picture of the arm."""
-    texts: dict[int, list[str]] = {}
+    """What was found at each joint, in the picture of the arm: all of it, by its share of the error."""
+    causes: dict[int, dict[str, None]] = {}
     for claim, _ in claims_by_share(diagnosis):
         if claim.joint is not None:
             is_link = effect_named(claim.effect).where == "link"
-            texts.setdefault(claim.joint, []).append(f"{'link: ' if is_link else ''}{claim_in_words(claim)}")
-    return {joint: JointMark(_short_mark(names), SOMETHING_UNKNOWN in names) for joint, names in texts.items()}
-
-
-def _short_mark(names: list[str]) -> str:
-    """What is unknown first, else what explains most."""
-    first = SOMETHING_UNKNOWN if SOMETHING_UNKNOWN in names else names[0]
-    return first if len(names) == 1 else f"{first}, {len(names) - 1} more"
+            causes.setdefault(claim.joint, {})[f"{'link: ' if is_link else ''}{claim_in_words(claim)}"] = None
+    return {joint: JointMark(tuple(names), SOMETHING_UNKNOWN in names) for joint, names in causes.items()}
 
 
 def _file_name(effect: str) -> str:

@@ -1,6 +1,7 @@
 """Words and numbers of a diagnosis: effects, places, and values with units and intervals."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from string import Formatter
 
@@ -8,6 +9,8 @@ import numpy as np
 
 from armlab.common.report.numbers import format_number, format_unit
 from armlab.diagnosis.result import Claim, Rival
+from armlab.diagnosis.settings import Baseline
+from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
@@ -16,6 +19,11 @@ from armlab.effects.words import place_in_words
 from problem.arm import Arm
 from problem.joint_words import joint_in_words
 
+COMPARED: Mapping[Baseline, str] = {
+    "nominal": "simulation as given",
+    "refit": "rigid body refitted",
+    "simulated": "torque simulated elsewhere",
+}
 SOMETHING_UNKNOWN = "something unknown"
 LESS_MASS = "less mass than modelled"
 MAX_NAME_LENGTH = 24  # letters
@@ -28,6 +36,11 @@ VALUE_DIGITS = 3  # of a value with its interval
 def effect_in_words(effect: str) -> str:
     """The name of an effect in a sentence; ValueError for an id that no effect has."""
     return effect_named(effect).words
+
+
+def compared_in_words(simulation: Simulation) -> str:
+    """What the recording is compared with, before anything is found."""
+    return COMPARED[simulation.kind]
 
 
 def finding_in_words(arm: Arm, claim: Claim) -> str:
@@ -139,8 +152,15 @@ def format_probability(value: float) -> str:
 
 
 def format_share(value: float) -> str:
-    """A share in percent, `below 0.1 %` where it is that small."""
+    """A share in percent, `below 0.1 %` where it is that small, `above 99.9 %` where it is nearly all."""
+    if 0.9995 <= value < 1 - 1e-9:
+        return "above 99.9 %"
     return "below 0.1 %" if 0 <= value < 0.001 else f"{100 * value:.1f} %"
+
+
+def format_growth(before: float, after: float) -> str:
+    """`42 times as large` of an error without a finding, before, and with it, after."""
+    return f"{format_number(before / max(after, 1e-300), 3 if before < 2 * after else 2)} times as large"
 
 
 def format_gap(closed: float | None) -> str:

@@ -16,7 +16,7 @@ from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report import content, measured
 from armlab.diagnosis.report.gallery import Gallery, draw_gallery
 from armlab.diagnosis.report.residuals import select_residuals
-from armlab.diagnosis.report.verdict import verdict_lines, verdict_sentences
+from armlab.diagnosis.report.verdict import first_screen, verdict_lines
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings, guards_without, vary
 from armlab.diagnosis.signals_file import SIGNALS_FILE, check_signals_writer, diagnosis_tracks, signals_content
@@ -41,8 +41,8 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
         "report.html",
         f"Diagnosis of {diagnosis.recording.name} ({diagnosis.simulation.arm.name})",
         status=diagnosis.status,
-        verdict=verdict_sentences(diagnosis),
-        story=content.story_text(diagnosis),
+        first=first_screen(diagnosis),
+        share_note=content.SHARE_NOTE if diagnosis.claims else "",
         setup=content.setup_part(diagnosis),
         joints=measured.joint_table(diagnosis) if diagnosis.claims else None,
         bodies=measured.body_sentences(diagnosis),

@@ -1,6 +1,7 @@
 """From files of other formats to a recording folder: the last step of an import, and what it says about itself."""
 
 import os
+import re
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from pathlib import Path
 
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
+from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.plan import ImportPlan, plan_import
 from armlab.recordings.imports.questions import Options
 from armlab.recordings.imports.sources import Source
@@ -54,14 +56,16 @@ class ImportedRecording:
             "columns": self.plan.columns,
             "units": self.plan.units,
             "reasons": {"columns": self.plan.column_reasons, "units": self.plan.unit_reasons},
+            "doubts": self.plan.doubts,
         }
 
 
 def import_files(files: Sequence[Path], out: Path, options: Options) -> ImportedRecording:
     """Writes the recording, and tells how each file was read and what each signal was taken from.
 
-    options: robot, tip, lock, the columns of each signal, units, gains, joints, validate, separator, decimal, topic and
-    command_topic; None if not given. Raises InputError for a wrong option, and for all missing ones together.
+    options: robot, tip, lock, the columns of each signal, units, gains, gear_ratio, motor_side, joints, validate,
+    separator, decimal, topic and command_topic; None if not given. Raises InputError for a wrong option, and for all
+    missing ones together.
     """
     return write_plan(plan_import(files, {**options, "out": out}))
 
@@ -82,6 +86,7 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     columns: Keys = {signal: names[0] if signal == "time" else names for signal, names in plan.columns.items()}
     others = {
         **({"gains": list(plan.gains)} if plan.gains else {}),
+        **({"transmission": plan.gear.transmission("torque" in columns)} if plan.gear else {}),
         **({"joints": list(plan.joints)} if plan.joints else {}),
     }
     note = tuple(f"{run.file}: imported from {Path(path).name}" for path, run in zip(plan.sources, runs, strict=True))
@@ -100,18 +105,49 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
 
 
 def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
-    """How each file was read, what each signal was taken from, and why, as far as that is known: names and texts."""
+    """How each file was read, what each signal was taken from and why, one row a signal, and what is doubtful.
+
+    Names and texts.
+    """
     rows = [(path, _describe_source(source)) for path, source in plan.sources.items()]
     if plan.robot:
         rows.append(("robot", "; ".join(filter(None, (plan.robot.source, plan.robot.locked)))))
     for signal, names in plan.columns.items():
-        rows.append((signal, f"{', '.join(names)} [{_describe_unit(plan, signal)}]"))
-        rows.append((f"{signal} columns", plan.column_reasons[signal]))
-        if signal in plan.units:
-            rows.append((f"{signal} unit", f"{_describe_unit(plan, signal)}: {plan.unit_reasons[signal]}"))
+        rows.append((signal, _describe_signal(plan, signal, names)))
+    if plan.gear:
+        rows.append(("gear ratio", _describe_gear(plan.gear)))
     if plan.joints:
         rows.append(("joints", f"{', '.join(plan.joints)}; the others of the robot are held at zero"))
-    return rows
+    return [*rows, *(("doubtful", text) for text in plan.doubts)]
+
+
+MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and the last are named
+
+
+def _describe_signal(plan: ImportPlan, signal: str, names: Sequence[str]) -> str:
+    """`q1_rad ... q6_rad [rad] (usual names; unit from _rad)`."""
+    column, unit = plan.column_reasons[signal], plan.unit_reasons.get(signal)
+    why = column if unit is None or unit in column else f"{column}; unit {unit}"
+    return f"{list_columns(names)} [{_describe_unit(plan, signal)}] ({why})"
+
+
+def list_columns(names: Sequence[str]) -> str:
+    """All names, or the first and the last of names that differ in a number that counts up alone."""
+    parts = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
+    found = [part.groups() for part in parts if part]
+    if len(names) > MAX_LISTED_COLUMNS and len(found) == len(names):
+        counts = [int(number) for _, number, _ in found]
+        is_alike = len({(stem, end) for stem, _, end in found}) == 1
+        if is_alike and counts == list(range(counts[0], counts[0] + len(counts))):
+            return f"{names[0]} ... {names[-1]}"
+    return ", ".join(names)
+
+
+def _describe_gear(gear: Gear) -> str:
+    """Which signals were divided or multiplied by which ratios."""
+    ratios = ", ".join(f"{ratio:g}" for ratio in gear.ratios)
+    what = ["positions divided"] * gear.position + ["torques multiplied"] * gear.torque
+    return f"{' and '.join(what)} by {ratios}"
 
 
 def _describe_unit(plan: ImportPlan, signal: str) -> str:

@@ -11,7 +11,10 @@ from pathlib import Path
 from armlab.common.errors import InputError, UndecidedError
 from armlab.common.settings import suggest_name
 from armlab.recordings.imports.columns import Log, choose_columns, choose_commands
+from armlab.recordings.imports.doubtful import doubtful_units
+from armlab.recordings.imports.gears import Gear, choose_gear
 from armlab.recordings.imports.impossible import ask_impossible_units
+from armlab.recordings.imports.numbers import read_numbers
 from armlab.recordings.imports.proposals import propose_robot
 from armlab.recordings.imports.questions import Options, Question
 from armlab.recordings.imports.robots import ImportedRobot, read_robot
@@ -31,8 +34,9 @@ class ImportPlan:
 
     options: as they were given. robot: None while it is open. sources: by the path of the run. columns: names by the
     signal. units: of each signal, one for all its columns or one a column. column_reasons, unit_reasons: why these, by
-    the signal. gains: of the torque, where it is in A or V. joints: of the robot, in the order of the columns, where
-    the recording has only some of them.
+    the signal. gains: of the torque, where it is in A or V. gear: of signals that were measured at the motors. joints:
+    of the robot, in the order of the columns, where the recording has only some of them. doubts: what is probably, but
+    not surely, read in a wrong unit.
     """
 
     options: Options
@@ -43,16 +47,18 @@ class ImportPlan:
     column_reasons: Mapping[str, str] = field(default_factory=dict)
     unit_reasons: Mapping[str, str] = field(default_factory=dict)
     gains: tuple[float, ...] | None = None
+    gear: Gear | None = None
     joints: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
     questions: tuple[Question, ...] = ()
 
 
 def plan_import(files: Sequence[Path], options: Options, read: ReadSources = read_sources) -> ImportPlan:
     """What is known of an import, and the questions that are open.
 
-    options: out, robot, tip, lock, the columns of each signal, units, gains, joints, validate, separator, decimal,
-    topic, command_topic. read: reads a file; a form that plans after each answer gives one that keeps what it read.
-    Raises InputError for an option that cannot be right, whatever the answers to the questions are.
+    options: out, robot, tip, lock, the columns of each signal, units, gains, gear_ratio, motor_side, joints, validate,
+    separator, decimal, topic, command_topic. read: reads a file; a form that plans after each answer gives one that
+    keeps what it read. Raises InputError for an option that cannot be right, whatever the answers to the questions are.
     """
     robot, undecided = _read_robot(options)
     arm = robot.arm if robot else None
@@ -72,11 +78,14 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     columns = {signal: known.value for signal, known in chosen_columns.items()}
     _check_sources(sources, columns)
     _check_order(columns)
-    chosen_units, unmeasured = choose_units(log, columns)
+    count = len(columns["position"]) if "position" in columns else None
+    gear = choose_gear(options, count)
+    chosen_units, unmeasured = choose_units(log, columns, gear)
     units = {name: known.value[0] if len(known.value) == 1 else known.value for name, known in chosen_units.items()}
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
-    impossible = ask_impossible_units(log, sources, columns, units, gains)
-    count = len(columns["position"]) if "position" in columns else None
+    numbers = read_numbers(log, sources, columns, units, gear)
+    impossible = ask_impossible_units(numbers, units, gains, log.source.same_units)
+    doubts = () if impossible or unscaled else doubtful_units(numbers, arm, units, gains, gear)
     robots = () if robot else (undecided or _ask_robot(files[0], count, log.joints),)
     return ImportPlan(
         options=options,
@@ -87,6 +96,8 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         column_reasons={signal: known.reason for signal, known in chosen_columns.items()},
         unit_reasons={signal: known.reason for signal, known in chosen_units.items()},
         gains=gains,
+        gear=gear,
+        doubts=doubts,
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
         questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
     )

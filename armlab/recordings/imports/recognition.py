@@ -95,7 +95,7 @@ class Known:
 def recognise_time(names: Sequence[str]) -> Known | None:
     """The time column, by its name."""
     found = next((name for name in names if _split_unit(name).stem in TIME_NAMES), None)
-    return Known((found,), "a usual name of stamps") if found is not None else None
+    return Known((found,), "a usual name") if found is not None else None
 
 
 def time_unit(name: str, stamps: Array) -> Known | None:
@@ -111,7 +111,7 @@ def time_unit(name: str, stamps: Array) -> Known | None:
     fitting = [name for name, unit in TIME_UNITS.items() if RATES_HZ[0] <= rate / unit.factor <= RATES_HZ[1]]
     if not fitting:
         return None
-    return Known((fitting[0],), f"the steps make {rate / TIME_UNITS[fitting[0]].factor:.4g} Hz, a usual rate")
+    return Known((fitting[0],), f"by its steps, {rate / TIME_UNITS[fitting[0]].factor:.4g} Hz")
 
 
 def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -> Known | None:
@@ -127,7 +127,7 @@ def recognise_signal(names: Sequence[str], signal: str, joints: Sequence[str]) -
         group = tuple(column.name for column in columns if column.stem == stem and column.key)
         if meaning.signal != signal or not group:
             continue
-        reason = f"named as in {meaning.writer}" if meaning.writer else f"usual names of {signal}"
+        reason = f"named as in {meaning.writer}" if meaning.writer else "usual names"
         if not joints:
             return Known(group, reason)
         own = tuple(name for name, owner in zip(group, _owners(group, joints), strict=True) if owner)
@@ -148,14 +148,13 @@ def unit_by_name(chosen: Sequence[str], names: Sequence[str]) -> Known | None:
         return Known((suffix,), _reason_of_suffix(chosen))
     known = STEMS.get(stem)
     if known is not None and known.unit is not None:
-        return Known((known.unit,), f"as in {known.writer}" if known.writer else "the name tells it")
+        return Known((known.unit,), f"as in {known.writer}" if known.writer else "as the name tells")
     franka = FRANKA_UNITS.get(stem) if any(split_name(name).stem == FRANKA_STEM for name in names) else None
     return Known((franka,), f"as in {FRANKA}") if franka else None
 
 
 def _reason_of_suffix(names: Sequence[str]) -> str:
-    whose = "the column's name ends" if len(names) == 1 else "the columns' names end"
-    return f"{whose} in _{names[0].rpartition('_')[2]}"
+    return f"from _{names[0].rpartition('_')[2]}"
 
 
 def split_name(name: str) -> Column:

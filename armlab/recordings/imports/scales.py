@@ -6,6 +6,7 @@ from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.channels import MAX_GAIN
 from armlab.recordings.imports.columns import Log
+from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.proposals import propose_unit
 from armlab.recordings.imports.questions import Question
 from armlab.recordings.imports.recognition import Known, time_unit, unit_by_name
@@ -29,10 +30,12 @@ UNIT_ALIASES = {
 }
 
 
-def choose_units(log: Log, columns: Mapping[str, tuple[str, ...]]) -> tuple[dict[str, Known], tuple[Question, ...]]:
+def choose_units(
+    log: Log, columns: Mapping[str, tuple[str, ...]], gear: Gear | None
+) -> tuple[dict[str, Known], tuple[Question, ...]]:
     """Units of each signal as given, else as the file or the names tell; a question for each that is missing.
 
-    One unit for all columns of a signal, or one a column where they differ.
+    One unit for all columns of a signal, or one a column where they differ. gear: a motor turns where its joint slides.
     """
     given = dict(_parse_unit_option(text) for text in log.options["units"])
     source = log.source
@@ -48,7 +51,8 @@ def choose_units(log: Log, columns: Mapping[str, tuple[str, ...]]) -> tuple[dict
                 units[signal] = Known(units[same].value, f"that of {same} in this format")
             continue
         if one is not None:
-            _check_unit(signal, one.value[0], log)
+            if gear is None or not gear.is_before(signal):
+                _check_unit(signal, one.value[0], log)
             units[signal] = one
         elif all(known):
             listed = tuple(unit for unit in known if unit)

@@ -73,7 +73,7 @@ def read_sources(path: Path, options: ReadOptions) -> dict[str, Source]:
             prefixes=LEROBOT_PREFIXES,
             not_angles=PERCENT_NAMES,
             same_units={"reference_position": "position"},
-            reason="LeRobot datasets have it",
+            reason="as in LeRobot datasets",
         )
         for name, table in read_lerobot(path).items()
     }
@@ -86,14 +86,14 @@ def _read_source(path: Path, options: ReadOptions) -> Source:
     if suffix in BAG_SUFFIXES or path.is_dir():
         table = read_bag(path, options.topic, options.commands, options.joints)
         note = "joint states; rad, rad/s and N.m by ROS convention"
-        return Source(table, _bag_units(table), note, BAG_PREFIXES, reason="ROS messages have it")
+        return Source(table, _bag_units(table), note, BAG_PREFIXES, reason="as in ROS messages")
     if suffix == ".mat":
         return Source(read_mat(path), {}, "MATLAB variables")
     if suffix == ".parquet":
         return Source(read_table(path), {}, "Parquet columns")
     if suffix in TEXT_SUFFIXES:
         text = read_odd_csv(path, options.separator, options.decimal)
-        return Source(text.table, text.units, str(text.layout), reason="the header names it")
+        return Source(text.table, text.units, str(text.layout), reason="from the header")
     known = ", ".join((".mat", ".parquet", *BAG_SUFFIXES, *TEXT_SUFFIXES))
     raise InputError(f"cannot import {path}: its ending should be one of {known}, or it should be a bag's folder")
 

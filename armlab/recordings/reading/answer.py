@@ -60,8 +60,8 @@ class SetupFinding:
         """What is wrong, and the evidence."""
         worst = joint_in_words(self.arm, self.worst_joint)
         return (
-            f"{self.description} (read so, the held-out error of {worst} falls from "
-            f"{self.share_before:.0%} to {self.share_after:.0%} of its torque)"
+            f"{self.description} (read so, links and usual friction fit {worst} with an error of "
+            f"{100 * self.share_after:.0f} % of its torque, not {100 * self.share_before:.0f} %)"
         )
 
 
@@ -96,8 +96,8 @@ class Answer:
         zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
         told = f" These data do not tell the zero of {zeros} by quarters of a turn." if zeros else ""
         return (
-            f"The recording is read wrongly: {mistakes}. Read rightly, the held-out error falls from {self.share:.1%} "
-            f"to {self.share_after:.1%} of the torque.{told}"
+            f"The recording is read wrongly: {mistakes}. Read rightly, links and usual friction fit with an error of "
+            f"{100 * self.share_after:.1f} % of the torque, not {100 * self.share:.1f} %.{told}"
         )
 
     def reason_inconclusive(self, tuning: ReadingTuning) -> str | None:
