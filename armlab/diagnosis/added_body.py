@@ -225,7 +225,7 @@ def _split_among_bodies(model: FittedModel) -> Array:
 
     Joints feel sums of links' parameters alone. How a sum that is found is split among the links that are off is the
     prior's guess, and may be no body where another split is one: found by projections on bodies and on what feels the
-    same, in turn (Bauschke and Borwein 1996).
+    same, in turn.
     """
     found, prior = inertial_parameters(model).reshape(-1, 10), model.design.prior
     off = np.array([bool(width) for width in model.state.widths or (0.0,) * len(found)])

@@ -39,9 +39,9 @@ from armlab.diagnosis.prediction import (
     fit_prediction,
     with_smoothing_of,
 )
-from armlab.diagnosis.pruning import Pruned, lasts, prefer_one_body, prune, withdraw
+from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
-from armlab.diagnosis.settings import Baseline, Settings, vary
+from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.story import with_story
@@ -163,23 +163,7 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
 
 
 def find_names(design: DesignMatrix, seed: int, progress: Progress) -> "NamedEffects":
-    """The effects that a search finds and that pass all tests.
-
-    Where a link is as far off as the widest that is tried, the bound has chosen and not the data: what the link does
-    not hold is then taken by other laws. All is looked for once more with links that may be further off, and taken if
-    that predicts held-out rows as well with no more effects that not every arm has.
-    """
-    named = _search_names(design, seed, progress)
-    links, widths = design.settings.tuning.links, named.model.state.widths or (0.0,)
-    if max(widths) < max(links.single_link_grid):
-        return named
-    settings = vary(design.settings, "links.single_link_grid", (*links.single_link_grid, *links.far_link_grid))
-    again = _search_names(replace(design, settings=settings), seed, progress)
-    effects = [each.model.solver.crowd(each.model.state.groups) for each in (named, again)]
-    return again if effects[1] <= effects[0] and lasts(named.model, again.model) else named
-
-
-def _search_names(design: DesignMatrix, seed: int, progress: Progress) -> "NamedEffects":
+    """The effects that a search finds and that pass all tests."""
     return _keep_what_holds(search_effects(fit_background(design, library(), seed, progress), progress), progress)
 
 

@@ -70,25 +70,6 @@ def initial_link_widths(design: DesignMatrix) -> Widths | None:
     return (design.settings.tuning.links.initial_width,) * design.prior.links
 
 
-def opened_state(solver: Solver, design: DesignMatrix) -> State:
-    """Usual friction and offsets beside links that may be off, all alike; or one of them far, where that is looked for.
-
-    The likeliest of these: beside a link that is off by far more, other laws would take what its width does not hold.
-    """
-    widths = initial_link_widths(design)
-    alike = background_state(solver, widths)
-    if widths is None:
-        return alike
-    tuning = design.settings.tuning.links
-    sizes = set(tuning.single_link_grid) & set(tuning.far_link_grid)
-    one_more = [
-        State(alike.groups, tuple(size if other == link else width for other, width in enumerate(widths)))
-        for size in sorted(sizes)
-        for link in range(len(widths))
-    ]
-    return max((alike, *one_more), key=lambda state: solver.fit(state).score)
-
-
 def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, progress: Progress) -> FittedModel:
     """Friction and links fitted, every candidate on the design, and errors taken as coloured for the first time.
 
@@ -96,7 +77,9 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     """
     progress("fitting links and friction")
     plain = design.with_candidates(family for family in families if family.facts.usual)
-    first = _fit_model(plain, _white_noise(plain.target, plain), lambda solver: opened_state(solver, plain))
+    first = _fit_model(
+        plain, _white_noise(plain.target, plain), lambda solver: background_state(solver, initial_link_widths(plain))
+    )
     moved = _follow_model(first)
     progress("looking for candidates")
     left = first.residual(first.fit)
@@ -104,7 +87,9 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     tuning = design.settings.tuning.surrogate
     made = tuple(flexible_features(moved.observed, joint, rng, tuning) for joint in range(moved.observed.joints))
     whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made)
-    rough = _fit_model(whole, _white_noise(left, whole), lambda solver: opened_state(solver, whole))
+    rough = _fit_model(
+        whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
+    )
     guards = replace(design.settings.guards, backward_elimination=False)
     forward = Search(rough.solver, replace(design.settings, guards=guards), True, 0)
     steps: list[Step] = []
@@ -154,7 +139,7 @@ def _search_state(
     if afresh:
         starts.append(State((), at_rest))
     if afresh and settings.guards.background_start:
-        starts.append(opened_state(base.solver, design))
+        starts.append(background_state(base.solver, opened))
     state, moves = Search(base.solver, settings, opened is None, links).best(starts)
     return replace(base, state=state, steps=(*steps, *moves))
 

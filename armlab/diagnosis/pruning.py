@@ -67,7 +67,7 @@ def _prune_and_search(model: FittedModel, banned: frozenset[int], fixed: bool = 
         if searched.state == passed[0].state:
             break
         again = _remove_failing(searched, passed[2])
-        if not lasts(passed[0], again[0]):
+        if not _lasts(passed[0], again[0]):
             step = Step("back to what passed before: what was found beside it does not last", passed[0].fit.score)
             return replace(passed[0], steps=(*again[0].steps, step)), passed[1], again[2]
         passed = again
@@ -107,10 +107,10 @@ def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
     if searched.state == model.state:
         return pruned
     again = _settle_links(_remove_failing(searched, banned))
-    return again if again[0].fit.score > model.fit.score and lasts(model, again[0]) else pruned
+    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
 
 
-def lasts(before: FittedModel, after: FittedModel) -> bool:
+def _lasts(before: FittedModel, after: FittedModel) -> bool:
     """Whether what a search has changed predicts held-out rows as well as before."""
     tolerance = after.design.settings.tuning.claims.body_tolerance
     errors = [each.moments.heldout_error(each.fit.coefficients) for each in (before, after)]

@@ -148,12 +148,6 @@ class LinkTuning:
         meaning="widths of one link, which may carry what the simulation does not know",
         least=1e-6,
     )
-    far_link_grid: tuple[float, ...] = tuned(
-        (1.6, 5.0),
-        unit="of the links' inertia",
-        meaning="widths of one link that are tried, too, where the search takes the widest of the others",
-        least=1e-6,
-    )
     initial_width: float = tuned(
         0.08, unit="of the links' inertia", meaning="width of all links in the first fit", least=1e-6
     )
