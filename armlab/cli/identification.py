@@ -120,7 +120,9 @@ def _add_load_options(command: Callable[..., None]) -> Callable[..., None]:
 
 @click.command()
 @click.argument("loaded", type=click.Path(path_type=Path))
-@click.option("--without", type=click.Path(path_type=Path), help="Recording without the load [default: the CAD links].")
+@click.option(
+    "--without", type=click.Path(path_type=Path), help="Recording without the load [default: the robot file]."
+)
 @click.option(
     "--centre",
     type=FiniteNumber(min=-100, max=100),
@@ -139,11 +141,16 @@ def payload(
 ) -> ResultLines:
     """Identify the load that an arm carries in LOADED.
 
-    LOADED: a recording folder.
+    LOADED: a recording folder. Without --without the robot file stands for the arm without the load, and what else it
+    lacks is found as `diagnose` finds it.
     """
+    from armlab.diagnosis.load import nominal_payload_lines
     from armlab.identification.payload import PayloadSetting, Place, payload_lines
 
-    return payload_lines(loaded, without, PayloadSetting(Place(link, centre), counterbalance, cutoff_hz))
+    setting = PayloadSetting(Place(link, centre), counterbalance, cutoff_hz)
+    if without is None:
+        return nominal_payload_lines(loaded, setting, tell_progress)
+    return payload_lines(loaded, without, setting)
 
 
 @click.command()

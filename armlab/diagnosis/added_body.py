@@ -27,7 +27,7 @@ from armlab.effects.links import (
     felt_values,
     pseudo_inertia_parts,
 )
-from problem.pseudo_inertia import pseudo_inertias
+from problem.pseudo_inertia import parameters_of, pseudo_inertias
 
 BALL_MASS = 10.0  # kg, where the search for a body begins
 MAX_NEWTON_STEPS, MIN_STEP_SHARE = 100, 1e-9
@@ -36,6 +36,9 @@ NEWTON_TOLERANCE, PATH_TOLERANCE = 1e-3, 0.1  # of the log likelihood
 PATH_FACTOR = 30.0  # by which the data weigh more at each stage of the path
 MIN_CURVATURE = 1e-9  # less is no maximum
 BODY_CHANGE = 0.01  # of a body's ten parameters: less does not change what is beside it
+KILOGRAMS = np.array([1.0, *[1 / BODY_SIZE_M] * 3, *[1 / BODY_SIZE_M**2] * 6])  # of ten parameters
+MAX_PROJECTIONS = 2000
+LEAST_SPREAD = 1e-6  # of a body's largest eigenvalue, so that projections end among bodies and not at their edge
 EIGENVALUE_SHARE = 0.02  # of a pseudo-inertia's largest eigenvalue: a point has no spread, and a little less is noise
 
 
@@ -202,8 +205,7 @@ def _ten_of(bodies: Array) -> Array:
 
 def is_possible_body(ten: Array, tolerance: float = EIGENVALUE_SHARE) -> bool:
     """Whether ten parameters are those of a body; tolerance: of the largest eigenvalue, in kilograms."""
-    kilograms = ten * np.array([1.0, *[1 / BODY_SIZE_M] * 3, *[1 / BODY_SIZE_M**2] * 6])
-    values = np.linalg.eigvalsh(pseudo_inertias(kilograms)[0])
+    values = np.linalg.eigvalsh(pseudo_inertias(ten * KILOGRAMS)[0])
     return bool(ten[0] > 0 and values[0] >= -tolerance * float(values[-1]))
 
 
@@ -211,11 +213,43 @@ def possible_links(model: FittedModel, links: dict[int, Evidence]) -> tuple[Fitt
     """The links (from 0) that are bodies as they were found, what they are off included; the log says of the others."""
     if not model.design.settings.guards.physics_signs:
         return model, links
-    found = inertial_parameters(model).reshape(-1, 10)
+    found = _split_among_bodies(model)
     kept = {link: each for link, each in links.items() if is_possible_body(found[link], EIGENVALUE_TOLERANCE)}
     why = "no body has the mass, centre and inertia that these data give it"
     gone = tuple(Step(f"withdrawn: link {link + 1}: {why}", 0.0) for link in links if link not in kept)
     return replace(model, steps=(*model.steps, *gone)), kept
+
+
+def _split_among_bodies(model: FittedModel) -> Array:
+    """Parameters of all links, (joints, 10): bodies, as far as the joints feel the same torque of them.
+
+    Joints feel sums of links' parameters alone. How a sum that is found is split among the links that are off is the
+    prior's guess, and may be no body where another split is one: found by projections on bodies and on what feels the
+    same, in turn.
+    """
+    found, prior = inertial_parameters(model).reshape(-1, 10), model.design.prior
+    off = np.array([bool(width) for width in model.state.widths or (0.0,) * len(found)])
+    if prior is None or not off.any():
+        return found
+    units = np.tile(KILOGRAMS, int(off.sum()))
+    felt = prior.grouping.reshape(len(prior.grouping), -1, 10)[:, off].reshape(len(prior.grouping), -1) / units
+    unfelt = np.eye(len(units)) - np.linalg.pinv(felt) @ felt
+    start = found[off].ravel() * units
+    split = start
+    for _ in range(MAX_PROJECTIONS):
+        if all(is_possible_body(each, 0.0) for each in (split / units).reshape(-1, 10)):
+            break
+        bodies = np.concatenate([_nearest_body(each) for each in split.reshape(-1, 10)])
+        split = start + unfelt @ (bodies - start)
+    found[off] = (split / units).reshape(-1, 10)
+    return found
+
+
+def _nearest_body(ten: Array) -> Array:
+    """The body nearest to ten parameters in kilograms, with a little spread in every direction."""
+    values, vectors = np.linalg.eigh(pseudo_inertias(ten)[0])
+    least = LEAST_SPREAD * float(values[-1])
+    return parameters_of(((vectors * np.maximum(values, least)) @ vectors.T)[None])
 
 
 def predicts_as_well(error: Array, other: Array, tolerance: float) -> bool:

@@ -1,7 +1,8 @@
 """The diagnosis of a recording, step by step.
 
 `diagnose` is the whole flow: filter the runs and make the columns (`prepare`), fit links and usual friction
-(`fit_background`), search effects (`search_effects`), test and name them (`conclude`).
+(`fit_background`), search effects (`search_effects`), test and name them
+(`find_names`), state their numbers (`state_numbers`).
 """
 
 import time
@@ -94,8 +95,8 @@ def diagnose(
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
         return with_setup(replace(design, signs=signs), setup, read_after)
-    searched = search_effects(fit_background(design, library(), seed, progress), progress)
-    found = replace(conclude(recording, searched, progress), signs=signs, seconds=time.perf_counter() - started)
+    numbered = state_numbers(recording, find_names(design, seed, progress), progress)
+    found = replace(numbered, signs=signs, seconds=time.perf_counter() - started)
     return with_setup(found, setup, read_after)
 
 
@@ -144,8 +145,11 @@ def prepare(
 
 def conclude(recording: Recording, searched: FittedModel, progress: Progress) -> Diagnosis:
     """Tests what a search found, withdraws names that do not hold, fits the model that predicts, and states numbers."""
-    progress("testing claims")
-    named = name_effects(prefer_one_body(find_friction_curves(prune(searched))))
+    return state_numbers(recording, _keep_what_holds(searched, progress), progress)
+
+
+def state_numbers(recording: Recording, named: "NamedEffects", progress: Progress) -> Diagnosis:
+    """Fits the model that predicts beside names that hold, and states numbers."""
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
     tuning = named.model.design.settings.tuning
@@ -156,6 +160,16 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
     model, claims = links_that_data_tell(model, make_claims(model, effects, named.links, prediction), remains)
     claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
     return with_story(_assemble(recording, model, prediction, claims, unknowns, remains))
+
+
+def find_names(design: DesignMatrix, seed: int, progress: Progress) -> "NamedEffects":
+    """The effects that a search finds and that pass all tests."""
+    return _keep_what_holds(search_effects(fit_background(design, library(), seed, progress), progress), progress)
+
+
+def _keep_what_holds(searched: FittedModel, progress: Progress) -> "NamedEffects":
+    progress("testing claims")
+    return name_effects(prefer_one_body(find_friction_curves(prune(searched))))
 
 
 @dataclass(frozen=True, eq=False)

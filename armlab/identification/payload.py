@@ -17,7 +17,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.documents import Document, ResultLines
 from armlab.common.errors import DataError, InputError
-from armlab.effects.drive import RotorInertia, TorqueOffset
+from armlab.effects.drive import TorqueOffset
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.estimators.least_squares import WeightedLeastSquares, joint_weights
@@ -30,9 +30,8 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording, Run
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
-from problem.motion import Motion
 from problem.pseudo_inertia import link_from_centre_of_mass, link_of, pseudo_inertias
-from problem.regressor import observation_matrix, rigid_body_torque
+from problem.regressor import observation_matrix
 
 EIGENVALUE_TOLERANCE = 1e-12  # of a body: a point mass has eigenvalues of zero
 
@@ -135,16 +134,16 @@ class TorqueGains:
 def identify_payload(
     structure: Structure, without: Sequence[Signals], loaded: Sequence[Signals], place: Place | None = None
 ) -> Payload:
-    """The load that some runs carry, as the body that can exist and explains them best.
+    """The load that some runs carry and others do not, as the body that can exist and explains them best.
 
-    without: runs without it; if there are none, the arm's own links stand for them. Raises ValueError where no
-    run is loaded, or where these motions do not determine the parameters of the load.
+    Raises ValueError where runs of either kind are missing, or where these motions do not determine the parameters of
+    the load.
     """
     place = place or Place()
-    if not loaded:
-        raise DataError("runs with the load are needed")
+    if not without or not loaded:
+        raise DataError("runs with the load and runs without it are needed")
     columns = np.vstack([place.columns(structure, each) for each in loaded])
-    data = _append_columns(_unloaded_regression(structure, without, loaded), columns)
+    data = _append_columns(regression(structure, [*without, *loaded]), columns)
     _check_load_columns(data.matrix, columns.shape[1])
     estimate = WeightedLeastSquares()(data)
     spread = uncertainty(data, estimate)
@@ -177,24 +176,6 @@ def torque_gains(
     return TorqueGains(gains, half)
 
 
-def _unloaded_regression(structure: Structure, without: Sequence[Signals], loaded: Sequence[Signals]) -> Regression:
-    """The regression of the unloaded arm over all runs: free links, or nominal ones whose torque is known."""
-    data = regression(structure, [*without, *loaded])
-    if without:
-        return data
-    known = [each.filter(_nominal_torque(structure, each.motion)).ravel() for each in loaded]
-    own = slice(len(structure.base), None)
-    return replace(data.columns(own), torque=data.torque - np.concatenate(known))
-
-
-def _nominal_torque(structure: Structure, motion: Motion) -> Array:
-    """Torque of the arm's own links, and of its rotors where the structure does not seek them."""
-    arm = structure.arm
-    sought = any(isinstance(part, RotorInertia) for part in structure.components)
-    rotors = np.zeros(len(arm)) if sought or not arm.rotor_inertia else np.array(arm.rotor_inertia)
-    return rigid_body_torque(arm, motion, arm.parameters) + motion.acceleration * rotors
-
-
 def _append_columns(data: Regression, columns: Array) -> Regression:
     padded = np.vstack([np.zeros((len(data.torque) - len(columns), columns.shape[1])), columns])
     return replace(data, matrix=np.hstack([data.matrix, padded]))
@@ -215,6 +196,16 @@ LOAD_POSITION_FACTOR = 2.0  # columns then lose nothing to the torque, and loads
 
 
 @dataclass(frozen=True)
+class Number:
+    """A number of a load with half of its 95 % interval."""
+
+    name: str
+    value: float
+    half_width: float
+    unit: str
+
+
+@dataclass(frozen=True)
 class PayloadSetting:
     """What a person says of the load and the arm: see the options of the commands.
 
@@ -225,6 +216,12 @@ class PayloadSetting:
     counterbalanced: int | None = None
     cutoff_hz: float | None = None
 
+    def check(self, arm: Arm) -> None:
+        """Raises InputError for a link or a joint that the arm does not have."""
+        for what, joint in (("--link", self.place.link), ("--counterbalance", self.counterbalanced)):
+            if joint is not None and joint > len(arm):
+                raise InputError(f"{what} {joint} should be one from 1 to {len(arm)}")
+
 
 @dataclass(frozen=True, eq=False)
 class _PayloadTask:
@@ -233,61 +230,67 @@ class _PayloadTask:
     without: Sequence[Signals]
 
     @staticmethod
-    def of(loaded: Path, without: Path | None, setting: PayloadSetting) -> "_PayloadTask":
+    def of(loaded: Path, without: Path, setting: PayloadSetting) -> "_PayloadTask":
         """Reads the recordings; the runs that identify take part, by one cut-off."""
-        carrying = load_recording(loaded)
-        bare = load_recording(without) if without else None
-        arm = carrying.arm
-        if bare is not None and len(bare.arm) != len(arm):
-            raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(arm)}")
-        if bare is None and arm.links is None:
-            raise InputError(f"--without is needed: the robot {arm.name} has no nominal `links` to stand for it")
-        for what, joint in (("--link", setting.place.link), ("--counterbalance", setting.counterbalanced)):
-            if joint is not None and joint > len(arm):
-                raise InputError(f"{what} {joint} should be one from 1 to {len(arm)}")
-        runs = _identification_runs(carrying), _identification_runs(bare) if bare else ()
+        carrying, bare = load_recording(loaded), load_recording(without)
+        if len(bare.arm) != len(carrying.arm):
+            raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(carrying.arm)}")
+        setting.check(carrying.arm)
+        runs = identification_runs(carrying), identification_runs(bare)
         cutoff = setting.cutoff_hz or max(map(suggested_cutoff, (*runs[0], *runs[1])))
         signals = ([signals_of(run, cutoff, LOAD_POSITION_FACTOR) for run in each] for each in runs)
-        return _PayloadTask(_payload_structure(arm, setting, nominal=bare is None), *signals)
+        return _PayloadTask(_payload_structure(carrying.arm, setting), *signals)
 
 
-def _identification_runs(recording: Recording) -> tuple[Run, ...]:
+def identification_runs(recording: Recording) -> tuple[Run, ...]:
+    """The runs of a recording that identify; InputError where it has none."""
     runs = recording.with_role("identify")
     if not runs:
         raise InputError(f"{recording.folder} has no run to identify from: give one of its runs the role identify")
     return runs
 
 
-def _payload_structure(arm: Arm, setting: PayloadSetting, nominal: bool) -> Structure:
-    """The usual components; rotors that the nominal arm names are not sought beside its links."""
-    known = nominal and arm.rotor_inertia
-    usual = tuple(part for part in usual_components(arm) if not (known and isinstance(part, RotorInertia)))
+def _payload_structure(arm: Arm, setting: PayloadSetting) -> Structure:
+    """The usual components, and the spring of a counterbalance."""
     spring = counterbalance_groups(arm, setting.counterbalanced)["spring"] if setting.counterbalanced else ()
     sprung = [part.joint for part in spring]  # the spring's rest angle takes the offset in
-    taken = tuple(part for part in usual if not isinstance(part, TorqueOffset) or part.joint not in sprung)
-    structure = Structure(arm, (*taken, *spring))
-    return structure if nominal else structure.separable()[0]  # beside links that are held, nothing is absorbed by them
+    taken = tuple(
+        part for part in usual_components(arm) if not isinstance(part, TorqueOffset) or part.joint not in sprung
+    )
+    return Structure(arm, (*taken, *spring)).separable()[0]
 
 
-def payload_lines(loaded: Path, without: Path | None, setting: PayloadSetting) -> ResultLines:
+def payload_lines(loaded: Path, without: Path, setting: PayloadSetting) -> ResultLines:
     """The load of a recording, with intervals; InputError, in one line, where the recordings do not determine it."""
     task = _PayloadTask.of(loaded, without, setting)
     try:
         payload = identify_payload(task.structure, task.without, task.loaded, setting.place)
     except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
-    rows = list(_payload_rows(payload, mass_alone=setting.place.centre is not None))
-    yield from (_interval_line(*row) for row in rows)
-    link = setting.place.link or len(task.structure.arm)
-    return {"link": link, "parameters": {name: _interval(value, half, unit) for name, value, half, unit in rows}}
+    numbers = list(_payload_numbers(payload, mass_alone=setting.place.centre is not None))
+    yield from (number_line(each) for each in numbers)
+    return load_document(setting.place.link or len(task.structure.arm), numbers)
 
 
-def _payload_rows(payload: Payload, mass_alone: bool) -> Iterator[tuple[str, float, float, str]]:
-    """Name, value, half width of the interval and unit of each number of a load."""
+def _payload_numbers(payload: Payload, mass_alone: bool) -> Iterator[Number]:
+    """Each number of a load."""
     rows = list(zip(PARAMETER_NAMES, payload.parameters, payload.half_widths, PARAMETER_UNITS, strict=True))
-    yield from rows[: 1 if mass_alone else 10]
     if not mass_alone and payload.parameters[0] > 0:
-        yield from zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, ["m"] * 3, strict=True)
+        rows += zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, ["m"] * 3, strict=True)
+    yield from (Number(*row) for row in rows[: 1 if mass_alone else None])
+
+
+def load_document(link: int, numbers: Sequence[Number]) -> Document:
+    """A load as a document: its link (from 1) and its numbers."""
+    return {
+        "link": link,
+        "parameters": {each.name: _interval(each.value, each.half_width, each.unit) for each in numbers},
+    }
+
+
+def number_line(number: Number) -> str:
+    """A number with its interval in a line."""
+    return _interval_line(number.name, number.value, number.half_width, number.unit)
 
 
 def _interval(value: float, half: float, unit: str) -> Document:

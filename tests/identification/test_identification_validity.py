@@ -144,7 +144,7 @@ def test_a_known_payload_shows_the_gain_of_each_joints_torque() -> None:
 
 def test_a_payload_needs_runs_with_it_and_gains_runs_of_both_kinds() -> None:
     model, without = six_joint_run(np.zeros(10), 1, np.ones(6))
-    with pytest.raises(ValueError, match="runs with the load are needed"):
+    with pytest.raises(ValueError, match="runs with the load and runs without it are needed"):
         identify_payload(model, [without], [])
     with pytest.raises(ValueError, match="runs without it are needed"):
         torque_gains(model, [], [without], link_of(LOAD))
