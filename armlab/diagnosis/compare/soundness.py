@@ -98,7 +98,7 @@ def runs_differ_as_much(table: ChangeTable, found: Sequence[Tested], tested: Tes
         return False
     difference, _ = between_ends(table, tested)
     scatter = scatter_between_runs(table, [each.group for each in found], tested.group)
-    return half_width_factor(tested.degrees) * np.sqrt(scatter.variance_along(difference)) > 1
+    return bool(half_width_factor(tested.degrees) * np.sqrt(scatter.variance_along(difference)) > 1)
 
 
 def _reason_no_body(pooled: Pooled, table: ChangeTable, tested: Tested) -> str | None:
