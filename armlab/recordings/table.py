@@ -3,6 +3,7 @@
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 
@@ -32,6 +33,17 @@ class Table:
     values: Array
     row_numbers: NDArray[np.intp]
     findings: tuple[Finding, ...] = ()
+
+    @cached_property
+    def empty(self) -> tuple[str, ...]:
+        """Columns without any number."""
+        return tuple(np.array(self.names)[np.isnan(self.values).all(axis=0)].tolist())
+
+    @property
+    def filled(self) -> tuple[str, ...]:
+        """Columns with numbers, which may be signals."""
+        empty = set(self.empty)
+        return tuple(name for name in self.names if name not in empty)
 
     def columns(self, wanted: Sequence[str], signal: str) -> Array:
         """The wanted columns (rows, wanted); InputError names the first that is missing."""

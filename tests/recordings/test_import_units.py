@@ -178,7 +178,6 @@ def spun(turns: float, seconds: float, wrapped: bool = False) -> pd.DataFrame:
         lambda table: table.assign(t=table["t"] * 1e3)[::200].head(7),  # poses with pauses
         lambda table: table.assign(**{name: table[name][0] for name in POSITION}, t=table["t"] * 200),  # at rest
         lambda table: table.head(1),
-        lambda table: table.assign(q2=np.nan),
     ],
 )
 def test_what_is_only_unusual_is_not_refused(tmp_path: Path, damage: Any) -> None:

@@ -80,6 +80,41 @@ def test_numbers_in_a_comment_are_no_measurement(tmp_path: Path) -> None:
     assert len(read_odd_csv(path).table.values) == len(frame())
 
 
+@pytest.mark.parametrize(("place", "cell"), [(3, ""), (3, "nan"), (7, ""), (7, "NaN")])
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+def test_a_column_without_numbers_is_no_signal(tmp_path: Path, separator: str, place: int, cell: str) -> None:
+    rows = [line.split(separator) for line in odd_text(separator).splitlines()]
+    for number, row in enumerate(rows):
+        row.insert(place, cell if number else "hollow")
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(map(separator.join, rows)) + "\n")
+    table = read_odd_csv(path).table
+    assert table.empty == ("hollow",)
+    assert_allclose(table.columns([name for name in table.names if name != "hollow"], "all"), frame(), rtol=1e-8)
+    lines = import_files([path], tmp_path / "new", OPTIONS).lines
+    assert "no signal, without any number: hollow" in lines[0]
+
+
+def test_a_separator_at_the_end_of_each_line_is_no_column(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text(";").replace("\n", ";\n"))
+    assert read_odd_csv(path).table.names == ("t", "q1", "q2", "q3", "tau1", "tau2", "tau3")
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("q1,q2,q3", "column q2 (position) is empty: it has no number in any row"),
+        ("q?", "--position q? names 2 columns (q1, q3; no number is in q2); the robot has 3 joints"),
+        ("q2*", "--position q2* names 0 columns (none; no number is in q2); the robot has 3 joints"),
+    ],
+)
+def test_a_chosen_column_without_numbers_is_refused_in_one_line(tmp_path: Path, given: str, message: str) -> None:
+    path = tmp_path / "log.csv"
+    frame().assign(q2="").to_csv(path, index=False)
+    assert message in refusal(import_files, [path], tmp_path / "new", {**OPTIONS, "position": given})
+
+
 def test_a_cut_last_row_of_an_odd_file_is_left_out_and_said_so(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text() + "9.9,0.1")
@@ -190,6 +225,9 @@ def test_a_recording_of_a_robot_with_a_gripper_holds_a_robot_file_of_its_arm(tmp
     assert "locked: hand (3 joints)" in refusal(import_files, [path], tmp_path / "recording", options)
     imported = import_files([path], tmp_path / "recording", {**options, "tip": "hand", "lock": ("finger1=0.02",)})
     assert any("locked: finger1 at 0.02, finger2 at 0.4" in line for line in imported.lines)
+    whole = tmp_path / "recording" / "whole-toy.urdf"
+    assert f"{whole}: the whole robot, for `armlab export-model`" in imported.lines
+    assert imported.document["whole_robot"] == whole
     shutil.move(tmp_path / "recording", tmp_path / "elsewhere")
     (tmp_path / "toy.urdf").unlink()
     assert [joint.name for joint in load_recording(tmp_path / "elsewhere").arm.joints] == ["joint1", "joint2", "joint3"]

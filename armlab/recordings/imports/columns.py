@@ -17,6 +17,7 @@ from armlab.recordings.imports.recognition import (
     recognise_time,
 )
 from armlab.recordings.imports.sources import Source
+from armlab.recordings.table import Table
 from armlab.recordings.units import SENSOR_SIGNALS, SIGNAL_QUANTITIES
 from problem.arm import Arm
 
@@ -94,14 +95,13 @@ def choose_columns(
     questions: list[Question] = []
     motion = bool(commands or unmatched or log.options.get("reference_position") is not None)
     settled = {question.option for question in unmatched if question.option not in commands}
-    names = log.source.table.names
     for signal in SIGNAL_QUANTITIES:
         given = log.options.get(signal)
         if given is None and signal in commands:
             columns[signal] = Known(commands[signal], "the format tells it, joints matched by name")
         elif given or (given is not None and signal != "reference_position"):
             try:
-                expanded = _expand_names(given, names, signal, log.joints, motion)
+                expanded = _expand_names(given, log.source.table, signal, log.joints, motion)
                 columns[signal] = Known(expanded, f"given with --{signal.replace('_', '-')}")
             except JointNamesError as error:
                 questions.append(_ask_columns(log, signal, columns, str(error)))
@@ -121,12 +121,13 @@ def choose_columns(
 
 
 def _recognise(log: Log, signal: str) -> Known | None:
-    names = log.source.table.names
+    names = log.source.table.filled
     return recognise_time(names) if signal == "time" else recognise_signal(names, signal, log.joints)
 
 
 def _ask_columns(log: Log, signal: str, columns: Mapping[str, Known], reason: str | None) -> Question:
-    names, values = log.source.table.names, log.source.table.values
+    table = log.source.table
+    names = table.filled
     shown = ", ".join(names[:SHOWN_COLUMNS]) + (", ..." if len(names) > SHOWN_COLUMNS else "")
     other = ", or --reference-position of a position servo" if signal == "torque" else ""
     flag = signal.replace("_", "-")
@@ -136,29 +137,30 @@ def _ask_columns(log: Log, signal: str, columns: Mapping[str, Known], reason: st
     if signal == "torque":
         text += f", or '{NO_TORQUE}' for a log of commands and positions"
     if signal == "time":
-        return Question(signal, missing, text, propose_time(names, values))
+        return Question(signal, missing, text, propose_time(table.names, table.values))
     chosen = {name: known.value for name, known in columns.items()}
     proposal = ",".join(propose_columns(names, signal, log.joints, chosen))
     return Question(signal, missing, text, proposal or None)
 
 
-def _expand_names(
-    given: str, names: Sequence[str], signal: str, joints: Sequence[str], some_joints: bool
-) -> tuple[str, ...]:
+def _expand_names(given: str, table: Table, signal: str, joints: Sequence[str], some_joints: bool) -> tuple[str, ...]:
     """Names and patterns with commas between them as column names, in the order of the robot's joints.
 
-    some_joints: whether a log of this kind may have some of the robot's joints.
+    A pattern names no column without numbers. some_joints: whether a log of this kind may have some of the robot's
+    joints.
     Raises InputError for a name that is no column, for more or fewer columns than the robot has joints, and for listed
     joints in another order than the robot's.
     """
-    wanted: list[str] = []
+    wanted, empty = list[str](), list[str]()
     listed = True
     for part in (part.strip() for part in given.split(",")):
         pattern = part.replace("[", "[[]")
-        found = [part] if part in names else [name for name in names if fnmatchcase(name, pattern)]
-        if not found:
-            raise InputError(f"no column '{part}' for {signal}: {suggest_name(part, names)}")
-        listed = listed and part in names
+        found = [part] if part in table.names else [name for name in table.filled if fnmatchcase(name, pattern)]
+        if part not in table.names:
+            empty += [name for name in table.empty if fnmatchcase(name, pattern)]
+        if not found and not empty:
+            raise InputError(f"no column '{part}' for {signal}: {suggest_name(part, table.filled)}")
+        listed = listed and part in table.names
         wanted += found
     chosen = tuple(wanted)
     twice = [name for name in chosen if chosen.count(name) > 1]
@@ -170,10 +172,11 @@ def _expand_names(
         return chosen
     if len(chosen) != len(joints):
         flag = signal.replace("_", "-")
-        shown = ", ".join(chosen)
+        shown = ", ".join(chosen) or "none"
+        hollow = f"; no number is in {', '.join(empty)}" if empty else ""
         other = ": name those that were recorded with --joints" if len(chosen) < len(joints) and some_joints else ""
         raise InputError(
-            f"--{flag} {given} names {len(chosen)} columns ({shown}); the robot has {len(joints)} joints{other}"
+            f"--{flag} {given} names {len(chosen)} columns ({shown}{hollow}); the robot has {len(joints)} joints{other}"
         )
     if listed:
         check_joint_order(chosen, joints, signal)

@@ -21,17 +21,20 @@ from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_record
 
 @dataclass(frozen=True, eq=False)
 class ImportedRecording:
-    """A recording that was written."""
+    """A recording that was written. whole_robot: the file of the whole robot, where joints are locked."""
 
     folder: Path
     plan: ImportPlan
     draft: Draft
+    whole_robot: Path | None
 
     @property
     def lines(self) -> list[str]:
         """How each file was read, what each signal was taken from, and what to do next."""
+        whole = f"{self.whole_robot}: the whole robot, for `armlab export-model`"
         return [
             *(f"{name}: {text}" for name, text in describe_plan(self.plan)),
+            *([whole] if self.whole_robot else []),
             f"{self.folder}: written; `armlab recording check {self.folder}` examines it",
         ]
 
@@ -42,6 +45,7 @@ class ImportedRecording:
         return {
             "recording": self.folder,
             "robot": self.draft.robot,
+            "whole_robot": self.whole_robot,
             "runs": [
                 {
                     "file": run.file,
@@ -50,6 +54,7 @@ class ImportedRecording:
                     "from": path,
                     "read_as": source.note,
                     "findings": [each.text for each in source.table.findings],
+                    "empty_columns": source.table.empty,
                 }
                 for run, (path, source) in runs
             ],
@@ -93,7 +98,8 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     draft = Draft(plan.robot.name, columns, dict(plan.units), tuple(runs), others, note)
     folder = Path(plan.options["out"])
     was_there = folder.is_dir()
-    write_recording(draft, folder, plan.robot.copies(folder))
+    copies = plan.robot.copies(folder)
+    write_recording(draft, folder, copies)
     try:
         (load_motion_recording if is_motion_only(folder) else load_recording)(folder)
     except InputError as error:
@@ -101,7 +107,8 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
         if was_there:
             folder.mkdir()
         raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
-    return ImportedRecording(folder, plan, draft)
+    whole = folder / plan.robot.whole_name if plan.robot.whole_name in copies else None
+    return ImportedRecording(folder, plan, draft, whole)
 
 
 def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
@@ -157,7 +164,8 @@ def _describe_unit(plan: ImportPlan, signal: str) -> str:
 
 def _describe_source(source: Source) -> str:
     found = "".join(f"; {finding.text}" for finding in source.table.findings)
-    return f"{len(source.table.values)} rows ({source.note}){found}"
+    empty = f"; no signal, without any number: {list_columns(source.table.empty)}" if source.table.empty else ""
+    return f"{len(source.table.values)} rows ({source.note}){found}{empty}"
 
 
 def _run_file(path: str, paths: Iterable[str]) -> str:

@@ -146,11 +146,14 @@ def _check_validate(validate: Sequence[Path], sources: Mapping[str, Source]) -> 
 
 
 def _check_sources(sources: Mapping[str, Source], columns: Mapping[str, tuple[str, ...]]) -> None:
-    """Raises InputError for a file that lacks a column, or that names another unit than the first file."""
+    """Raises InputError for a file that lacks a column or numbers in it, or names another unit than the first file."""
     first_path, first = next(iter(sources.items()))
     for path, source in sources.items():
         for signal, names in columns.items():
             source.table.columns(names, signal)
+            hollow = [name for name in names if name in source.table.empty]
+            if hollow:
+                raise InputError(f"{path}: column {', '.join(hollow)} ({signal}) is empty: it has no number in any row")
             for name in names:
                 unit, other = first.units.get(name), source.units.get(name)
                 if unit != other:

@@ -28,6 +28,11 @@ class ImportedRobot:
         name = Path(self.source).name
         return f"robot{Path(name).suffix}" if name == FILE_NAME else name
 
+    @property
+    def whole_name(self) -> str:
+        """Of the file of the whole robot beside a copy with locked joints."""
+        return f"whole-{self.name}"
+
     def copies(self, folder: Path) -> dict[str, str | bytes]:
         """Content of the robot file for a folder, by its name; none of a built-in robot.
 
@@ -41,8 +46,7 @@ class ImportedRobot:
         locked = lock_joints(path, self.tip, self.locks, folder)
         if not locked.positions or not locked.original.is_file():
             return {self.name: locked.text(str(locked.original.resolve()))}
-        whole = f"whole-{self.name}"
-        return {self.name: locked.text(whole), whole: robot_text(locked.original, folder)}
+        return {self.name: locked.text(self.whole_name), self.whole_name: robot_text(locked.original, folder)}
 
 
 def read_robot(options: Options) -> ImportedRobot | None:

@@ -1,12 +1,13 @@
 """CSV files of any layout: any separator, decimal comma, rows of units, comments, with or without a header."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -24,6 +25,7 @@ DECIMALS = (".", ",")
 COMMENT_START = re.compile(r"^\s*[#%!]+\s*")
 SAMPLE_LINES = 200
 MIN_DATA_ROWS = 2
+NO_NUMBER = ("", "nan", "null", "none", "na", "n/a")  # cells that stand for a number that is missing, in lower case
 NumberedRows = list[tuple[int, list[str]]]
 
 
@@ -51,8 +53,8 @@ class TextTable:
 def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None = None) -> TextTable:
     """The columns of a text file with numbers; without a header they are called c1, c2, ...
 
-    separator, decimal: found in the file if left out. Raises InputError for a file without rows of numbers, and
-    for rows of different length before the last.
+    A column without any number becomes NaN. separator, decimal: found in the file if left out. Raises InputError for a
+    file without rows of numbers, and for rows of different length before the last.
     """
     if separator is not None and (len(separator) != 1 or separator in '\r\n"'):
         words = ", ".join(SEPARATORS.values())
@@ -60,7 +62,8 @@ def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None =
     text = read_text(path)
     layout = find_layout(text, separator, decimal, path)
     rows = _split_lines(text, layout, str(path))
-    first = next((index for index, (_, cells) in enumerate(rows) if _is_data(cells, layout)), len(rows))
+    data = _data_rows(rows[:SAMPLE_LINES], layout)
+    first = data[0] if data else len(rows)
     body = rows[first:]
     if len(body) < MIN_DATA_ROWS:
         raise InputError(f"{path} holds no rows of numbers with {layout}; give --separator and --decimal")
@@ -87,7 +90,8 @@ def find_layout(text: str, separator: str | None, decimal: str | None, path: Pat
 
 def _score_layout(sample: str, layout: Layout) -> float:
     """Rows of numbers of the most frequent width; more columns decide between equals."""
-    widths = [len(cells) for _, cells in _split_lines(sample, layout, "") if _is_data(cells, layout)]
+    rows = _split_lines(sample, layout, "")
+    widths = [len(rows[index][1]) for index in _data_rows(rows, layout)]
     if not widths:
         return 0.0
     common = max(set(widths), key=widths.count)
@@ -101,20 +105,42 @@ def _split_lines(text: str, layout: Layout, where: str) -> NumberedRows:
     if layout.separator == " ":
         bare = "\n".join(re.sub(r"[ \t]+", " ", line.strip()) for line in bare.split("\n"))
     rows = split_rows(bare, layout.separator, where)
+    widths = {len(cells) for _, cells in rows if cells[-1].strip()}
+    rows = [(line, _drop_empty_last_cell(cells, widths)) for line, cells in rows]
+    in_comments = [(line, cells) for line, cells in rows if line in comments]
+    numbers = {in_comments[index][0] for index in _data_rows(in_comments, layout)}
+    return [each for each in rows if each[0] not in numbers]  # numbers in a comment are not measurements
+
+
+def _drop_empty_last_cell(cells: list[str], widths: Set[int]) -> list[str]:
+    """A separator at the end of a line starts another cell only where another line has something in that cell.
+
+    widths: of the lines whose last cell holds something.
+    """
+    return cells[:-1] if len(cells) > 1 and not cells[-1].strip() and len(cells) not in widths else cells
+
+
+def _data_rows(rows: NumberedRows, layout: Layout) -> list[int]:
+    """Which rows (from 0) hold numbers: one in each column, but for columns that have none in any row."""
+    parsed = {index: _numbers_or_holes(cells, layout) for index, (_, cells) in enumerate(rows)}
+    held = dict[int, NDArray[np.bool_]]()  # by the width of the rows: columns with a number
+    for values in parsed.values():
+        if values is not None:
+            held[len(values)] = held.get(len(values), False) | ~np.isnan(values)
     return [
-        (line, _drop_empty_last_cell(cells))
-        for line, cells in rows
-        if not (line in comments and _is_data(cells, layout))  # numbers in a comment are not measurements
+        index
+        for index, values in parsed.items()
+        if values is not None and not np.any(np.isnan(values) & held[len(values)])
     ]
 
 
-def _drop_empty_last_cell(cells: list[str]) -> list[str]:
-    """A separator at the end of a line does not start another cell."""
-    return cells[:-1] if len(cells) > 1 and not cells[-1].strip() else cells
-
-
-def _is_data(cells: list[str], layout: Layout) -> bool:
-    return not np.isnan(_parse_cells(cells, layout)).any()
+def _numbers_or_holes(cells: list[str], layout: Layout) -> Array | None:
+    """Numbers of a row, NaN for those that are missing; None for a row without numbers or with other text."""
+    values = _parse_cells(cells, layout)
+    holes = np.isnan(values)
+    if holes.all() or any(cells[index].strip().lower() not in NO_NUMBER for index in np.flatnonzero(holes)):
+        return None
+    return values
 
 
 def _parse_cells(cells: list[str], layout: Layout) -> Array:
