@@ -43,13 +43,15 @@ class SimulatorModel:
     """What a simulator can hold of a model.
 
     model: links with the bodies that were added, gravity as tilted. fields: of the joints, (joints,) each. missing:
-    the named effects without a place, in words. thickened_links: links, from 1, that were points or rods, which no
+    the named effects without a place, in words. unclaimed: the effects with a place that are no finding, in words; the
+    model predicts better with them. thickened_links: links, from 1, that were points or rods, which no
     simulator takes, and have been given a little extent.
     """
 
     model: TorqueModel
     fields: dict[str, Array]
     missing: tuple[str, ...]
+    unclaimed: tuple[str, ...] = ()
     thickened_links: tuple[int, ...] = ()
 
     def field(self, name: str) -> Array:
@@ -66,7 +68,8 @@ def has_place_in_simulator(candidate: Candidate, coefficients: Array) -> bool:
 
 def build_simulator_model(known: TorqueModel) -> SimulatorModel:
     """Sorts the effects of a model into links, gravity and fields of joints; the rest is named as missing."""
-    arm, inertial, missing = known.arm, known.inertial, list[str]()
+    arm, inertial = known.arm, known.inertial
+    missing, unclaimed = list[str](), list[str]()
     for number, effect in enumerate(known.effects):
         candidate, values = effect.candidate, effect.coefficients
         body, gravity = candidate.added_body(values), candidate.changed_gravity(values)
@@ -76,13 +79,17 @@ def build_simulator_model(known: TorqueModel) -> SimulatorModel:
         elif gravity is not None:
             x, y, z = gravity.tolist()
             arm = replace(arm, gravity=(x, y, z))
-        elif not candidate.joint_fields(values) and number not in known.unclaimed:
-            missing.append(component_in_words(known.arm, candidate, known.component_parameters(number)))
+        words = component_in_words(known.arm, candidate, known.component_parameters(number))
+        has_place, is_claimed = has_place_in_simulator(candidate, values), number not in known.unclaimed
+        if has_place and not is_claimed:
+            unclaimed.append(words)
+        elif is_claimed and not has_place:
+            missing.append(words)
     thickened: tuple[int, ...] = ()
     if inertial is not None:
         inertial, thickened = _thicken_links(arm, inertial)
     rigid = _model_with_links(known, arm, inertial)
-    return SimulatorModel(rigid, joint_fields(known), tuple(missing), thickened)
+    return SimulatorModel(rigid, joint_fields(known), tuple(missing), tuple(unclaimed), thickened)
 
 
 def _thicken_links(arm: Arm, inertial: Array) -> tuple[Array, tuple[int, ...]]:

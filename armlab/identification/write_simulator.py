@@ -81,9 +81,17 @@ def export_model(
     yield from notes
     if missing:
         yield "not in the file: " + "; ".join(missing)
+    if simulated.unclaimed:
+        yield f"no findings of the verdict, kept because the model predicts better: {'; '.join(simulated.unclaimed)}"
     if simulated.thickened_links:
         yield f"given a little extent, as simulators want it: link {', '.join(map(str, simulated.thickened_links))}"
-    return {"files": written, "not_in_the_file": missing, "thickened_links": simulated.thickened_links, "notes": notes}
+    return {
+        "files": written,
+        "not_in_the_file": missing,
+        "unclaimed": simulated.unclaimed,
+        "thickened_links": simulated.thickened_links,
+        "notes": notes,
+    }
 
 
 def _drives_of(controller: ControllerEntry, joints: int) -> dict[int, Drive]:

@@ -136,6 +136,18 @@ def test_export_says_what_the_file_does_not_hold(tmp_path: Path) -> None:
     assert "rotor" not in lines[-1]
 
 
+def test_a_number_that_is_no_finding_is_written_and_told(tmp_path: Path) -> None:
+    model = model_of("irb120-arm", ("rotor_inertia", "torque_offset"))
+    parts = [(part.effect, part.joint) for part in model.structure.components]
+    rotor, offset = parts.index(("rotor_inertia", 2)), parts.index(("torque_offset", 1))
+    model = replace(model, unclaimed=frozenset({rotor, offset}))
+    lines = list(export_model(model.save(tmp_path / "model.yaml"), tmp_path / "arm.xml"))
+    inertia = float(model.values[model.structure.slices[rotor]][0])
+    told = "no findings of the verdict, kept because the model predicts better: "
+    assert told + f"rotor inertia at joint 2 ({inertia:.3g} kg m²)" in lines
+    assert f'armature="{inertia!r}"' in (tmp_path / "arm.xml").read_text()
+
+
 def test_a_urdf_has_a_limit_that_the_robot_lacks_only_where_urdf_wants_one_and_that_is_told() -> None:
     known, free = Limits((-1.0, 1.0), velocity=2.0), Limits(velocity=3.0)
     arm = load_arm("irb120-arm")
