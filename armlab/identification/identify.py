@@ -24,7 +24,14 @@ from armlab.identification.selection import (
     describe_choice,
     select_structure,
 )
-from armlab.identification.validation import JointError, RunError, error_table, run_error, total_error_line
+from armlab.identification.validation import (
+    JointError,
+    RunError,
+    error_table,
+    filter_of_errors,
+    run_error,
+    total_error_line,
+)
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
@@ -44,6 +51,7 @@ def identification_page(recording: Recording, identifier: Identifier, errors: tu
         summary=f"Cut-off {model.cutoff_hz:.4g} Hz; condition number {identifier.condition_number_:.4g} (columns at "
         "unit length); each 95 % interval is for correlated errors.",
         errors=_joint_errors(errors),
+        filtered=filter_of_errors(errors),
         totals=[total_error_line(each) for each in errors],
         parameters=_parameters(model),
         pictures=pictures,

@@ -1,12 +1,15 @@
 """How far a model's torque is from the recorded one: joint by joint, filtered and as recorded."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.report.numbers import format_number
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
+from armlab.recordings.filters import LowPass
 
 
 @dataclass(frozen=True)
@@ -23,12 +26,13 @@ class JointError:
 class RunError:
     """Errors on one run: ||tau - tau_hat|| / ||tau|| over all joints in percent, and joint by joint.
 
-    recorded_percent: against the torque without any filter.
+    cutoff_hz: of the low-pass of both torques; None without one. recorded_percent: against the torque as recorded.
     """
 
     run: str
     role: str
     relative_percent: float
+    cutoff_hz: float | None
     recorded_percent: float
     joints: tuple[JointError, ...]
 
@@ -41,8 +45,14 @@ def run_error(model: TorqueModel, signals: Signals) -> RunError:
     raw = recorded - model.torque(signals.motion, signals.run)[rows]
     each = range(len(model.arm))
     joints = tuple(_joint_error(model, joint, left[:, joint], signals.torque[:, joint]) for joint in each)
-    percent = relative_percent(left, signals.torque)
-    return RunError(signals.run.name, signals.run.role, percent, relative_percent(raw, recorded), joints)
+    return RunError(
+        run=signals.run.name,
+        role=signals.run.role,
+        relative_percent=relative_percent(left, signals.torque),
+        cutoff_hz=signals.filter.cutoff_hz if isinstance(signals.filter, LowPass) else None,
+        recorded_percent=relative_percent(raw, recorded),
+        joints=joints,
+    )
 
 
 def relative_percent(error: Array, torque: Array) -> float:
@@ -57,8 +67,11 @@ def _joint_error(model: TorqueModel, joint: int, left: Array, torque: Array) -> 
 
 
 def error_table(errors: tuple[RunError, ...]) -> str:
-    """A table in plain text."""
-    lines = ["run                   role      joint   rms N m  % of torque  % of rated"]
+    """A table in plain text; its first line says which torque the joints' errors are of."""
+    lines = [
+        f"errors of torque {filter_of_errors(errors)}:",
+        "run                   role      joint   rms N m  % of torque  % of rated",
+    ]
     for each in errors:
         for joint in each.joints:
             rated = "-" if joint.percent_rated is None else f"{joint.percent_rated:.2f}"
@@ -70,4 +83,15 @@ def error_table(errors: tuple[RunError, ...]) -> str:
 
 def total_error_line(error: RunError) -> str:
     """The error of a run over all joints, in a line."""
-    return f"{error.run}: {error.relative_percent:.2f} % in all, {error.recorded_percent:.2f} % unfiltered"
+    return f"{error.run}: {error.relative_percent:.2f} % in all, {error.recorded_percent:.2f} % of torque as recorded"
+
+
+def filter_of_errors(errors: tuple[RunError, ...]) -> str:
+    """Which torque the errors of runs are of, joint by joint and in all: see `filter_in_words`."""
+    return filter_in_words([each.cutoff_hz for each in errors if each.cutoff_hz is not None])
+
+
+def filter_in_words(cutoffs_hz: Sequence[float]) -> str:
+    """Of a torque: `filtered below 8 Hz`, by several low-passes `filtered below 6 to 8 Hz`, else `as recorded`."""
+    ends = list(dict.fromkeys(format_number(each) for each in (min(cutoffs_hz), max(cutoffs_hz)))) if cutoffs_hz else []
+    return f"filtered below {' to '.join(ends)} Hz" if ends else "as recorded"

@@ -28,7 +28,7 @@ from armlab.common.report.charts import (
 )
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report import write
-from armlab.diagnosis.report.content import finding_details
+from armlab.diagnosis.report.content import error_note, finding_details
 from armlab.diagnosis.report.gallery import draw_gallery
 from armlab.diagnosis.report.measured import body_sentences, joint_table
 from armlab.diagnosis.report.residuals import correlation_seconds, filter_correlation_seconds, select_residuals
@@ -160,6 +160,14 @@ def test_the_verdict_stands_in_two_sentences_with_the_joint_and_the_gain(browser
     assert " on held-out data falls most at " in verdict
     assert re.search(r": from [\d.]+ N m \(simulation as given\) to [\d.]+ N m; the noise floor there is ", verdict)
     page.close()
+
+
+def test_errors_say_below_which_frequency_their_torque_is(found: Diagnosis) -> None:
+    data = select_residuals(found)
+    assert data is not None
+    filtered = f"filtered below {data.observed.cutoff_hz:.3g} Hz"
+    assert f"  errors on held-out data, rms of torque {filtered}:" in verdict_lines(found)
+    assert f"both {filtered}. All on held-out data." in error_note(found, data)
 
 
 CUT_CELLS = """() => [...document.querySelectorAll('th, td')].filter(cell =>

@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from simulated_arm import RATE_HZ, arm, run, structure, truth
 from armlab.cli.diagnosis import export_model, real
 from armlab.cli.identification import coverage, identify, predict
 from armlab.common.errors import InputError
+from armlab.common.report.numbers import format_number
 from armlab.identification.model import Model
+from armlab.identification.validation import filter_in_words
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 
 COLUMNS = {"time": "t", "position": ("q1", "q2", "q3"), "torque": ("tau1", "tau2", "tau3")}
@@ -56,7 +59,10 @@ def test_identify_tells_parameters_condition_number_and_errors_and_writes_model_
 def test_predict_meets_the_recorded_torque_and_writes_what_it_predicts(recording: Path, tmp_path: Path) -> None:
     invoke(identify, recording, "--out", tmp_path / "out")
     text = invoke(predict, tmp_path / "out" / "model.yaml", recording, "--out", tmp_path / "torques")
-    assert "run-1.csv: 0." in text
+    cutoff = format_number(Model.load(tmp_path / "out" / "model.yaml").cutoff_hz)
+    assert text.startswith(f"errors of torque filtered below {cutoff} Hz:\n")
+    assert re.search(r"run-1.csv: 0\.\d+ % in all, [\d.]+ % of torque as recorded", text)
+    assert f"both filtered below {cutoff} Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     predicted = pd.read_csv(tmp_path / "torques" / "run-1.csv.predicted.csv")
     recorded = pd.read_csv(recording / "run-1.csv")
     inner = slice(int(RATE_HZ), -int(RATE_HZ))
@@ -91,3 +97,9 @@ def test_coverage_writes_what_it_measured(tmp_path: Path) -> None:
     text = invoke(coverage, "--experiments", 10, "--results", tmp_path)
     assert "in 10 experiments" in text
     assert (tmp_path / "coverage.json").is_file()
+
+
+def test_errors_say_which_torque_they_are_of() -> None:
+    assert filter_in_words([]) == "as recorded"
+    assert filter_in_words([8.0, 8.0]) == "filtered below 8 Hz"
+    assert filter_in_words([8.0, 6.25]) == "filtered below 6.25 to 8 Hz"

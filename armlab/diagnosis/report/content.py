@@ -33,11 +33,6 @@ from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from problem.arm import Arm
 from problem.joint_words import joint_at_start, joint_in_table, joint_in_words
 
-SHARE_NOTE = (
-    "Shares are of the squared error above the noise, of all joints together, each in units of its own torque. Errors "
-    "in N m (N) are root mean squares of measured less predicted torque at one joint. All on held-out data."
-)
-
 
 @dataclass(frozen=True)
 class Origin:
@@ -70,6 +65,19 @@ class SetupPart:
 
     text: str
     table: Table
+
+
+def error_note(diagnosis: Diagnosis, data: ShownResiduals) -> str:
+    """What the shares and errors of the first screen are of."""
+    errors = (
+        f"Errors in N m (N) are root mean squares of measured less predicted torque at one joint, both {data.filtered}."
+    )
+    if not diagnosis.claims:
+        return f"{errors} On held-out data."
+    return (
+        "Shares are of the squared error above the noise, of all joints together, each in units of its own torque. "
+        f"{errors} All on held-out data."
+    )
 
 
 def cause_table(diagnosis: Diagnosis) -> Table | None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment, rows_in
 from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.identification.validation import filter_in_words
 
 Rows = NDArray[np.intp]
 
@@ -38,6 +39,11 @@ class ShownResiduals:
         """Root mean square on held-out rows, (joints,)."""
         joints = range(residual.shape[1])
         return np.array([np.sqrt(np.mean(residual[self.held_out(joint), joint] ** 2)) for joint in joints])
+
+    @property
+    def filtered(self) -> str:
+        """Which torque the residuals are of, in words: `filtered below 8 Hz`."""
+        return filter_in_words([self.observed.cutoff_hz])
 
     @property
     def before(self) -> Array:

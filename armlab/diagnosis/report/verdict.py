@@ -203,9 +203,11 @@ def _error_lines(diagnosis: Diagnosis) -> Iterator[str]:
         return
     given = None if data is None or data.given is None else data.held_out_rms(data.given).tolist()
     first = "" if given is None else f"{'as given':>11}"
+    filtered = "" if data is None else f" of torque {data.filtered}"
     names = [shorten_name(joint_in_table(arm, fit.joint).replace("\N{NO-BREAK SPACE}", " ")) for fit in fits]
     width = max(len("joint"), *map(len, names))
-    yield f"  {'joint':<{width}}{first}   refitted      found      noise   gap closed   (rms on held-out data)"
+    yield f"  errors on held-out data, rms{filtered}:"
+    yield f"  {'joint':<{width}}{first}   refitted      found      noise   gap closed"
     for name, fit in zip(names, fits, strict=True):
         closed = format_gap(fit.gap_closed)
         values = [*([] if given is None else [given[fit.joint - 1]]), fit.before, fit.after, fit.noise_floor]

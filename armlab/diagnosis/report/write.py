@@ -42,7 +42,6 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
         f"Diagnosis of {diagnosis.recording.name} ({diagnosis.simulation.arm.name})",
         status=diagnosis.status,
         first=first_screen(diagnosis),
-        share_note=content.SHARE_NOTE if diagnosis.claims else "",
         setup=content.setup_part(diagnosis),
         joints=measured.joint_table(diagnosis) if diagnosis.claims else None,
         bodies=measured.body_sentences(diagnosis),
@@ -57,6 +56,8 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
 def _details(diagnosis: Diagnosis, gallery: Gallery) -> dict[str, Any]:
     """What is folded on the page, and only there where something was fitted."""
     return {
+        "error_note": content.error_note(diagnosis, gallery.data),
+        "filtered": gallery.data.filtered,
         "causes": content.cause_table(diagnosis),
         "findings": content.finding_details(diagnosis, gallery),
         "unexplained": content.unexplained_lines(diagnosis),
