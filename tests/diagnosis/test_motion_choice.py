@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armlab.diagnosis.motion.choose import ChosenServo, Gain, chance_of_gain, first_guesses, is_hidden_by_encoder_steps
+from armlab.diagnosis.motion.choose import ChosenServo, Gain, first_guesses, is_hidden_by_encoder_steps
+from armlab.diagnosis.motion.compare import chance_of_gain
 from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows

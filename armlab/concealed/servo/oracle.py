@@ -7,6 +7,9 @@ joint, and k = 1 + 2 sum of its autocorrelations. D is the difference of the rep
 s sqrt(k), without its part along what changes of kp, damping and friction of the joints concerned do to these joints.
 
     multiple = |D| / (z(1 - level / (2 tests)) + z(power))
+
+Where drives hold the commands of several samples, nobody knows when within a sample their clocks tick: of a delay only
+what is beyond one sample counts.
 """
 
 from collections.abc import Sequence
@@ -96,6 +99,9 @@ class Oracle:
 
     def multiple(self, hidden: Hidden, with_it: ServoArm, without: ServoArm) -> float:
         """Detection limits of a difference between two arms."""
+        if hidden.kind == "delay" and self.case.hold > 1:
+            beyond = replace(hidden, size=max(hidden.size - 1 / self.case.rate_hz, 0.0))
+            with_it = beyond.apply(without)
         before = self.own if without is self.arm else self.smooth(without)
         after = self.own if with_it is self.arm else self.smooth(with_it)
         added = self._weighted(after, before)
