@@ -83,7 +83,7 @@ class MotionTuning:
         2.5,
         unit="of a standard error",
         meaning="widens what correlated errors tell of a number: what the law leaves out is no noise",
-        source="a development set: intervals of 129 reported numbers held in 69 % with 1.5, and would have in 92 % with 2.5",
+        source="129 intervals held in 69 % with 1.5 on a development set, and would have in 92 % with 2.5",
         least=1.0,
     )
     min_gain: float = tuned(
