@@ -165,13 +165,13 @@ def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
     blocks = len(scores)
     clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
-    least = _correlated_variances(slopes @ inverse, errors, window)
+    least = correlated_variances(slopes @ inverse, errors, window)
     own = np.maximum(np.diag(clustered), 1e-300)
     wider = np.sqrt(np.maximum(DEFAULT.widening**2 * least / own, 1.0))
     return np.asarray(clustered * np.outer(wider, wider))
 
 
-def _correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+def correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp]) -> Array:
     """Variances (free,) of numbers with these influences (samples, free), under errors correlated within windows."""
     starts = np.searchsorted(window, np.arange(window[-1] + 1))
     place = np.arange(len(window)) - starts[window]
