@@ -7,6 +7,10 @@ joint, and k = 1 + 2 sum of its autocorrelations. D is the difference of the rep
 s sqrt(k), without its part along what changes of kp, damping and friction of the joints concerned do to these joints.
 
     multiple = |D| / (z(1 - level / (2 tests)) + z(power))
+
+Where drives hold the commands of several samples, nobody knows when within a sample their clocks tick: of a delay only
+what is beyond one sample counts. A drive that reads its position in counts does not act on an error within a count
+either: of a dead band only what is beyond one count does.
 """
 
 from collections.abc import Sequence
@@ -96,6 +100,7 @@ class Oracle:
 
     def multiple(self, hidden: Hidden, with_it: ServoArm, without: ServoArm) -> float:
         """Detection limits of a difference between two arms."""
+        with_it = with_it if hidden.kind not in ("delay", "dead band") else self._beyond_steps(hidden).apply(without)
         before = self.own if without is self.arm else self.smooth(without)
         after = self.own if with_it is self.arm else self.smooth(with_it)
         added = self._weighted(after, before)
@@ -105,6 +110,13 @@ class Oracle:
         tests = len(KINDS) * self.arm.joints
         needed = norm.ppf(1 - ORACLE.level / (2 * tests)) + norm.ppf(ORACLE.power)
         return float(np.linalg.norm(rest) / needed)
+
+    def _beyond_steps(self, hidden: Hidden) -> Hidden:
+        """A delay or dead band without the part that steps of time or of the encoder make as well."""
+        step = 1 / self.case.rate_hz if self.case.hold > 1 else 0.0
+        if hidden.kind == "dead band":
+            step = self.arm.servos[hidden.joint].count
+        return replace(hidden, size=max(hidden.size - step, 0.0))
 
     def _weighted(self, first: Sequence[Array], second: Sequence[Array]) -> Array:
         """Difference of replays over the noise, (samples of all runs, joints)."""

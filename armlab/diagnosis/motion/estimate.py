@@ -6,10 +6,13 @@ J_w and r_w the Jacobian and the errors of window w (Huber 1967, clustered),
 
     cov = H^-1 (sum_w J_w^T r_w r_w^T J_w) H^-1,  H = J^T J
 
-What the law and the encoder in the loop leave out is alike in all windows, and such blocks do not see it. So a window
-counts as at most one independent sample: with N samples in W windows, no variance is less than that of
+What all windows have in common such blocks do not see. So no variance is less than that of errors which are correlated
+over time within a window: with u_w the influence of window w's samples on a number, from J H^-1, and S the mean power
+spectrum of the errors,
 
-    cov = (N / W) mean(r^2) H^-1
+    var = widening^2 sum_w sum_f |U_w(f)|^2 S(f)
+
+The widening stands for what the law leaves out, which is no noise.
 
 Where the drive integrates its error, what the integral holds at the start of each run is fitted, too.
 """
@@ -35,7 +38,7 @@ INTEGRAL_STEP = 0.005  # rad (m): position error whose torque is a step of an in
 @dataclass(frozen=True, eq=False)
 class ServoFit:
     """Parameters of one joint. values: (parameters,); free: which of them were fitted; covariance: of the coordinates
-    (see `to_coordinates`) that are free, from blocks. rms: of the errors, rad. windows: number of blocks. integral:
+    (see `to_coordinates`) that are free. rms: of the errors, rad. windows: number of blocks. integral:
     of the drive at the start of each run, (runs,), N m."""
 
     values: Array
@@ -46,14 +49,26 @@ class ServoFit:
     integral: Array
 
     def standard_errors(self) -> Array:
-        """Of the coordinates, (parameters,); 0 for those that were not fitted."""
+        """Of the coordinates, (parameters,); 0 for those that were not fitted, infinite where no sample tells."""
         errors = np.zeros(len(self.values))
-        errors[self.free] = np.sqrt(np.diag(self.covariance))
+        own = np.sqrt(np.diag(self.covariance))
+        errors[self.free] = np.where(own > 0, own, np.inf)
         return errors
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of the covariance."""
+        return max(self.windows - int(self.free.sum()), 1)
+
+    def p_value(self, number: int, known: float) -> float:
+        """That a number which was fitted is a known one, two-sided by Student's t."""
+        moved = to_coordinates(np.where(np.arange(len(self.values)) == number, known, self.values))[number]
+        apart = abs(float(to_coordinates(self.values)[number] - moved))
+        return float(2 * student.sf(apart / float(self.standard_errors()[number]), self.freedom))
 
     def interval(self, level: float = 0.95) -> Array:
         """Lower and upper ends (2, parameters) of Student intervals within the bounds of each parameter."""
-        half = student.ppf(0.5 + level / 2, max(self.windows - int(self.free.sum()), 1)) * self.standard_errors()
+        half = student.ppf(0.5 + level / 2, self.freedom) * self.standard_errors()
         centre = to_coordinates(self.values)
         with np.errstate(over="ignore"):
             ends = from_coordinates(np.stack([centre - half, centre + half]))
@@ -121,7 +136,7 @@ def fit_servo(
         xtol=1e-5,
     )
     moved, values = whole(solution.x)
-    covariance = _block_covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
+    covariance = _covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
     return ServoFit(values, free, covariance, _root_mean_square(solution.fun), windows.count, moved.integral)
 
 
@@ -144,15 +159,33 @@ def _integral_slopes(windows: Windows, values: Array, runs: NDArray[np.int64], p
     return np.where(windows.run[windows.window][:, None] == runs, ((ends[0] - ends[1]) / (2 * push))[:, None], 0.0)
 
 
-def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+    """Of the coordinates, (free, free), by windows as blocks; no variance is less than that of correlated errors."""
     scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
     blocks = len(scores)
     clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
-    least = len(errors) / blocks * np.mean(errors**2) * np.diag(inverse)
+    least = correlated_variances(slopes @ inverse, errors, window)
     own = np.maximum(np.diag(clustered), 1e-300)
-    wider = np.sqrt(np.maximum(least / own, 1.0))
+    wider = np.sqrt(np.maximum(DEFAULT.widening**2 * least / own, 1.0))
     return np.asarray(clustered * np.outer(wider, wider))
+
+
+def correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+    """Variances (free,) of numbers with these influences (samples, free), under errors correlated within windows."""
+    starts = np.searchsorted(window, np.arange(window[-1] + 1))
+    place = np.arange(len(window)) - starts[window]
+    shape = len(starts), int(place.max()) + 1
+
+    def powers(signal: Array) -> Array:
+        laid_out = np.zeros(shape)
+        laid_out[window, place] = signal
+        return np.asarray(np.sum(np.abs(np.fft.rfft(laid_out, 2 * shape[1], axis=1)) ** 2, axis=0))
+
+    of_errors = powers(errors) / len(errors)
+    weights = np.full(len(of_errors), 2.0)
+    weights[[0, -1]] = 1.0
+    return np.array([float(weights @ (powers(each) * of_errors)) for each in influence.T]) / (2 * shape[1])
 
 
 def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning: MotionTuning = DEFAULT) -> ServoFit:
