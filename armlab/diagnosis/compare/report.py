@@ -94,7 +94,7 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     more = f", and {rest} more" if rest else ""
     numbers = f"{join_words(phrases)}{more}."
     whole = " ".join(_whole_friction(comparison))
-    second = f"{numbers[0].upper()}{numbers[1:]} {whole} No other change is sure. {seen}"
+    second = f"{whole} {numbers[0].upper()}{numbers[1:]} No other change is sure. {seen}"
     return f"Between {names} this changed: {join_words(places)}.", " ".join(second.split())
 
 
@@ -143,8 +143,11 @@ def _signed(percent: float) -> str:
 
 
 def detectable_sentence(comparison: Comparison) -> str:
-    """The smallest changes that would have been named, of the usual kinds: the middle one of the joints."""
-    parts = []
+    """The smallest changes that would have been named, of the usual kinds: the middle one of the joints.
+
+    Of a level that would have to change by more than itself these recordings tell nothing.
+    """
+    parts, untold = [], []
     for effect in SEEN_EFFECTS:
         rows = [each for each in comparison.changes if each.effect == effect and not each.changed]
         names = [each.parameter for each in rows]
@@ -154,11 +157,19 @@ def detectable_sentence(comparison: Comparison) -> str:
             continue
         middle = sizes[len(sizes) // 2][1]
         share = detectable_share(middle)
+        if share is not None and share > 1:
+            untold.append(effect_in_words(effect))
+            continue
         size = f"{format_number(middle.detectable, 2)} {format_unit(middle.unit)}"
         parts.append(f"{effect_in_words(effect)} {size if share is None else f'{format_number(100 * share, 2)} %'}")
-    if not parts:
-        return ""
-    return f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
+    sentences = []
+    if parts:
+        sentences.append(
+            f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
+        )
+    if untold:
+        sentences.append(f"A doubled level of {join_words(untold)} would not have been seen.")
+    return " ".join(sentences)
 
 
 def detectable_share(change: Change) -> float | None:
@@ -356,7 +367,8 @@ def _card(arm: Arm, named: NamedChange, names: Sequence[str]) -> ChangeCard:
         f"It could also be {join_words(rivals)}." if rivals else "Nothing else explains it nearly as well.",
     )
     numbers = Table(["change of", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
-    return ChangeCard(change_phrase(arm, named), texts, numbers)
+    title = _place_phrase(arm, named)
+    return ChangeCard(f"{title[0].upper()}{title[1:]}", texts, numbers)
 
 
 def _trend_part(comparison: Comparison) -> TrendPart:
