@@ -23,6 +23,7 @@ SMALL_CURRENT_A = 0.02  # the largest of all joints: the smallest servos take mo
 SMALL_TORQUE_SHARE = 1e-3  # of the torque limit, at every joint that has one
 GRAVITY_RATIOS = (0.05, 100.0)  # of the largest torque to the largest that gravity needs, at every joint that carries
 CARRYING_SHARE = 0.1  # of the largest gravity torque: a joint with less carries little
+MIN_RATIO = 1e-12  # a joint whose torque is zero counts as one with so little
 FITTING_RATIOS = (0.2, 20.0)  # of the same ratio in a unit that fits
 POSES = 300  # at which gravity is computed
 
@@ -99,7 +100,7 @@ def _doubt_torque(
         f"torque of joint {joints[place].name} is {peaks[place]:.3g} {si} at most, where the links of the robot file "
         f"need {needed[place]:.3g} {si} against gravity"
     )
-    middle = float(np.exp(np.nanmean(np.log(ratios))))
+    middle = float(np.exp(np.nanmean(np.log(np.maximum(ratios, MIN_RATIO)))))
     return f"{text}: {_torque_advice(names, middle, is_geared=gear is not None and gear.torque)}"
 
 
