@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.documents import Document, ResultLines
+from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.diagnosis.added_body import body_groups, fit_body, payload_groups
 from armlab.diagnosis.diagnose import find_names, find_setup, prepare
@@ -111,8 +111,8 @@ def nominal_payload_lines(loaded: Path, setting: PayloadSetting, progress: Progr
         yield "not determined by these motions: " + ", ".join(found.undetermined)
     if found.beside:
         yield "beside it: " + ", ".join(found.beside)
-    told: Document = {"not_determined": list(found.undetermined), "beside": list(found.beside)}
-    return {**load_document(found.link, found.numbers), **told}
+    document = load_document(found.link, found.numbers)
+    return {**document, "not_determined": list(found.undetermined), "beside": list(found.beside)}
 
 
 def find_load(recording: Recording, setting: PayloadSetting, settings: Settings, progress: Progress) -> FoundLoad:
@@ -136,6 +136,8 @@ def find_load(recording: Recording, setting: PayloadSetting, settings: Settings,
         raise InputError(f"{recording.folder}: {UNDETERMINED}: no joint feels the mass of link {link} alone")
     free = _numbers(replace(bare, state=bare.state.plus(groups[link])), groups[link])
     mass, names = free[MASS_NAME], (*PARAMETER_NAMES, *CENTRE_NAMES)
+    if not np.isfinite(mass.half_width):
+        raise InputError(f"{recording.folder}: {UNDETERMINED} at link {link}")
     if mass.value <= mass.half_width:
         return FoundLoad(link, (mass,), names[1:], beside)
     body = fit_body(bare, bare.state, groups[link], link).ten

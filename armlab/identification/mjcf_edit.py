@@ -57,9 +57,9 @@ class Meant:
     """What MuJoCo should read from a text.
 
     inertias: pseudo-inertias (4, 4) about the bodies' frames by their numbers, zero for a body without. joints: numbers
-    of the joints whose fields and drives are meant. fields: (joints,) each, by their names in MJCF; rad, also of
-    `springref`. drives: of joints, by their numbers; their friction loss
-    holds at rest.
+    of the joints whose fields are meant. fields: (joints,) each, by their names in MJCF, SI units; rad, also of
+    `springref`. gravity: (3,), m/s2. notes: what a person has to know, one line each. drives: of joints, by their
+    numbers; their friction loss holds at rest.
     """
 
     inertias: Mapping[int, Array]
@@ -180,9 +180,8 @@ def _set_drives(document: XmlText, nodes: Mapping[int, XmlNode], before: Any, me
         if number is not None and number not in known:
             raise UneditableError(_not_in_text(f"the actuator of joint '{name}'", document, path))
         if number is None:
-            section = sections[-1] if sections else document.root.add("actuator", {})
-            sections = sections or [section]
-            known[before.nu] = node = section.add("position", {"name": f"servo-{name}", "joint": name})
+            sections = sections or [document.root.add("actuator", {})]
+            node = sections[-1].add("position", {"name": f"servo-{name}", "joint": name})
         else:
             node = known[number]
         node.set(_drive_numbers(node, drive, before, number, path))
@@ -199,10 +198,13 @@ def _drive_numbers(node: XmlNode, drive: Drive, before: Any, number: int | None,
     """Attributes of an actuator's element, as far as MuJoCo reads them otherwise. number: None for a new one."""
     numbers: dict[str, str | None] = {}
     present = None if number is None else _read_drive(before, number)
+    has_filter = number is not None and bool(before.actuator_dyntype[number])
+    affine = import_mujoco().mjtBias.mjBIAS_AFFINE
     if node.tag == "position":
-        gains = {"kp": repr(drive.kp), "kv": repr(drive.kv), "dampratio": None}
-    elif node.tag == "general":
-        law = {"gaintype": "fixed", "biastype": "affine"}
+        without_filter = {"timeconst": "0"} if has_filter else {}
+        gains = {"kp": repr(drive.kp), "kv": repr(drive.kv), "dampratio": None, **without_filter}
+    elif node.tag == "general" and before.actuator_biastype[number] == affine:
+        law = {"gaintype": "fixed", "biastype": "affine"} | ({"dyntype": "none"} if has_filter else {})
         gains = {**law, "gainprm": repr(drive.kp), "biasprm": format_numbers((0.0, -drive.kp, -drive.kv))}
     else:
         raise InputError(f"{path.name}, line {node.line}: <{node.tag}> is no position servo, which the model has there")
@@ -219,12 +221,19 @@ def _drive_numbers(node: XmlNode, drive: Drive, before: Any, number: int | None,
 
 
 def _read_drive(model: Any, number: int) -> Drive:
-    """An actuator; delays are those of versions of MuJoCo that have them."""
+    """An actuator; kp is no number where it has another law than a drive, or a gear other than 1.
+
+    Delays are those of versions of MuJoCo that have them.
+    """
+    mujoco, gain, bias = import_mujoco(), float(model.actuator_gainprm[number, 0]), model.actuator_biasprm[number]
+    kinds = model.actuator_gaintype[number], model.actuator_biastype[number], model.actuator_dyntype[number]
+    is_servo = kinds == (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE, mujoco.mjtDyn.mjDYN_NONE)
+    is_servo = is_servo and (bias[0], bias[1], model.actuator_gear[number, 0]) == (0.0, -gain, 1.0)
     low, high = model.actuator_forcerange[number].tolist() if model.actuator_forcelimited[number] else (-np.inf, np.inf)
     delays = getattr(model, "actuator_delay", None)
     return Drive(
-        kp=float(model.actuator_gainprm[number, 0]),
-        kv=-float(model.actuator_biasprm[number, 2]),
+        kp=gain if is_servo else np.nan,
+        kv=-float(bias[2]),
         limit=high if low == -high else np.nan,
         delay=0.0 if delays is None else float(delays[number]),
     )
@@ -311,4 +320,8 @@ def _check_drives(after: Any, before: Any, meant: Meant, path: Path) -> None:
         number = find_drive(after, joint)
         numbers = None if number is None else vars(_read_drive(after, number))
         if numbers is None or not all(np.isclose(numbers[key], value) for key, value in vars(drive).items()):
-            raise UneditableError(f"{path.name}: the drive of joint '{after.joint(joint).name}' is not what it states")
+            name = after.joint(joint).name
+            raise UneditableError(
+                f"{path.name}: the actuator of joint '{name}' does not take the drive of the model: it should be a "
+                "position servo with gear 1, and default classes should leave its numbers free"
+            )

@@ -9,7 +9,6 @@ import numpy as np
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import refuse_existing, write_texts
-from armlab.common.report.words import join_words
 from armlab.identification.export import (
     SimulatorModel,
     build_simulator_model,
@@ -31,11 +30,8 @@ from problem.mjcf import compile_mjcf, mjcf_tree
 from problem.urdf_document import read_urdf_root, urdf_tree
 
 FORMATS = (".urdf", ".xml")
-DRIVE_WORDS = {
-    "ki": "integral gain",
-    "offset": "offset of the command",
-    "dead_band": "dead band",
-}  # of what no actuator of MJCF has
+# What no actuator of MJCF has.
+DRIVE_WORDS = {"ki": "integral gain", "offset": "offset of the command", "dead_band": "dead band"}
 
 
 def export_model(
@@ -125,8 +121,10 @@ def _document(
 ) -> Patched:
     robot = Path(simulated.model.robot)
     if into is None and robot.suffix not in FORMATS:
+        if locks:
+            raise InputError(f"--lock needs a robot file that has {', '.join(locks)}: give it with --into")
         return _chain(simulated, out)
-    target, told = _choose_target(simulated, robot, into, locks)
+    target, lock_notes = _choose_target(simulated, robot, into, locks)
     source = target.path
     if source.suffix == ".xml" and out.suffix == ".urdf":
         keeps = f"a chain of bodies without meshes: only an .xml file keeps what {source.name} has"
@@ -139,7 +137,7 @@ def _document(
     except UnreadableError as error:
         return _chain(simulated, out, f"a chain of bodies without meshes: {error}")
     stays = f"{source.name} with other numbers: its names, frames and meshes stay"
-    return replace(made, notes=(stays, *told, *made.notes))
+    return replace(made, notes=(stays, *lock_notes, *made.notes))
 
 
 def _choose_target(
@@ -158,18 +156,23 @@ def _choose_target(
     known = {} if record is None else {name: value for name, value in record.positions.items() if name in moving}
     positions = {**known, **tree.locked_positions(None, locks)}
     own = {joint.name for joint in simulated.model.arm.joints}
+    moved = [name for name in locks if name in own]
+    if moved:
+        raise InputError(
+            f"--lock names {', '.join(moved)}, which the model moves: it is for joints that it does not have"
+        )
     extra = [name for name in moving if name not in own and name not in positions]
     if extra:
         raise InputError(
             f"{source} has joints that the model does not have, {', '.join(extra)}: say with --lock JOINT=VALUE where "
             "they stood in the recording"
         )
-    told: tuple[str, ...] = ()
+    target = Target(source, positions)
     if positions:
-        told = (f"{join_words(list(positions))}, locked in the recording, move in this file",)
-    elif record is not None:
-        told = (f"{join_words(list(record.positions))} are fixed in this file, as in the recording",)
-    return Target(source, positions), told
+        return target, (f"locked in the recording, free to move in this file: {', '.join(positions)}",)
+    if record is not None:
+        return target, (f"fixed in this file, as in the recording: {', '.join(record.positions)}",)
+    return target, ()
 
 
 def _read_tree(path: Path) -> KinematicTree:

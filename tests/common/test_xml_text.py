@@ -4,7 +4,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refusal
 
@@ -55,6 +55,7 @@ def test_numbers_that_differ_by_rounding_stay_as_written() -> None:
     assert document.text() == '<a x="0.10 2e0" y="1.1" z="3" w="4"/>'
 
 
+@settings(deadline=None)
 @given(st.text(st.characters(codec="utf-8", exclude_categories=["Cc", "Cs"], exclude_characters="\ufffe\uffff")))
 def test_any_value_of_an_attribute_is_read_back(value: str) -> None:
     document = parse_xml_text('<a><b c="1" d="2"/></a>', "x")
@@ -79,6 +80,7 @@ def test_other_encodings_become_utf_8(tmp_path: Path, encoding: str, declared: s
         ('<!DOCTYPE a [<!ENTITY x "y">]><a/>', "with XML entities"),
         ("<a>" * (MAX_DEPTH + 1), f"more than {MAX_DEPTH} elements inside each other"),
         ("", "is not valid XML"),
+        ('<?xml version="1.0" encoding="undefined"?><a/>', "is not text in undefined"),
     ],
 )
 def test_what_is_no_document_is_refused_in_one_line(tmp_path: Path, text: str, message: str) -> None:

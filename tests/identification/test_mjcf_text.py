@@ -214,10 +214,26 @@ def test_the_drives_of_a_model_of_motion_go_into_the_actuators(tmp_path: Path, d
     assert lines[-1].endswith("the gains of the drives")
 
 
-def test_an_actuator_that_is_no_position_servo_is_not_made_one(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("drive", "message"),
+    [
+        ('<motor joint="elbow"/>', "two.xml, line 19: <motor> is no position servo, which the model has there"),
+        ('<general joint="elbow" gainprm="30"/>', "two.xml, line 19: <general> is no position servo"),
+        ('<position joint="elbow" kp="30" gear="2"/>', "the actuator of joint 'elbow' does not take the drive"),
+    ],
+)
+def test_an_actuator_that_is_no_position_servo_is_not_made_one(tmp_path: Path, drive: str, message: str) -> None:
     source = tmp_path / "two.xml"
-    source.write_text(PLAIN.replace('<position name="servo" joint="elbow" kp="30"/>', '<motor joint="elbow"/>'))
+    source.write_text(PLAIN.replace('<position name="servo" joint="elbow" kp="30"/>', drive))
     model = model_of(source)
     model.write_text(yaml.safe_dump(yaml.safe_load(model.read_text()) | {"controller": CONTROLLER}))
-    told = refusal(lambda: list(export_model(model, tmp_path / "out.xml")))
-    assert told == "two.xml, line 19: <motor> is no position servo, which the model has there"
+    assert message in refusal(lambda: list(export_model(model, tmp_path / "out.xml")))
+
+
+def test_a_drive_of_a_model_has_no_filter_of_its_command(tmp_path: Path) -> None:
+    source = tmp_path / "two.xml"
+    source.write_text(PLAIN.replace('joint="elbow" kp="30"', 'joint="elbow" kp="30" timeconst="0.1"'))
+    model = model_of(source)
+    model.write_text(yaml.safe_dump(yaml.safe_load(model.read_text()) | {"controller": CONTROLLER}))
+    list(export_model(model, tmp_path / "out.xml"))
+    assert not mujoco.MjModel.from_xml_path(str(tmp_path / "out.xml")).actuator_dyntype.any()

@@ -213,3 +213,10 @@ def test_an_input_file_is_never_written_over(urdf: Path) -> None:
     with pytest.raises(InputError, match="is there already: choose another name"):
         list(export_model(model, urdf))
     assert urdf.read_text() == before
+
+
+def test_a_damping_that_is_no_number_is_refused(urdf: Path, tmp_path: Path) -> None:
+    model = model_of(urdf)
+    urdf.write_text(urdf.read_text().replace("<axis", '<dynamics damping="much"/><axis', 1))
+    with pytest.raises(InputError, match="dynamics damping='much' should be a number"):
+        list(export_model(model, tmp_path / "out.urdf"))

@@ -101,7 +101,8 @@ def test_pinocchio_finds_the_torque_of_the_locked_urdf_in_the_whole_one_with_a_s
     list(export_model(model, tmp_path / "fixed.urdf", into=robot))
     record = read_lock_record(robot)
     assert record is not None
-    assert any("finger2" in line and line.endswith("locked in the recording, move in this file") for line in lines)
+    assert any(line.startswith("locked in the recording, free to move in this file: ") for line in lines)
+    assert any(line.endswith("finger2") for line in lines)
     motion = states(len(names))
     whole = pinocchio_torque(tmp_path / "whole.urdf", motion, names, record.positions)
     assert_allclose(whole, pinocchio_torque(tmp_path / "fixed.urdf", motion, names, {}), atol=1e-9)
@@ -211,3 +212,15 @@ def test_a_damaged_record_is_refused(tmp_path: Path) -> None:
     for wrong in ('{"original": 3}', '{"positions": {"finger1": NaN}, "original": "x.urdf"}', "{x}"):
         robot.write_text(f"<robot><!-- armlab: locked joints {wrong} --></robot>")
         assert "the comment 'armlab: locked joints'" in refusal(read_lock_record, robot)
+
+
+def test_positions_of_joints_that_no_file_of_the_export_locks_are_refused(tmp_path: Path) -> None:
+    model, out = model_of(locked_robot(tmp_path, ".urdf")), tmp_path / "out.urdf"
+    told = refusal(lambda: list(export_model(model, out, None, {"joint1": 0.0})))
+    assert "--lock names joint1, which the model moves" in told
+    arm = load_arm("irb120-arm")
+    structure = Structure(arm, ())
+    values = structure.base.values(arm.parameters)
+    own = Model("irb120-arm", structure, values, inertial=arm.parameters).save(tmp_path / "own.yaml")
+    told = refusal(lambda: list(export_model(own, out, None, {"finger1": 0.0})))
+    assert told == "--lock needs a robot file that has finger1: give it with --into"

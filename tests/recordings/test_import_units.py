@@ -286,6 +286,14 @@ def test_numbers_in_their_right_unit_are_not_doubtful(tmp_path: Path) -> None:
         assert (plan.questions, plan.doubts) == ((), ())
 
 
+@pytest.mark.filterwarnings("error")
+def test_torque_far_too_small_is_doubtful_where_some_joints_have_none(tmp_path: Path) -> None:
+    table = carrying_table(tau=1e-4)
+    table[["tau2", "tau3"]] = 0.0
+    (doubt,) = plan_of(tmp_path, table, "irb120-arm", OPTIONS["units"]).doubts
+    assert "against gravity" in doubt
+
+
 def test_torque_is_judged_by_the_limits_where_the_links_are_unknown(tmp_path: Path) -> None:
     robot = changed_arm(tmp_path, {"torque_limit": 60.0})
     text = yaml.safe_load(Path(robot).read_text())
@@ -316,6 +324,11 @@ def test_a_velocity_that_is_no_slope_of_its_position_is_refused_with_the_unit_th
     assert message.endswith(right)
 
 
+MOTION_ONLY: dict[str, Any] = {
+    "torque": None,
+    "reference_position": "q1,q2,q3",
+    "units": ("time=s", "position=rad", "reference_position=rad"),
+}
 RATIOS = np.array([100.0, -80.0, 50.0])
 
 
@@ -381,8 +394,9 @@ def test_a_motor_turns_where_its_joint_slides(tmp_path: Path) -> None:
         ({"gear_ratio": "100,0,50"}, "not zero"),
         ({"gear_ratio": "a,b,c"}, "one number a joint"),
         ({"motor_side": "torque"}, "needs the gears: give --gear-ratio"),
+        ({"gear_ratio": "9,9,9", "motor_side": "torque", **MOTION_ONLY}, "--motor-side torque needs columns of torque"),
     ],
 )
-def test_a_wrong_gear_ratio_is_refused(tmp_path: Path, options: dict[str, str], message: str) -> None:
+def test_a_wrong_gear_ratio_is_refused(tmp_path: Path, options: dict[str, Any], message: str) -> None:
     path = write_log(tmp_path / "log.csv", {})
     assert message in refusal(import_files, [path], tmp_path / "new", {**OPTIONS, **options})

@@ -58,7 +58,7 @@ def write_page_again(folder: Path) -> dict[str, Any]:
         table = ScoreRows(*(_read_table(folder / f"{name}.csv") for name in ROW_TABLES))
         drawn = [name for name in CAPTIONS if (folder / f"{name}.svg").is_file()]
         page = render_page(table, result, _read_table(folder / MISSES_FILE), drawn)
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{folder} holds no whole score ({error}): score its set again with --verdicts") from None
     write_texts({PAGE_FILE: page}, folder)
     return cast(dict[str, Any], result)

@@ -163,6 +163,9 @@ def _servos_of_mjcf(recording: MotionRecording, path: Path) -> Array:
         if bias[1] != -gain[0] or gain[0] <= 0 or model.actuator_gear[actuator, 0] != 1:
             name = recording.arm.joints[joint].name
             raise InputError(f"{path}: the actuator of joint '{name}' is no position servo with gear 1")
+        if model.actuator_dyntype[actuator] != 0:
+            name = recording.arm.joints[joint].name
+            raise InputError(f"{path}: the actuator of joint '{name}' filters its command, which the replay cannot")
         values[row, place("kp")], values[row, place("kd")] = gain[0], -bias[2]
         values[row, place("delay")] = model.actuator_delay[actuator]
         if model.actuator_forcelimited[actuator]:

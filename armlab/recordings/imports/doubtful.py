@@ -23,6 +23,7 @@ SMALL_CURRENT_A = 0.02  # the largest of all joints: the smallest servos take mo
 SMALL_TORQUE_SHARE = 1e-3  # of the torque limit, at every joint that has one
 GRAVITY_RATIOS = (0.05, 100.0)  # of the largest torque to the largest that gravity needs, at every joint that carries
 CARRYING_SHARE = 0.1  # of the largest gravity torque: a joint with less carries little
+MIN_RATIO = 1e-12  # a joint whose torque is zero counts as one with so little
 FITTING_RATIOS = (0.2, 20.0)  # of the same ratio in a unit that fits
 POSES = 300  # at which gravity is computed
 
@@ -87,20 +88,28 @@ def _doubt_torque(
         return f"torque: no drive takes more than {1e3 * np.max(measured):.3g} mA: --unit torque=A?"
     peaks = factors * raw * np.abs(np.array(gains if gains is not None else (1.0,) * len(names)))
     needed = _gravity_peaks(numbers, arm, units)
-    if needed is None:
+    if needed is None or arm is None:
         return _doubt_by_limits(numbers[0], peaks, names)
-    carrying = needed >= CARRYING_SHARE * np.max(needed)
-    ratios = np.where(carrying, peaks / np.where(carrying, needed, 1.0), np.nan)
-    if not (np.nanmax(ratios) < GRAVITY_RATIOS[0] or np.nanmin(ratios) > GRAVITY_RATIOS[1]):
-        return None
+    ratios = _over_gravity(peaks, needed)
+    if np.nanmax(ratios) >= GRAVITY_RATIOS[0]:
+        needed = _gravity_anywhere(arm)
+        ratios = _over_gravity(peaks, needed)
+        if np.nanmin(ratios) <= GRAVITY_RATIOS[1]:
+            return None
     place = int(np.argmax(needed))
     si = SIGNAL_QUANTITIES["torque"].si[joints[place].kind == "prismatic"]
     text = (
         f"torque of joint {joints[place].name} is {peaks[place]:.3g} {si} at most, where the links of the robot file "
         f"need {needed[place]:.3g} {si} against gravity"
     )
-    middle = float(np.exp(np.nanmean(np.log(ratios))))
+    middle = float(np.exp(np.nanmean(np.log(np.maximum(ratios, MIN_RATIO)))))
     return f"{text}: {_torque_advice(names, middle, is_geared=gear is not None and gear.torque)}"
+
+
+def _over_gravity(peaks: Array, needed: Array) -> Array:
+    """Largest torques over those that gravity needs, (joints,); NaN for joints that carry little."""
+    carrying = needed >= CARRYING_SHARE * np.max(needed)
+    return np.where(carrying, peaks / np.where(carrying, needed, 1.0), np.nan)
 
 
 def _torque_advice(names: Sequence[str], ratio: float, is_geared: bool) -> str:
@@ -138,6 +147,20 @@ def _gravity_peaks(numbers: Sequence[Numbers], arm: Arm | None, units: Units) ->
         peaks.append(np.quantile(np.abs(torque), 1 - OUTLIER_SHARE, axis=0))
     needed = np.max(peaks, axis=0)
     return needed if np.all(np.isfinite(needed)) and np.max(needed) > 0 else None
+
+
+def _gravity_anywhere(arm: Arm) -> Array:
+    """The largest torque that gravity needs at each joint in poses all over its range, (joints,).
+
+    A log near the upright pose needs little, and its torque is none the less right.
+    """
+    turn = np.random.default_rng(0).uniform(-np.pi, np.pi, (POSES, len(arm)))
+    ends = np.array([joint.limits.position for joint in arm.joints], dtype=float)
+    bounded = np.isfinite(ends).all(axis=1)
+    low, high = np.where(bounded[:, None], ends, (-np.pi, np.pi)).T
+    position = low + (high - low) * (turn + np.pi) / (2 * np.pi)
+    still = np.zeros_like(position)
+    return np.asarray(np.max(np.abs(rigid_body_torque(arm, Motion(position, still, still))), axis=0))
 
 
 def _doubt_by_limits(numbers: Numbers, peaks: Array, names: Sequence[str]) -> str | None:

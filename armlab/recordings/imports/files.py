@@ -18,6 +18,8 @@ from armlab.recordings.motion import is_motion_only, load_motion_recording
 from armlab.recordings.recording import Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 
+MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and the last are named
+
 
 @dataclass(frozen=True, eq=False)
 class ImportedRecording:
@@ -122,13 +124,10 @@ def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:
     for signal, names in plan.columns.items():
         rows.append((signal, _describe_signal(plan, signal, names)))
     if plan.gear:
-        rows.append(("gear ratio", _describe_gear(plan.gear)))
+        rows.append(("gear ratio", _describe_gear(plan.gear, "torque" in plan.columns)))
     if plan.joints:
         rows.append(("joints", f"{', '.join(plan.joints)}; the others of the robot are held at zero"))
     return [*rows, *(("doubtful", text) for text in plan.doubts)]
-
-
-MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and the last are named
 
 
 def _describe_signal(plan: ImportPlan, signal: str, names: Sequence[str]) -> str:
@@ -150,10 +149,10 @@ def list_columns(names: Sequence[str]) -> str:
     return ", ".join(names)
 
 
-def _describe_gear(gear: Gear) -> str:
+def _describe_gear(gear: Gear, has_torque: bool) -> str:
     """Which signals were divided or multiplied by which ratios."""
     ratios = ", ".join(f"{ratio:g}" for ratio in gear.ratios)
-    what = ["positions divided"] * gear.position + ["torques multiplied"] * gear.torque
+    what = ["positions divided"] * gear.position + ["torques multiplied"] * (gear.torque and has_torque)
     return f"{' and '.join(what)} by {ratios}"
 
 

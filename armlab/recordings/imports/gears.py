@@ -1,5 +1,6 @@
 """The gears of a log whose signals were measured at the motors: as given with `--gear-ratio` and `--motor-side`."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,10 +40,11 @@ class Gear:
         return {signal: np.diag(self.factors(signal)).tolist() for signal, is_wanted in wanted.items() if is_wanted}
 
 
-def choose_gear(options: Options, joints: int | None) -> Gear | None:
-    """The gears as given, None without them. joints: number of columns of the position, None while unknown.
+def choose_gear(options: Options, columns: Mapping[str, tuple[str, ...]], has_all_columns: bool) -> Gear | None:
+    """The gears as given, None without them. columns: those that are known, by the signal; has_all_columns: no other.
 
-    Raises InputError for what is no ratio, and for another number of ratios than of joints.
+    Raises InputError for what is no ratio, for another number of ratios than of columns of the position, and for a log
+    without the signal that `--motor-side` names.
     """
     given, side = options.get("gear_ratio"), options.get("motor_side")
     if given is None:
@@ -50,8 +52,12 @@ def choose_gear(options: Options, joints: int | None) -> Gear | None:
             raise InputError(f"--motor-side {side} needs the gears: give --gear-ratio NUMBER,NUMBER,...")
         return None
     ratios = _parse_ratios(given)
-    if joints is not None and len(ratios) != joints:
-        raise InputError(f"--gear-ratio holds {len(ratios)} numbers for {joints} columns of position")
+    if "position" in columns and len(ratios) != len(columns["position"]):
+        raise InputError(f"--gear-ratio holds {len(ratios)} numbers for {len(columns['position'])} columns of position")
+    if side == "torque" and has_all_columns and side not in columns:
+        raise InputError(
+            "--motor-side torque needs columns of torque, which this recording of motion only does not have"
+        )
     return Gear(ratios, position=side != "torque", torque=side != "position")
 
 

@@ -79,7 +79,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     _check_sources(sources, columns)
     _check_order(columns)
     count = len(columns["position"]) if "position" in columns else None
-    gear = choose_gear(options, count)
+    gear = choose_gear(options, columns, has_all_columns=not unnamed)
     chosen_units, unmeasured = choose_units(log, columns, gear)
     units = {name: known.value[0] if len(known.value) == 1 else known.value for name, known in chosen_units.items()}
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
