@@ -17,6 +17,7 @@ from armlab.effects.contract import Candidate
 from armlab.effects.drive import RotorInertia
 from armlab.effects.parameters import ParameterValue, parameter_values
 from armlab.identification.model_file import base_covariance
+from armlab.identification.recorded_motion import RecordedMotion
 from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Recording
@@ -68,7 +69,15 @@ def build_model(
         provenance=_provenance(recording, notes),
         stated=tuple(term[2] for term in terms),
         unclaimed=frozenset(number for number, term in enumerate(terms) if not term[3]),
+        motion=_recorded_motion(fitted, inertial),
     )
+
+
+def _recorded_motion(fitted: FittedModel, inertial: Array) -> RecordedMotion:
+    """The motion of the runs that identify. inertial: (10 * joints,), the links."""
+    design = fitted.design
+    numbers = sorted({segment.run for segment in design.observed.of_role("identify")})
+    return RecordedMotion.of([design.scenes[number] for number in numbers], inertial)
 
 
 def _fitted_terms(fitted: FittedModel, claims: Mapping[int, Claim]) -> Iterator[Term]:

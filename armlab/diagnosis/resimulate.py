@@ -14,7 +14,6 @@ from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.result import Diagnosis
-from armlab.identification.torque_model import joint_fields
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion
@@ -169,8 +168,7 @@ def _new_body(diagnosis: Diagnosis) -> Body:
     """Links and rotors of the model found."""
     assert diagnosis.inertial is not None
     assert diagnosis.model is not None
-    rotors = joint_fields(diagnosis.model).get("armature", np.zeros(len(diagnosis.simulation.arm)))
-    return Body(diagnosis.simulation.arm, diagnosis.inertial, rotors)
+    return Body(diagnosis.simulation.arm, diagnosis.inertial, diagnosis.model.rotor_inertia)
 
 
 def _old_body(diagnosis: Diagnosis) -> Body:
@@ -192,7 +190,7 @@ def _given_rotors(diagnosis: Diagnosis) -> Array:
     """Rotor inertias that the simulation has, (joints,)."""
     simulation = diagnosis.simulation
     if simulation.model is not None:
-        return joint_fields(simulation.model).get("armature", np.zeros(len(simulation.arm))).copy()
+        return simulation.model.rotor_inertia
     return np.zeros(len(simulation.arm)) + (
         np.asarray(simulation.arm.rotor_inertia) if simulation.arm.rotor_inertia else 0.0
     )

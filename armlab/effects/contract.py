@@ -291,10 +291,10 @@ class Candidate(ABC):
         return None
 
     def joint_fields(self, coefficients: Array) -> dict[str, float]:
-        """Fields of a simulator's joint that stand for this law, in SI units; empty where none comes near enough.
+        """Fields of a simulator's joint that are this law, in SI units; empty where none is.
 
-        A field may replace a part of the law (friction that is smooth at a reversal); the documentation of the effect
-        says so. Names as in MJCF: damping, frictionloss, armature, stiffness, springref.
+        Friction needs none: all friction of a joint becomes the nearest line of Coulomb and viscous friction. Names as
+        in MJCF: damping, frictionloss, armature, stiffness, springref.
         """
         return {}
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from scipy.optimize import nnls
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import ANGLE, TORQUE, Effect, Parameter, Scene, Value
@@ -33,7 +32,6 @@ KNOT_SHARES = (  # of the top speed: from a coarse curve to a fine one
     (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0),
 )
 MAX_FALL = 0.05  # of the largest torque: a broken line swings about a smooth curve by less (chosen by eye)
-LINE_SPEEDS = 50  # speeds at which a simulator's line comes near the curve
 
 
 @dataclass(frozen=True)
@@ -81,13 +79,6 @@ class FrictionCurve(Term):
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         """The knots: velocities, and the torque against the motion at each."""
         return {"velocities": self.velocities, "torques": tuple(np.cumsum(coefficients).tolist())}
-
-    def joint_fields(self, coefficients: Array) -> dict[str, float]:
-        """`damping` and `frictionloss` of the line that is nearest to the curve over its range of speeds."""
-        speed = np.linspace(0, self.velocities[-1], LINE_SPEEDS)
-        curve = coefficients[0] + coefficients[1:] @ self._ramps(speed)
-        level, slope = nnls(np.column_stack([np.ones(LINE_SPEEDS), speed]), curve)[0].tolist()
-        return {"damping": slope, "frictionloss": level}
 
     def equation(self, coefficients: Array) -> str:
         pairs = zip(self.velocities, np.cumsum(coefficients).tolist(), strict=True)

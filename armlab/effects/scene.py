@@ -1,6 +1,6 @@
 """A run as effects see it that are more than linear terms of a motion."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -59,6 +59,18 @@ class Scene:
     def step(self) -> float:
         """Time from sample to sample, s."""
         return float((self.time[-1] - self.time[0]) / max(len(self.time) - 1, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class LoadedScene(Scene):
+    """A scene whose links need the same torque at all times. load: (joints,), N m (N)."""
+
+    load: Array = field(kw_only=True)
+
+    @cached_property
+    def rigid_torque(self) -> Array:
+        """That torque, (samples, joints), N m (N)."""
+        return np.broadcast_to(self.load, self.torque.shape)
 
 
 def _read_only(values: Array) -> Array:

@@ -1,7 +1,8 @@
 """A model as a file of a simulator: URDF, with an SRDF beside it, or MJCF.
 
 Payloads and link errors go into the links, a tilt of the base into gravity, and laws that a simulator's joint has to
-the joints (see `Candidate.joint_fields`); effects without a place in the file are listed.
+the joints (see `Candidate.joint_fields`); all friction of a joint becomes one line (see `friction_lines`); effects
+without a place in the file are listed.
 
 Both formats write the model as a chain of bodies on joints that turn about or slide along z. URDF has no place for the
 armature, which goes to the SRDF that Pinocchio reads (`loadRotorParameters`), and takes gravity as -z of the root: a
@@ -18,8 +19,9 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.effects.contract import Candidate
 from armlab.effects.words import component_in_words
+from armlab.identification.friction_lines import FrictionLine, friction_lines
 from armlab.identification.structure import Structure
-from armlab.identification.torque_model import TorqueModel, joint_fields
+from armlab.identification.torque_model import TorqueModel
 from problem.arm import Arm
 from problem.pseudo_inertia import (
     link_of,
@@ -45,7 +47,8 @@ class SimulatorModel:
     model: links with the bodies that were added, gravity as tilted. fields: of the joints, (joints,) each. missing:
     the named effects without a place, in words. unclaimed: the effects with a place that are no finding, in words; the
     model predicts better with them. thickened_links: links, from 1, that were points or rods, which no
-    simulator takes, and have been given a little extent.
+    simulator takes, and have been given a little extent. friction: one line a joint. negative_rotors: joints, from 1,
+    with a negative rotor inertia in the model, which is left out.
     """
 
     model: TorqueModel
@@ -53,6 +56,8 @@ class SimulatorModel:
     missing: tuple[str, ...]
     unclaimed: tuple[str, ...] = ()
     thickened_links: tuple[int, ...] = ()
+    friction: tuple[FrictionLine, ...] = ()
+    negative_rotors: tuple[int, ...] = ()
 
     def field(self, name: str) -> Array:
         """A field of the joints, (joints,): zero where no effect states it."""
@@ -61,8 +66,12 @@ class SimulatorModel:
 
 def has_place_in_simulator(candidate: Candidate, coefficients: Array) -> bool:
     """Whether an MJCF file can hold an effect: in a joint, a link, or gravity."""
-    return bool(candidate.joint_fields(coefficients)) or any(
-        each is not None for each in (candidate.added_body(coefficients), candidate.changed_gravity(coefficients))
+    return (
+        candidate.is_friction
+        or bool(candidate.joint_fields(coefficients))
+        or any(
+            each is not None for each in (candidate.added_body(coefficients), candidate.changed_gravity(coefficients))
+        )
     )
 
 
@@ -89,7 +98,29 @@ def build_simulator_model(known: TorqueModel) -> SimulatorModel:
     if inertial is not None:
         inertial, thickened = _thicken_links(arm, inertial)
     rigid = _model_with_links(known, arm, inertial)
-    return SimulatorModel(rigid, joint_fields(known), tuple(missing), tuple(unclaimed), thickened)
+    lines, negative = friction_lines(known), known.rotor_inertia < 0
+    return SimulatorModel(
+        model=rigid,
+        fields=_joint_fields(known, lines),
+        missing=tuple(missing),
+        unclaimed=tuple(unclaimed),
+        thickened_links=thickened,
+        friction=lines,
+        negative_rotors=tuple((np.flatnonzero(negative) + 1).tolist()),
+    )
+
+
+def _joint_fields(model: TorqueModel, friction: tuple[FrictionLine, ...]) -> dict[str, Array]:
+    """What a simulator's joints hold of a model, (joints,) a field; no damping, friction or rotor is negative."""
+    out: dict[str, Array] = {}
+    for effect in (each for each in model.effects if not each.candidate.is_friction):
+        for name, value in effect.candidate.joint_fields(effect.coefficients).items():
+            out.setdefault(name, np.zeros(len(model.arm)))[effect.candidate.rows[0]] += value
+    return out | {
+        "armature": np.maximum(model.rotor_inertia, 0.0),
+        "damping": np.array([line.slope for line in friction]),
+        "frictionloss": np.array([line.level for line in friction]),
+    }
 
 
 def _thicken_links(arm: Arm, inertial: Array) -> tuple[Array, tuple[int, ...]]:

@@ -7,6 +7,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Candidate
+from armlab.effects.scene import scene_of
 from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.cross_validation import held_out_error
@@ -30,6 +31,7 @@ from armlab.identification.estimators.noisy_columns import (
 from armlab.identification.estimators.physical import PhysicalEstimate, PhysicalLeastSquares
 from armlab.identification.model import Model
 from armlab.identification.priors import NO_PULL, Pull
+from armlab.identification.recorded_motion import RecordedMotion
 from armlab.identification.regression import Regression, cutoff_of, regression, signals_of, suggested_cutoff
 from armlab.identification.selection import with_load
 from armlab.identification.structure import Structure
@@ -113,6 +115,8 @@ class Identifier:
             structure = replace(structure, load=load)
             data = regression(structure, signals)
         self._keep(structure, data, estimate, cutoff)
+        scenes = [scene_of(each.run, each.motion, self.arm) for each in signals]
+        self.model_ = replace(self.model_, motion=RecordedMotion.of(scenes, self.model_.links))
         return self
 
     def prepare(self, runs: Sequence[Run]) -> PreparedData:

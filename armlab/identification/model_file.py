@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
-from annotated_types import Gt
+from annotated_types import Ge, Gt
 from pydantic import Field
 from scipy.stats import norm
 
@@ -18,8 +18,9 @@ from armlab.common.settings import Settings, read_yaml, validate
 from armlab.effects.contract import Candidate
 from armlab.effects.library import family_named
 from armlab.effects.parameters import Interval, ParameterValue
+from armlab.identification.recorded_motion import RecordedMotion
 from armlab.identification.structure import Structure
-from armlab.identification.torque_model import TorqueModel, joint_fields
+from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording_file import ControllerEntry
 from problem.arm import Arm
 from problem.pseudo_inertia import links_of
@@ -60,6 +61,19 @@ class BaseEntry(Settings):
     covariance: tuple[tuple[float, ...], ...] | None = None
 
 
+class MotionEntry(Settings):
+    """How the joints moved in the runs that the model was fitted on: see `RecordedMotion`.
+
+    speeds: of each joint, rad/s (m/s), at which it spent equal shares of the time that it moved. load: mean size of the
+    torque that the links need, N m (N). duration: s. temperature: degrees Celsius.
+    """
+
+    speeds: tuple[tuple[Annotated[float, Ge(0)], ...], ...]
+    load: tuple[Annotated[float, Ge(0)], ...]
+    duration: Annotated[float, Ge(0)]
+    temperature: tuple[float, ...] | None = None
+
+
 class ModelFile(Settings):
     """The content of `model.yaml`. controller: of position servos, where a recording of motion only was diagnosed."""
 
@@ -68,6 +82,7 @@ class ModelFile(Settings):
     links: tuple[LinkEntry, ...] | None = None
     base_parameters: BaseEntry | None = None
     components: tuple[ComponentEntry, ...]
+    motion: MotionEntry | None = None
     controller: ControllerEntry | None = None
     provenance: dict[str, Any] = Field(default_factory=dict)
 
@@ -104,6 +119,8 @@ def model_content(model: TorqueModel, folder: Path) -> dict[str, Any]:
         count = len(model.structure.base)
         base["covariance"] = model.covariance[:count, :count].tolist()
     content |= {"base_parameters": base, "components": _component_entries(model)}
+    if model.motion is not None:
+        content["motion"] = _motion_entry(model.motion)
     filters = {"cutoff_hz": model.cutoff_hz, "position_factor": model.position_factor}
     factor = {"interval_factor": None if model.covariance is None else model.factor}
     provenance = {**model.provenance, **filters, **factor}
@@ -132,6 +149,15 @@ def _component_entries(model: TorqueModel) -> list[dict[str, Any]]:
         }
         for index, part in enumerate(model.structure.components)
     ]
+
+
+def _motion_entry(motion: RecordedMotion) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "speeds": motion.speeds.tolist(),
+        "load": motion.load.tolist(),
+        "duration": motion.duration,
+    }
+    return entry if motion.temperature is None else entry | {"temperature": motion.temperature.tolist()}
 
 
 def _parameter_entry(parameter: ParameterValue) -> dict[str, Any]:
@@ -180,6 +206,7 @@ def model_of(file: ModelFile, path: Path) -> TorqueModel:
         provenance={key: value for key, value in file.provenance.items() if key not in NUMBER_KEYS},
         stated=tuple(_stated_parameters(entry) for entry in file.components),
         unclaimed=frozenset(index for index, entry in enumerate(file.components) if not entry.claimed),
+        motion=None if file.motion is None else _read_motion(file.motion, arm, path),
     )
 
 
@@ -220,6 +247,16 @@ def _read_inertial(file: ModelFile, arm: Arm, path: Path) -> Array | None:
     return np.concatenate([[each.mass, *each.first_moment, *each.inertia] for each in file.links])
 
 
+def _read_motion(entry: MotionEntry, arm: Arm, path: Path) -> RecordedMotion:
+    counts = {len(own) for own in entry.speeds}
+    if len(entry.speeds) != len(arm) or len(entry.load) != len(arm):
+        raise InputError(f"{path}: motion.speeds and motion.load should have {len(arm)} entries, one a joint")
+    if len(counts) != 1 or 0 in counts:
+        raise InputError(f"{path}: motion.speeds should have equally many speeds for each joint, one or more")
+    temperature = None if entry.temperature is None else np.array(entry.temperature)
+    return RecordedMotion(np.array(entry.speeds), np.array(entry.load), entry.duration, temperature)
+
+
 def _read_base_values(file: ModelFile, structure: Structure, inertial: Array | None, path: Path) -> Array:
     if file.base_parameters is None:
         if inertial is None:
@@ -251,6 +288,5 @@ def arm_of_model(model: TorqueModel) -> Arm:
     """The model's arm with its identified links and rotors; ValueError for a model without physical links."""
     if model.inertial is None:
         raise ValueError("the model has base parameters only: identify it with physically consistent links")
-    rotors = joint_fields(model).get("armature", np.zeros(len(model.arm)))
     arm = model.arm
-    return Arm(arm.name, arm.joints, links_of(model.inertial), arm.gravity, tuple(rotors.tolist()))
+    return Arm(arm.name, arm.joints, links_of(model.inertial), arm.gravity, tuple(model.rotor_inertia.tolist()))

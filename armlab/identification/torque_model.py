@@ -11,6 +11,7 @@ from armlab.common.arrays import Array
 from armlab.effects.model import FittedEffect, torque_in_mechanism, torque_of_model
 from armlab.effects.parameters import ParameterValue, parameter_values
 from armlab.effects.scene import Scene, instants, scene_of
+from armlab.identification.recorded_motion import RecordedMotion
 from armlab.identification.regression import signals_of
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
@@ -28,7 +29,8 @@ class TorqueModel:
     known. factor: from a standard error to half an interval. inertial: (10 * joints,) of physically consistent links,
     or None. cutoff_hz, position_factor: of the filters that it was identified with, see `signals_of`.
     stated: the parameters of each component as a file states them; empty for a model that was fitted. unclaimed:
-    components that the model has because many arms have them, without enough evidence for a finding.
+    components that the model has because many arms have them, without enough evidence for a finding. motion: of the
+    runs that it was fitted on; None where that is not known.
     """
 
     robot: str
@@ -42,6 +44,7 @@ class TorqueModel:
     provenance: dict[str, Any] = field(default_factory=dict)
     stated: tuple[tuple[ParameterValue, ...], ...] = ()
     unclaimed: frozenset[int] = frozenset()
+    motion: RecordedMotion | None = None
 
     @property
     def arm(self) -> Arm:
@@ -63,6 +66,14 @@ class TorqueModel:
     def links(self) -> Array:
         """Inertial parameters (10 * joints,): of the links, or the base parameters and zeros elsewhere."""
         return self.inertial if self.inertial is not None else self.structure.full(self.base_values)
+
+    @property
+    def rotor_inertia(self) -> Array:
+        """Inertia of each rotor on the joint side, (joints,), kg m2 (kg)."""
+        out = np.zeros(len(self.arm))
+        for effect in self.effects:
+            out[effect.candidate.rows[0]] += effect.candidate.joint_fields(effect.coefficients).get("armature", 0.0)
+        return out
 
     def torque(self, motion: Motion, run: Run | None = None) -> Array:
         """Torque of a motion, (samples, joints), N m (N).
@@ -143,15 +154,6 @@ class TorqueModel:
         for index, part in enumerate(self.structure.components):
             rows += [(part.label, each) for each in self.component_parameters(index)]
         return rows
-
-
-def joint_fields(model: TorqueModel) -> dict[str, Array]:
-    """What a simulator's joints hold of a model, (joints,) for each field: see `Candidate.joint_fields`."""
-    out: dict[str, Array] = {}
-    for effect in model.effects:
-        for name, value in effect.candidate.joint_fields(effect.coefficients).items():
-            out.setdefault(name, np.zeros(len(model.arm)))[effect.candidate.rows[0]] += value
-    return out
 
 
 def _around(value: float, half: float) -> tuple[float, float] | None:

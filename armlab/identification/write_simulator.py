@@ -1,6 +1,6 @@
 """`armlab export-model`: a model in the user's own URDF or MJCF, or as a chain of its own."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +17,7 @@ from armlab.identification.export import (
     unstated_limits,
     urdf_document,
 )
+from armlab.identification.friction_lines import line_in_words
 from armlab.identification.mjcf_edit import Drive
 from armlab.identification.model_file import model_of, read_model_file
 from armlab.identification.patch import Patched, Target, patched_urdf
@@ -56,7 +57,7 @@ def export_model(
     drives = {} if file.controller is None else _drives_of(file.controller, len(model.arm))
     patched = _document(simulated, into, locks or {}, out, drives)
     texts = {out.name: patched.text}
-    missing, notes = list(simulated.missing), list(patched.notes)
+    missing, notes = list(simulated.missing), [*patched.notes, *_friction_notes(simulated, model.arm)]
     if out.suffix == ".urdf":
         missing = [
             f"spring of {joint_in_words(model.arm, number)}"
@@ -88,6 +89,14 @@ def export_model(
         "thickened_links": simulated.thickened_links,
         "notes": notes,
     }
+
+
+def _friction_notes(simulated: SimulatorModel, arm: Arm) -> Iterator[str]:
+    """Which lines stand for friction that is no line, and where a rotor's inertia is left out."""
+    yield from (line_in_words(arm, line) for line in simulated.friction if line.laws)
+    if simulated.negative_rotors:
+        joints = joints_in_words(arm, simulated.negative_rotors)
+        yield f"the rotor inertia of {joints} is negative in the model, which no simulator takes: the file has none"
 
 
 def _drives_of(controller: ControllerEntry, joints: int) -> dict[int, Drive]:

@@ -46,9 +46,6 @@ class LipSealFriction(Term):
         share = f"{speed}^2 / ({speed}^2 + {FILM_SPEED}^2)"
         return f"tau_{self.joint} += {format_number(coefficients[0])} {share} sgn({speed})"
 
-    def joint_fields(self, coefficients: Array) -> dict[str, float]:
-        return {"frictionloss": float(coefficients[0])}
-
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
         return cls.at(arm, joints[0]), np.array([parameters["level"]])

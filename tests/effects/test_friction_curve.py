@@ -86,11 +86,6 @@ def test_a_curve_brakes_and_does_not_fall_beyond_its_uncertainty(
     assert found is None if objection is None else objection in (found or "")
 
 
-def test_a_simulator_gets_the_line_that_is_nearest_to_the_curve() -> None:
-    fields = CURVE.joint_fields(np.array([1.5, 0.8, 1.2, 2.0]))
-    assert fields == pytest.approx({"damping": 4.0, "frictionloss": 1.5})
-
-
 def test_the_equation_lists_the_knots() -> None:
     text = CURVE.equation(np.array([1.0, 2.0, 0.5, 2.0]))
     assert text.startswith("tau_2 += F(|qd_2|) sgn(qd_2), F linear between (0, 1), (0.2, 3), (0.5, 3.5), (1, 5.5)")
