@@ -293,10 +293,13 @@ def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array 
 
 
 def _drift_of_gain(pooled: Pooled, joint: int) -> Array:
-    """The torque of each run times what a motor's torque constant differs by between runs, (rows, runs)."""
+    """The torque of each run, by the common model, times what a motor's torque constant differs by between runs, (rows,
+    runs). The measured torque would bring the noise itself into the columns, and bias all that is fitted beside them.
+    """
     counts = [len(each.torque) for each in pooled.observed.signals]
     runs = np.repeat(np.arange(len(counts)), counts)
-    torque = pooled.tuning.gain_drift * pooled.observed.torque[:, joint]
+    left = pooled.model.residual(pooled.model.fit)[:, joint]
+    torque = pooled.tuning.gain_drift * (pooled.observed.torque[:, joint] - left)
     return np.asarray(torque[:, None] * (runs[:, None] == np.arange(len(counts))))
 
 
