@@ -4,12 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
-from armlab.common.arrays import Array
 from armlab.diagnosis.motion.choose import ChosenServo, Gain, first_guesses, is_hidden_by_encoder_steps
 from armlab.diagnosis.motion.compare import chance_of_gain
-from armlab.diagnosis.motion.estimate import ServoFit, correlated_variances
+from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows
 
@@ -76,25 +74,6 @@ def test_a_dead_band_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(st
     assert not is_hidden_by_encoder_steps(place("dead_band"), 0.002, counted)
     assert not is_hidden_by_encoder_steps(place("offset"), 0.001, counted)
     assert not is_hidden_by_encoder_steps(place("dead_band"), 1e-4, still)
-
-
-def test_correlated_errors_widen_what_slow_influences_tell_and_not_what_fast_ones_do() -> None:
-    """Against the scatter of estimates over many drawings of a first-order process."""
-    rng, windows, length, memory = np.random.default_rng(5), 24, 200, 0.9
-    window = np.repeat(np.arange(windows), length)
-    time = np.arange(length)
-    columns = np.column_stack([np.tile(np.cos(2 * np.pi * time / period), windows) for period in (100.0, 4.0)])
-    influence = columns @ np.linalg.inv(columns.T @ columns)
-
-    def draw() -> Array:
-        shocks = rng.normal(size=(windows, length + 100))
-        return np.asarray(lfilter([1.0], [1.0, -memory], shocks, axis=1)[:, 100:].ravel())
-
-    drawn = [draw() for _ in range(300)]
-    scatter = np.var([influence.T @ errors for errors in drawn], axis=0)
-    told = np.mean([correlated_variances(influence, errors, window) for errors in drawn[:20]], axis=0)
-    assert told == pytest.approx(scatter, rel=0.2)
-    assert scatter[0] > 20 * scatter[1]
 
 
 def test_a_number_without_any_slope_is_not_known() -> None:

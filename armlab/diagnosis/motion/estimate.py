@@ -6,13 +6,10 @@ J_w and r_w the Jacobian and the errors of window w (Huber 1967, clustered),
 
     cov = H^-1 (sum_w J_w^T r_w r_w^T J_w) H^-1,  H = J^T J
 
-What all windows have in common such blocks do not see. So no variance is less than that of errors which are correlated
-over time within a window: with u_w the influence of window w's samples on a number, from J H^-1, and S the mean power
-spectrum of the errors,
+What the law and the encoder in the loop leave out is alike in all windows, and such blocks do not see it. So a window
+counts as at most one independent sample: with N samples in W windows, no variance is less than that of
 
-    var = widening^2 sum_w sum_f |U_w(f)|^2 S(f)
-
-The widening stands for what the law leaves out, which is no noise.
+    cov = (N / W) mean(r^2) H^-1
 
 Where the drive integrates its error, what the integral holds at the start of each run is fitted, too.
 """
@@ -136,7 +133,7 @@ def fit_servo(
         xtol=1e-5,
     )
     moved, values = whole(solution.x)
-    covariance = _covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
+    covariance = _block_covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
     return ServoFit(values, free, covariance, _root_mean_square(solution.fun), windows.count, moved.integral)
 
 
@@ -159,33 +156,15 @@ def _integral_slopes(windows: Windows, values: Array, runs: NDArray[np.int64], p
     return np.where(windows.run[windows.window][:, None] == runs, ((ends[0] - ends[1]) / (2 * push))[:, None], 0.0)
 
 
-def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
-    """Of the coordinates, (free, free), by windows as blocks; no variance is less than that of correlated errors."""
+def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
     scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
     blocks = len(scores)
     clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
-    least = correlated_variances(slopes @ inverse, errors, window)
+    least = len(errors) / blocks * np.mean(errors**2) * np.diag(inverse)
     own = np.maximum(np.diag(clustered), 1e-300)
-    wider = np.sqrt(np.maximum(DEFAULT.widening**2 * least / own, 1.0))
+    wider = np.sqrt(np.maximum(least / own, 1.0))
     return np.asarray(clustered * np.outer(wider, wider))
-
-
-def correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp]) -> Array:
-    """Variances (free,) of numbers with these influences (samples, free), under errors correlated within windows."""
-    starts = np.searchsorted(window, np.arange(window[-1] + 1))
-    place = np.arange(len(window)) - starts[window]
-    shape = len(starts), int(place.max()) + 1
-
-    def powers(signal: Array) -> Array:
-        laid_out = np.zeros(shape)
-        laid_out[window, place] = signal
-        return np.asarray(np.sum(np.abs(np.fft.rfft(laid_out, 2 * shape[1], axis=1)) ** 2, axis=0))
-
-    of_errors = powers(errors) / len(errors)
-    weights = np.full(len(of_errors), 2.0)
-    weights[[0, -1]] = 1.0
-    return np.array([float(weights @ (powers(each) * of_errors)) for each in influence.T]) / (2 * shape[1])
 
 
 def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning: MotionTuning = DEFAULT) -> ServoFit:

@@ -79,13 +79,6 @@ class MotionTuning:
         6, unit="fits", meaning="most by which the damping of an unknown drive goes into its torque limit", least=0
     )
     payload_replays: int = tuned(3, unit="replays", meaning="most replays of the arm for one payload", least=1)
-    widening: float = tuned(
-        2.5,
-        unit="of a standard error",
-        meaning="widens what correlated errors tell of a number: what the law leaves out is no noise",
-        source="129 intervals held in 69 % with 1.5 on a development set, and would have in 92 % with 2.5",
-        least=1.0,
-    )
     min_gain: float = tuned(
         0.02,
         unit="of the squared error",
