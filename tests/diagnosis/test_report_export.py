@@ -86,11 +86,10 @@ def test_a_tilt_of_the_base_becomes_the_simulators_gravity_which_the_diagnosis_k
 
 
 def test_effects_without_a_place_in_the_simulator_are_named_in_one_line(tmp_path: Path) -> None:
-    stribeck = component("stribeck_friction", 1, level=2.0, static_level=3.0, velocity=0.1, exponent=2.0)
-    path = model_with(tmp_path, stribeck, component("time_delay", None, seconds=0.004))
+    offset = component("torque_offset", 1, offset=0.4)
+    path = model_with(tmp_path, offset, component("time_delay", None, seconds=0.004))
     lines = list(export_model(path, tmp_path / "arm.xml"))
-    stribeck_words = "Stribeck friction at joint 1 (exponent 2, level 2, static level 3, velocity 0.1)"
-    assert lines[1] == f"not in the file: {stribeck_words}; time delay of the whole robot (0.004)"
+    assert lines[1] == "not in the file: torque offset at joint 1 (0.4); time delay of the whole robot (0.004)"
 
 
 def test_a_model_read_again_adds_each_effect_once(tmp_path: Path) -> None:
