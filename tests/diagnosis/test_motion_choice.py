@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armlab.diagnosis.motion.choose import ChosenServo, Gain, first_guesses, is_hidden_by_encoder_steps
-from armlab.diagnosis.motion.compare import chance_of_gain
+from armlab.diagnosis.motion.choose import ChosenServo, Gain, chance_of_gain, first_guesses, is_hidden_by_encoder_steps
 from armlab.diagnosis.motion.estimate import ServoFit
-from armlab.diagnosis.motion.servo import KEYS, NEUTRAL, USUAL, Key, place
+from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows
 
 GAIN = Gain(share=0.5, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
@@ -76,13 +75,13 @@ def test_a_dead_band_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(st
     assert not is_hidden_by_encoder_steps(place("dead_band"), 1e-4, still)
 
 
-def test_a_number_without_any_slope_is_not_known() -> None:
+def test_a_number_that_no_sample_tells_has_no_interval() -> None:
     free = np.array([key in ("kp", "limit") for key in KEYS])
-    values = numbers(kp=8.0, limit=2.0)
-    fit = ServoFit(values, free, np.diag([1e-4, 0.0]), 1e-3, 20, np.zeros(1))
-    assert fit.p_value(place("limit"), 5.0) == 1.0
-    assert fit.p_value(place("kp"), 7.0) < 1e-6
-    assert fit.p_value(place("kp"), 8.0) == pytest.approx(1.0)
+    fit = ServoFit(numbers(kp=8.0, limit=2.0), free, np.diag([1e-4, 0.0]), 1e-3, 20, np.zeros(1))
+    low, high = fit.interval()
+    limit, kp = place("limit"), place("kp")
+    assert (low[limit], high[limit]) == (LOWEST[limit], HIGHEST[limit])
+    assert 7.5 < low[kp] < 8.0 < high[kp] < 8.5
 
 
 @pytest.fixture

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import t as student
-from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.choose import choose_servo
+from armlab.diagnosis.motion.choose import chance_of_gain, choose_servo
 from armlab.diagnosis.motion.diagnose import reason_unusable
 from armlab.diagnosis.motion.estimate import (
     LOGARITHMIC,
@@ -289,16 +288,6 @@ def _compare_joint(
     judged_models = [(each, *_run_errors(pair, each)) for each in models]
     found, test = {number: gains[number] for number in model.changing}, (looks, tuning.max_p_value)
     return [_change(pair, number, joint, judged_models[number not in found], found, test) for number in numbers]
-
-
-def chance_of_gain(difference: Array) -> float:
-    """P-value of no gain by Wilcoxon's signed ranks (1945): few windows with large errors do not decide.
-
-    difference: (windows,), squared error without a change minus that with it. Windows without a difference, in which
-    the joint rests, say nothing; with them scipy would leave the exact distribution for the normal one.
-    """
-    told = difference[difference != 0]
-    return float(wilcoxon(told, alternative="greater").pvalue) if len(told) else 1.0
 
 
 def _tie(pair: Pair, model: "_Model", number: int) -> "_Model":

@@ -57,12 +57,6 @@ class ServoFit:
         """Degrees of freedom of the covariance."""
         return max(self.windows - int(self.free.sum()), 1)
 
-    def p_value(self, number: int, known: float) -> float:
-        """That a number which was fitted is a known one, two-sided by Student's t."""
-        moved = to_coordinates(np.where(np.arange(len(self.values)) == number, known, self.values))[number]
-        apart = abs(float(to_coordinates(self.values)[number] - moved))
-        return float(2 * student.sf(apart / float(self.standard_errors()[number]), self.freedom))
-
     def interval(self, level: float = 0.95) -> Array:
         """Lower and upper ends (2, parameters) of Student intervals within the bounds of each parameter."""
         half = student.ppf(0.5 + level / 2, self.freedom) * self.standard_errors()

@@ -21,7 +21,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
@@ -142,11 +141,10 @@ def find_payload(
         if not joints:
             return None
         without, with_it = _errors_without_and_with(list(joints.values()), simulation.payload, tuning)
-        more, error = estimate_mass(list(joints.values()), tuning)
-        chance = 2 * float(student.sf(abs(simulation.payload + more) / error, without.shape[1] - 1))
-        gain = _gain_of_all(joints, without, with_it, chance)
+        gain = _gain_of_all(joints, without, with_it)
         if not is_finding(gain, number_of_tests(len(models)), tuning):
             return None
+        more, error = estimate_mass(list(joints.values()), tuning)
         simulation = simulation.with_payload(more)
         if not simulation.is_physical():
             return None
@@ -162,7 +160,7 @@ def find_payload(
 
 
 def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning = DEFAULT) -> tuple[float, float]:
-    """A mass at the tool beside that of the windows, and its standard error, kg."""
+    """A mass at the tool beside that of the windows, and its standard error, kg; infinite where no joint tells."""
     weights, masses = [], []
     for joint in joints:
         free = joint.free.copy()
@@ -170,7 +168,8 @@ def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning = DEFAULT) 
         found = fit_servo(joint.windows, joint.values, free, tuning.refit_evaluations)
         weights.append(1 / max(float(found.standard_errors()[place("payload")]) ** 2, 1e-300))
         masses.append(float(found.values[place("payload")]))
-    return float(np.average(masses, weights=weights)), float(1 / np.sqrt(np.sum(weights)))
+    told = float(np.sum(weights))
+    return (float(np.average(masses, weights=weights)), float(1 / np.sqrt(told))) if told > 0 else (0.0, np.inf)
 
 
 def _errors_without_and_with(joints: Sequence[JointModel], mass: float, tuning: MotionTuning) -> tuple[Array, Array]:
@@ -191,13 +190,11 @@ def _errors_without_and_with(joints: Sequence[JointModel], mass: float, tuning: 
     return without, with_it
 
 
-def _gain_of_all(joints: dict[int, JointModel], without: Array, with_it: Array, chance: float) -> Gain:
-    """What a mass is worth over all joints, of errors over the noise. share: at the joint that gains most. chance: that
-    there is none.
-    """
+def _gain_of_all(joints: dict[int, JointModel], without: Array, with_it: Array) -> Gain:
+    """What a mass is worth over all joints, of errors over the noise. share: at the joint that gains most."""
     noise = np.maximum(with_it.mean(axis=1, keepdims=True), 1e-300)
     samples = sum(len(joint.windows.position) for joint in joints.values())
-    gain = gain_over_windows(samples, (without / noise).sum(axis=0), (with_it / noise).sum(axis=0), chance)
+    gain = gain_over_windows(samples, (without / noise).sum(axis=0), (with_it / noise).sum(axis=0))
     share = float(np.max(1 - with_it.sum(axis=1) / np.maximum(without.sum(axis=1), 1e-300)))
     return replace(gain, share=share)
 
