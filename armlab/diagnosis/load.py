@@ -23,7 +23,15 @@ from armlab.diagnosis.result import Diagnosis, Rival
 from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.solver import State
 from armlab.effects.contract import Candidate, Value
-from armlab.effects.links import MAX_CENTRE_M, PAYLOAD_FACTS, LinkTerm, Payload, SolidBody, torque_of_parameters
+from armlab.effects.links import (
+    MAX_CENTRE_M,
+    PAYLOAD_FACTS,
+    LinkTerm,
+    Payload,
+    SolidBody,
+    torque_of_parameters,
+    unit_mass_at,
+)
 from armlab.effects.parameters import half_widths
 from armlab.effects.scene import Scene
 from armlab.effects.springs import SpringCompensator
@@ -36,7 +44,6 @@ from armlab.identification.payload import (
     load_document,
     number_line,
 )
-from armlab.identification.priors import point_mass
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
@@ -62,11 +69,11 @@ class MassAtPoint(LinkTerm):
 
     def columns(self, scene: Scene) -> Array:
         """Torque of one kilogram there."""
-        return torque_of_parameters(scene, self.link, point_mass(1, self.centre)[None])
+        return torque_of_parameters(scene, self.link, unit_mass_at(self.centre)[None])
 
     def added_body(self, coefficients: Array) -> Array:
         """A point mass about the link's frame."""
-        return float(coefficients[0]) * point_mass(1, self.centre)
+        return float(coefficients[0]) * unit_mass_at(self.centre)
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         return {"mass": float(coefficients[0])}

@@ -234,6 +234,12 @@ class Payload(Body):
         return None
 
 
+def unit_mass_at(point: Sequence[float]) -> Array:
+    """Parameters (10,) of one kilogram at a point of a link's frame, m."""
+    x, y, z = point
+    return np.array([1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
+
+
 @dataclass(frozen=True)
 class PointPayload(LinkTerm):
     """A mass at one point of a link; shape: the point in the link's frame, m."""
@@ -261,19 +267,14 @@ class PointPayload(LinkTerm):
 
     def columns(self, scene: Scene) -> Array:
         """Torque of one kilogram there."""
-        return torque_of_parameters(scene, self.link, self._unit_mass()[None])
-
-    def _unit_mass(self) -> Array:
-        """Parameters (10,) of one kilogram at the point."""
-        x, y, z = self.shape
-        return np.array([1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z])
+        return torque_of_parameters(scene, self.link, unit_mass_at(self.shape)[None])
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
         return {"mass": float(coefficients[0]), "centre": self.shape}
 
     def added_body(self, coefficients: Array) -> Array:
         """A point mass about the link's frame."""
-        return float(coefficients[0]) * self._unit_mass()
+        return float(coefficients[0]) * unit_mass_at(self.shape)
 
     def equation(self, coefficients: Array) -> str:
         """The mass and where it is."""

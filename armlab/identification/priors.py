@@ -8,6 +8,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.effects.drive import RotorInertia
+from armlab.effects.links import unit_mass_at
 from armlab.identification.estimators.least_squares import Prior
 from armlab.identification.regression import Regression
 from armlab.identification.structure import Structure
@@ -44,9 +45,8 @@ NO_PULL = Pull()
 
 def point_mass(joints: int, centre: tuple[float, float, float]) -> Array:
     """Parameters (10 * joints,) of a kilogram at a point of the last link's frame."""
-    x, y, z = centre
     out = np.zeros(10 * joints)
-    out[-10:] = [1, x, y, z, y * y + z * z, x * x + z * z, x * x + y * y, -x * y, -x * z, -y * z]
+    out[-10:] = unit_mass_at(centre)
     return out
 
 

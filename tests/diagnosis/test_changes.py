@@ -98,6 +98,16 @@ def test_two_recordings_of_an_unchanged_robot_are_the_same() -> None:
     assert "Smaller changes than these would not have been seen" in second
 
 
+def test_levels_in_common_are_those_of_the_robot() -> None:
+    """A torque constant that may drift makes them wider, not smaller."""
+    rows = [each for each in comparison("same").changes if each.effect == "viscous_friction"]
+    assert len(rows) == len(ARM)
+    for each in rows:
+        assert each.levels is not None
+        assert each.joint is not None
+        assert np.mean(each.levels) == pytest.approx(VISCOUS[each.joint - 1], rel=0.01)
+
+
 def test_friction_that_fell_is_named_with_its_percent() -> None:
     found = comparison("warm")
     assert found.status == "changed"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.columns import Block, place_of
+from armlab.diagnosis.columns import Block, Place, place_of
 from armlab.diagnosis.compare.mixed import JointRows, MixedModel, WeightedRows, weigh_rows
 from armlab.diagnosis.compare.pooled import Pooled, is_body
 from armlab.diagnosis.tuning import ComparisonTuning
@@ -191,6 +191,17 @@ def _log_bayes_factor(data: Array, towards: Array, scales: Array) -> float:
     return 0.5 * float(scaled @ np.linalg.solve(inner, scaled)) - 0.5 * float(np.linalg.slogdet(inner)[1])
 
 
+@dataclass(frozen=True, eq=False)
+class _Offer:
+    """What may have changed, without own columns yet. scales: (coefficients,); the others as in `ChangeGroup`."""
+
+    block: Block
+    common: NDArray[np.intp]
+    scales: Array
+    laws: tuple[tuple[Candidate, Array], ...] = ()
+    whole_law: bool = False
+
+
 def make_table(pooled: Pooled) -> ChangeTable:
     """Columns of the common model and of all changes, row by row, with the drift of each run."""
     design, observed, tuning = pooled.design, pooled.observed, pooled.tuning
@@ -204,7 +215,7 @@ def make_table(pooled: Pooled) -> ChangeTable:
     for joint in range(observed.joints):
         loading = np.flatnonzero(design.base.columns >= 10 * joint)
         parts.add(joint, np.concatenate([run[joint] for run in design.rigid]), loading)
-    at, prior, common = len(design.base), [np.zeros(len(design.base))], dict[object, NDArray[np.intp]]()
+    at, prior, common = len(design.base), [np.zeros(len(design.base))], dict[Place, NDArray[np.intp]]()
     for block in shared:
         columns = np.arange(at, at + block.values.shape[2])
         at += len(columns)
@@ -213,38 +224,36 @@ def make_table(pooled: Pooled) -> ChangeTable:
         common[place_of(block.candidate)] = columns
         for place, row in enumerate(block.candidate.rows):
             parts.add(row, block.values[:, place], columns)
-    whole = _whole_laws(pooled)
-    for block in whole:
+    whole = []
+    for block in _whole_laws(pooled):
         shapes = np.arange(at, at + len(block.candidate.shape))
         at += len(shapes)
         prior.append(_shape_scales(block.candidate, tuning) ** -2.0)
-        common[id(block)] = np.concatenate([common[place_of(block.candidate)], shapes])
+        both = np.concatenate([common[place_of(block.candidate)], shapes])
+        whole.append(_Offer(block, both, _whole_law_scales(block, pooled), whole_law=True))
         for place, row in enumerate(block.candidate.rows):
             parts.add(row, block.values[:, place, -len(shapes) :], shapes)
     everything, groups = np.arange(at), []
-    scaled = _scaled_frictions(pooled)
     none = np.empty(0, dtype=np.intp)
-    offered = [
-        *(
-            (block, (), common.get(place_of(block.candidate), none), _prior_scales(block, pooled))
-            for block in pooled.changes
-        ),
-        *((block, laws, none, np.full(1, tuning.typical_scale)) for block, laws in scaled),
-        *((block, (), common[id(block)], _whole_law_scales(block, pooled)) for block in whole),
+    scaled = [_Offer(block, none, np.full(1, tuning.typical_scale), laws) for block, laws in _scaled_frictions(pooled)]
+    plain = [
+        _Offer(block, common.get(place_of(block.candidate), none), _prior_scales(block, pooled))
+        for block in pooled.changes
     ]
-    for block, laws, own, scales in offered:
+    for offer in (*plain, *scaled, *whole):
+        block = offer.block
         columns = np.arange(at, at + block.values.shape[2] * contrast.shape[1])
         at += len(columns)
-        scales = np.repeat(scales, contrast.shape[1])
+        scales = np.repeat(offer.scales, contrast.shape[1])
         sampled = any(each.sampled for each in block.candidate.facts.parameters)
         least = interval if sampled else 0.0
         familiar = place_of(block.candidate) in known
-        groups.append(ChangeGroup(block, columns, scales, own, laws, least, id(block) in common, familiar))
+        groups.append(ChangeGroup(block, columns, scales, offer.common, offer.laws, least, offer.whole_law, familiar))
         prior.append(scales**-2.0)
         for place, row in enumerate(block.candidate.rows):
             values = block.values[:, place, :, None] * contrast[pooled.members][:, None, :]
             parts.add(row, values.reshape(len(values), -1), columns)
-    friction = {block.candidate.rows[0]: block.values[:, 0, 0] for block, _ in scaled}
+    friction = {each.block.candidate.rows[0]: each.block.values[:, 0, 0] for each in scaled}
     joints = tuple(_weighted_rows(pooled, parts, joint, friction.get(joint)) for joint in range(observed.joints))
     mixed = MixedModel(joints, at, np.concatenate(prior))
     own = np.arange(design.columns.size)
@@ -298,7 +307,7 @@ def _drift_of_gain(pooled: Pooled, joint: int) -> Array:
     """
     counts = [len(each.torque) for each in pooled.observed.signals]
     runs = np.repeat(np.arange(len(counts)), counts)
-    left = pooled.model.residual(pooled.model.fit)[:, joint]
+    left = pooled.model.residual_at(joint, pooled.model.fit)
     torque = pooled.tuning.gain_drift * (pooled.observed.torque[:, joint] - left)
     return np.asarray(torque[:, None] * (runs[:, None] == np.arange(len(counts))))
 
