@@ -1,6 +1,7 @@
 """Diagnoses of recordings of motion only: named servos, honest nulls, files that reproduce the replay, bad input."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,10 +18,11 @@ from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.choose import learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
+from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
 from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
-from armlab.diagnosis.motion.joint_replay import replay_joint
+from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
@@ -28,7 +30,7 @@ from armlab.diagnosis.motion.servo import NEUTRAL, USUAL, Servos, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
-from armlab.diagnosis.motion.windows import make_windows
+from armlab.diagnosis.motion.windows import Windows, make_windows
 from armlab.diagnosis.motion.words import motion_lines
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
@@ -127,6 +129,27 @@ def test_replay_of_one_joint_agrees_with_mujoco(soft: Path) -> None:
     for windows in make_windows(recording.with_role("identify"), simulation):
         errors = replay_joint(windows, true)[0] - windows.position
         assert np.sqrt(np.mean(errors**2)) < 0.03 * np.std(windows.position)
+
+
+def test_loads_of_replayed_joints_end_at_the_motion_of_the_arm(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
+    true = NEUTRAL.copy()
+    true[[place("kp"), place("damping"), place("friction"), place("armature")]] = 8.0, 0.5, 0.1, 0.01
+    true[[place("limit"), place("delay")]] = 3.0, 0.02
+
+    def error(windows: Sequence[Windows]) -> float:
+        return float(np.sqrt(np.mean(np.concatenate([joint_errors(joint, true)[0] for joint in windows]) ** 2)))
+
+    measured = error(make_windows(runs, simulation))
+    swept = [
+        error(coupled_windows(runs, simulation, [true, true], replace(DEFAULT, coupling_sweeps=sweeps)))
+        for sweeps in (1, 4, 8)
+    ]
+    assert swept[1] < 0.85 * measured
+    assert swept[2] == pytest.approx(swept[1], rel=0.02)
+    held = coupled_windows(runs, simulation, [true, None])[1]
+    np.testing.assert_array_equal(held.measured, make_windows(runs, simulation)[1].measured)
 
 
 def test_a_limit_acts_on_the_command_before_and_after_its_change_within_a_step(soft: Path) -> None:

@@ -1,4 +1,9 @@
-"""Fits the servos of all joints: the arm is replayed for the loads, then each joint chooses its numbers alone."""
+"""Fits the servos of all joints: their replays make the loads, then each joint chooses its numbers alone.
+
+Numbers and loads depend on each other. So the usual numbers and the loads take turns first, and where a joint has
+chosen a number beyond the usual ones, the loads are made and the numbers are chosen again as long as that lowers the
+errors.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -45,8 +50,43 @@ def fit_arm(
 ) -> ArmFit:
     """The servos of all joints.
 
-    starts: numbers, (parameters,) of each joint, with which the arm is replayed; None for a joint that stands still.
+    starts: numbers, (parameters,) of each joint; None for a joint that stands still.
     """
+    progress("replaying the joints together")
+    for _ in range(tuning.coupling_rounds):
+        windows = coupled_windows(runs, simulation, starts, tuning)
+        starts = [
+            None if values is None else _refit(own, values, tuning) for own, values in zip(windows, starts, strict=True)
+        ]
+    fit = _choose_all(runs, simulation, starts, progress, tuning)
+    for _ in range(tuning.coupling_choices - 1):
+        if not any(each is not None and (each.fit.free & np.array(OPTIONAL)).any() for each in fit.chosen):
+            break
+        before = fit
+        starts = [given if own is None else own for own, given in zip(fit.values, starts, strict=True)]
+        fit = _choose_all(runs, simulation, starts, progress, tuning)
+        if _log_squares(fit) > _log_squares(before) + np.log(1 - tuning.min_gain):
+            break
+    return fit
+
+
+def _log_squares(fit: ArmFit) -> float:
+    """Sum of the logarithms of the squared errors of all joints."""
+    return float(2 * sum(np.log(max(each.fit.rms, 1e-300)) for each in fit.chosen if each is not None))
+
+
+def _refit(windows: Windows, values: Array, tuning: MotionTuning) -> Array:
+    few = thin_windows(windows, tuning.max_start_windows)
+    return fit_servo(few, values, np.array(USUAL), tuning.refit_evaluations).values
+
+
+def _choose_all(
+    runs: Sequence[MotionRun],
+    simulation: ServoSimulation,
+    starts: Sequence[Array | None],
+    progress: Callable[[str], None],
+    tuning: MotionTuning,
+) -> ArmFit:
     windows, chosen = coupled_windows(runs, simulation, starts, tuning), list[ChosenServo | None]()
     for number, joint in enumerate(windows):
         progress(f"fitting joint {number + 1} of {len(windows)}")

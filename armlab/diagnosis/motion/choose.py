@@ -21,9 +21,10 @@ from armlab.diagnosis.motion.estimate import (
     settle,
     thin_windows,
     unsaturated_limit,
+    with_damping_inside,
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
-from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, SCALE, USUAL, place
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, PARAMETERS, SCALE, USUAL, Key, place
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
@@ -79,29 +80,18 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
 
     The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
     """
-    free = np.array(USUAL)
-    start, nominal = _choose_damping(windows, nominal, free, tuning)
+    start, nominal = _choose_damping(windows, nominal, np.array(USUAL), tuning)
     base = fill_unknown(nominal)
     windows = windows.with_integral(start.integral)
     odd = _odd_with_any_limit(windows, start, tuning)
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
     few = thin_windows(sound, tuning.max_judged_windows)
-    fit = fit_servo(few, start.values, free, tuning.max_evaluations)
-    judged = errors_on_other_half(few, fit.values, free, tuning)
-    waiting = np.flatnonzero(OPTIONAL).tolist()
-    while waiting:
-        promising = _most_promising(few, fit, waiting, tuning)[: tuning.tried_parameters]
-        tried = {number: _with_parameter(few, fit, number, start, tuning) for number, start in promising}
-        gains = {number: gain_over_windows(len(few.position), judged, errors) for number, (_, errors) in tried.items()}
-        best = max(gains, key=lambda number: gains[number].share)
-        if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
-            break
-        waiting.remove(best)
-        if is_hidden_by_encoder_steps(best, float(tried[best][0].values[best] - base[best]), few):
-            continue
-        fit, judged = tried[best]
-        if best == place("limit") and np.isnan(nominal[place("kp")]):
-            fit, judged = _with_damping_inside(few, fit, judged, base, tuning)
+    fit, judged = _grow(few, start, nominal, tuning)
+    if np.isnan(nominal[place("kp")]) and base[place("limit")] >= INFINITE_LIMIT:
+        limited = find_start(few, nominal, _with(np.array(USUAL), "limit"), tuning, tuning.needed_limits)
+        other, errors = _grow(few, limited, nominal, tuning)
+        if errors.sum() < (1 - tuning.min_gain) * judged.sum():
+            fit, judged = other, errors
     gains = {number: _gain_of(few, fit, number, (base, judged), tuning) for number in np.flatnonzero(fit.free).tolist()}
     last = fit_servo(sound, fit.values, fit.free, tuning.max_evaluations)
     worth = {
@@ -111,6 +101,37 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
         and not is_hidden_by_encoder_steps(number, float(last.values[number] - base[number]), sound)
     }
     return ChosenServo(nominal, last, worth, odd)
+
+
+def _grow(windows: Windows, start: ServoFit, nominal: Array, tuning: MotionTuning) -> tuple[ServoFit, Array]:
+    """The fit from a start with all parameters that are worth a place; its squared error of each window, (windows,)."""
+    base, unknown = fill_unknown(nominal), bool(np.isnan(nominal[place("kp")]))
+    fit = fit_servo(windows, start.values, start.free, tuning.max_evaluations)
+    judged = errors_on_other_half(windows, fit.values, fit.free, tuning)
+    if unknown and fit.free[place("limit")]:
+        fit, judged = _with_damping_inside(windows, fit, judged, base, tuning)
+    waiting = np.flatnonzero(np.array(OPTIONAL) & ~fit.free).tolist()
+    while waiting:
+        promising = _most_promising(windows, fit, waiting, tuning)[: tuning.tried_parameters]
+        tried = {number: _with_parameter(windows, fit, number, guess, tuning) for number, guess in promising}
+        samples = len(windows.position)
+        gains = {number: gain_over_windows(samples, judged, errors) for number, (_, errors) in tried.items()}
+        best = max(gains, key=lambda number: gains[number].share)
+        if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
+            break
+        waiting.remove(best)
+        if is_hidden_by_encoder_steps(best, float(tried[best][0].values[best] - base[best]), windows):
+            continue
+        fit, judged = tried[best]
+        if best == place("limit") and unknown:
+            fit, judged = _with_damping_inside(windows, fit, judged, base, tuning)
+    return fit, judged
+
+
+def _with(free: NDArray[np.bool_], key: Key) -> NDArray[np.bool_]:
+    more = free.copy()
+    more[place(key)] = True
+    return more
 
 
 def first_fit(windows: Windows, nominal: Array, tuning: MotionTuning = DEFAULT) -> ServoFit:
@@ -204,12 +225,8 @@ def _with_damping_inside(
     What the joint has beyond the simulation's damping goes into kd, again and again while that lowers the error.
     judged: squared error of each window. base: the simulation's numbers, with the damping of the joint.
     """
-    kd, damping = place("kd"), place("damping")
     for _ in range(tuning.damping_rounds):
-        inside = fit.values.copy()
-        both = float(inside[kd] + inside[damping])
-        inside[kd] = max(both - float(base[damping]), 0.0)
-        inside[damping] = both - inside[kd]
+        inside = with_damping_inside(fit.values, base)
         other = fit_servo(windows, inside, fit.free, tuning.refit_evaluations)
         errors = errors_on_other_half(windows, other.values, fit.free, tuning)
         if errors.sum() >= judged.sum():

@@ -132,7 +132,7 @@ def diagnose_motion(
     if reason is not None:
         return MotionDiagnosis(recording, simulation, "inconclusive", reason)
     learned, held_out = split_runs(recording, tuning.held_out_share)
-    progress("replaying the joints together")
+    progress("fitting each joint alone")
     firsts = _first_fits(learned, simulation, tuning)
     held = holds_samples(recording.runs, given.rate_hz)
     if held:
@@ -252,7 +252,7 @@ def _conclude(
         named = [[each for each in own if not each.is_shorter(sample)] for own in named]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(given, None, held_out)) if known else ()
-    servos, after, named = replay_named(simulation, chosen, named, before, held_out)
+    servos, after, named = replay_named(simulation, chosen, named, before, held_out, tuning)
     findings = [finding for own in named for finding in own]
     if payload is not None:
         findings.append(_name_payload(payload, fit, judged, tuning))
@@ -291,22 +291,38 @@ def replay_named(
     named: Sequence[list[ServoFinding]],
     before: tuple[Replayed, ...],
     held_out: Sequence[MotionRun],
+    tuning: MotionTuning = DEFAULT,
 ) -> tuple[Servos, tuple[Replayed, ...], list[list[ServoFinding]]]:
     """The servos with what is named, their replay of the held-out runs, and the names of each joint that hold there.
 
-    A joint whose replay its names make worse, the worst first, gets back the numbers of the simulation.
+    A joint whose replay its names make worse, the worst first, gets back the numbers of the simulation. A whole run of
+    sticking joints goes a little another way with any other number: worse is what exceeds the standard error over
+    stretches.
     """
     named = list(named)
     while True:
         values = [_values_after(simulation, number, each, bool(named[number])) for number, each in enumerate(chosen)]
         servos = Servos(np.stack(values))
         after = tuple(replay(simulation, servos, held_out))
-        ratios = joint_rms(after) / joint_rms(before) if before else np.ones(len(named))
-        ratios = np.where([bool(own) for own in named], ratios, 0.0)
-        worst = int(np.argmax(ratios))
-        if ratios[worst] <= 1:
+        rises = _rises(before, after, tuning) if before else np.zeros(len(named))
+        rises = np.where([bool(own) for own in named], rises, 0.0)
+        worst = int(np.argmax(rises))
+        if rises[worst] <= 1:
             return servos, after, named
         named[worst] = []
+
+
+def _rises(before: Sequence[Replayed], after: Sequence[Replayed], tuning: MotionTuning) -> Array:
+    """How much the squared error of each joint rises, (joints,), in standard errors over stretches of the runs."""
+    runs = [each.run for each in before]
+    starts = [(name, first) for name, first, _ in window_stretches(runs, tuning)]
+    rises = []
+    for own, other in zip(before, after, strict=True):
+        edges = np.searchsorted(own.run.time, [first for name, first in starts if name == own.run.name])
+        rises.append(np.add.reduceat(other.error**2 - own.error**2, edges))
+    stretches = np.concatenate(rises)
+    error = np.std(stretches, axis=0, ddof=1) / np.sqrt(len(stretches)) if len(stretches) > 1 else np.zeros(1)
+    return np.asarray(stretches.mean(axis=0) / np.maximum(error, 1e-300))
 
 
 def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo | None, named: bool) -> Array:

@@ -6,10 +6,13 @@ J_w and r_w the Jacobian and the errors of window w (Huber 1967, clustered),
 
     cov = H^-1 (sum_w J_w^T r_w r_w^T J_w) H^-1,  H = J^T J
 
-What the law and the encoder in the loop leave out is alike in all windows, and such blocks do not see it. So a window
-counts as at most one independent sample: with N samples in W windows, no variance is less than that of
+What all windows have in common such blocks do not see. So no variance is less than that of errors which are correlated
+over time within a window: with u_w the influence of window w's samples on a number, from J H^-1, and S the mean power
+spectrum of the errors,
 
-    cov = (N / W) mean(r^2) H^-1
+    var = widening^2 sum_w sum_f |U_w(f)|^2 S(f)
+
+The widening stands for what the law leaves out, which is no noise.
 
 Where the drive integrates its error, what the integral holds at the start of each run is fitted, too.
 """
@@ -29,6 +32,7 @@ from armlab.diagnosis.motion.windows import Windows
 
 LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
 RELATIVE_STEP, SCALE_STEP = 0.01, 0.02  # of finite differences: large, because a joint that sticks is not smooth
+NEEDED_QUANTILE = 0.995  # of the torque that the motion needs: less than what few rows of noise say
 INTEGRAL_STEP = 0.005  # rad (m): position error whose torque is a step of an integral
 
 
@@ -127,7 +131,7 @@ def fit_servo(
         xtol=1e-5,
     )
     moved, values = whole(solution.x)
-    covariance = _block_covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
+    covariance = _covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
     return ServoFit(values, free, covariance, _root_mean_square(solution.fun), windows.count, moved.integral)
 
 
@@ -150,29 +154,77 @@ def _integral_slopes(windows: Windows, values: Array, runs: NDArray[np.int64], p
     return np.where(windows.run[windows.window][:, None] == runs, ((ends[0] - ends[1]) / (2 * push))[:, None], 0.0)
 
 
-def _block_covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+    """Of the coordinates, (free, free), by windows as blocks; no variance is less than that of correlated errors."""
     scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
     blocks = len(scores)
     clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
-    least = len(errors) / blocks * np.mean(errors**2) * np.diag(inverse)
+    least = correlated_variances(slopes @ inverse, errors, window)
     own = np.maximum(np.diag(clustered), 1e-300)
-    wider = np.sqrt(np.maximum(least / own, 1.0))
+    wider = np.sqrt(np.maximum(DEFAULT.widening**2 * least / own, 1.0))
     return np.asarray(clustered * np.outer(wider, wider))
 
 
-def find_start(windows: Windows, nominal: Array, free: NDArray[np.bool_], tuning: MotionTuning = DEFAULT) -> ServoFit:
+def correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+    """Variances (free,) of numbers with these influences (samples, free), under errors correlated within windows."""
+    starts = np.searchsorted(window, np.arange(window[-1] + 1))
+    place = np.arange(len(window)) - starts[window]
+    shape = len(starts), int(place.max()) + 1
+
+    def powers(signal: Array) -> Array:
+        laid_out = np.zeros(shape)
+        laid_out[window, place] = signal
+        return np.asarray(np.sum(np.abs(np.fft.rfft(laid_out, 2 * shape[1], axis=1)) ** 2, axis=0))
+
+    of_errors = powers(errors) / len(errors)
+    weights = np.full(len(of_errors), 2.0)
+    weights[[0, -1]] = 1.0
+    return np.array([float(weights @ (powers(each) * of_errors)) for each in influence.T]) / (2 * shape[1])
+
+
+def find_start(
+    windows: Windows,
+    nominal: Array,
+    free: NDArray[np.bool_],
+    tuning: MotionTuning = DEFAULT,
+    limits: tuple[float, ...] = (),
+) -> ServoFit:
     """The best of several fits of the free parameters: from the regression, a grid of gains, and the simulation.
 
-    nominal: (parameters,), NaN where the simulation does not know a value.
+    nominal: (parameters,), NaN where the simulation does not know a value. limits: of torque, in place of that of the
+    simulation, as shares of the torque that the motion needs; damping is within them.
     """
     few = thin_windows(windows, tuning.max_start_windows)
-    starts = _starts(few, nominal, tuning)
+    starts = _starts(few, nominal, limits, tuning)
     errors = joint_errors(few, starts)
-    best = np.argsort(np.mean(errors**2, axis=1))[: tuning.starts]
+    best = _best_starts(starts, np.mean(errors**2, axis=1), tuning.starts)
     fits = [fit_servo(few, starts[each], free, tuning.start_evaluations) for each in best]
     first = min(fits, key=lambda fit: fit.rms)
     return fit_servo(windows.with_integral(first.integral), first.values, free, tuning.max_evaluations)
+
+
+def _best_starts(starts: Array, squares: Array, count: int) -> list[int]:
+    """The starts with the least squared error, `count` of each torque limit."""
+    limits = starts[:, place("limit")]
+    order = np.argsort(squares)
+    return [each for level in np.unique(limits) for each in order[limits[order] == level][:count].tolist()]
+
+
+def with_found_limit(free: NDArray[np.bool_], values: Array, nominal: Array) -> NDArray[np.bool_]:
+    """The free parameters, and the torque limit where it is not that of the simulation any more."""
+    out, limit = free.copy(), place("limit")
+    out[limit] |= bool(values[limit] != fill_unknown(nominal)[limit])
+    return out
+
+
+def with_damping_inside(values: Array, base: Array) -> Array:
+    """The same with what the joint has beyond the damping of the simulation, `base`, in kd, which the limit acts on."""
+    inside, (kd, damping) = values.copy(), (place("kd"), place("damping"))
+    both = float(values[kd] + values[damping])
+    inside[kd] = max(both - float(base[damping]), 0.0)
+    inside[damping] = both - inside[kd]
+    return inside
 
 
 def thin_windows(windows: Windows, most: int) -> Windows:
@@ -190,12 +242,12 @@ def fill_unknown(nominal: Array) -> Array:
     return np.where(np.isnan(nominal), NEUTRAL, nominal)
 
 
-def _starts(windows: Windows, nominal: Array, tuning: MotionTuning) -> Array:
+def _starts(windows: Windows, nominal: Array, limits: tuple[float, ...], tuning: MotionTuning) -> Array:
     """Parameter sets (starts, parameters)."""
     base = fill_unknown(nominal)
     mass = float(np.median(windows.inertia)) + base[place("armature")]
     found = [] if np.isnan(nominal).any() else [base]
-    regressed = _regress(windows, base, tuning.moving_speed)
+    regressed, needed = _regress(windows, base, tuning.moving_speed)
     frictions = {0.0, float(regressed[place("friction")]), *((float(base[place("friction")]),) if len(found) else ())}
     for frequency in tuning.frequencies_hz:
         for ratio in tuning.damping_ratios:
@@ -207,11 +259,19 @@ def _starts(windows: Windows, nominal: Array, tuning: MotionTuning) -> Array:
                 found.append(one)
     if regressed[place("kp")] > 0:
         found.append(regressed)
+    if limits:
+        inside = [with_damping_inside(one, base) for one in found]
+        found = [one.copy() for one in inside for _ in limits]
+        for one, level in zip(found, limits * len(inside), strict=True):
+            one[place("limit")] = level * needed
     return np.clip(np.stack(found), LOWEST, HIGHEST)
 
 
-def _regress(windows: Windows, base: Array, moving_speed: float) -> Array:
-    """kp e - damping qd - friction sgn(qd) = inertia qdd + load, on moving rows, by least squares."""
+def _regress(windows: Windows, base: Array, moving_speed: float) -> tuple[Array, float]:
+    """kp e - damping qd - friction sgn(qd) = inertia qdd + load, on moving rows, by least squares.
+
+    And the torque that the motion needs beside damping and friction, N m: few rows are above it.
+    """
     steps = windows.measured.shape[1]
     stride = max(round(0.02 / windows.step_s), 1)
     velocity = np.gradient(windows.measured[:, ::stride], stride * windows.step_s, axis=1)
@@ -221,13 +281,13 @@ def _regress(windows: Windows, base: Array, moving_speed: float) -> Array:
     error = command - windows.measured[:, ::stride]
     known = (windows.inertia[:, ::stride] + base[place("armature")]) * acceleration + windows.load[:, ::stride]
     rows = np.abs(velocity) > moving_speed
-    found = base.copy()
+    found, needed = base.copy(), float(np.quantile(np.abs(known), NEEDED_QUANTILE))
     if rows.sum() < 10:
-        return found
+        return found, needed
     columns = np.stack([error[rows], -velocity[rows], -np.sign(velocity[rows])], axis=1)
     solution = np.linalg.lstsq(columns, known[rows], rcond=None)[0]
     found[[place("kp"), place("damping"), place("friction")]] = np.maximum(solution, 0.0)
-    return found
+    return found, needed
 
 
 def unsaturated_limit(windows: Windows, values: Array) -> float:

@@ -16,6 +16,8 @@ commands there are the means of the steps around it, and the share of each follo
 The integral at the first step of a window is that of its run there, along the measured motion.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from armlab.common.arrays import Array
@@ -63,6 +65,26 @@ def replay_joint(windows: Windows, values: Array) -> Array:
     places = (ffi.from_buffer("Servo[]", servos), integrals, path, ffi.from_buffer("double[]", out))
     lib.replay_joint(stretch, len(servos), *places)
     return out
+
+
+def replay_paths(windows: Windows, values: Array) -> tuple[Array, Array]:
+    """Simulated position and velocity at the beginning of each step, (windows, steps) each, rad and rad/s.
+
+    values: (parameters,). A window that ends before the last step repeats its commands and loads.
+    """
+    count, steps = windows.measured.shape
+    everywhere = replace(
+        windows,
+        begin=np.arange(count + 1, dtype=np.int64) * steps,
+        row=np.tile(np.arange(steps, dtype=np.int64), count),
+        fraction=np.zeros(count * steps),
+        position=np.zeros(count * steps),
+    )
+    position = replay_joint(everywhere, values).reshape(count, steps)
+    turns = (-1.0) ** np.arange(steps)  # v' = 2 (q' - q) / h - v
+    sums = np.cumsum(2 / windows.step_s * np.diff(position, axis=1) * turns[1:], axis=1)
+    velocity = turns * (windows.first_velocity[:, None] + np.pad(sums, ((0, 0), (1, 0))))
+    return position, velocity
 
 
 def joint_errors(windows: Windows, values: Array) -> Array:

@@ -1,6 +1,6 @@
 """Closed-loop replay in MuJoCo: the recorded commands through a whole simulated arm, beside the measured motion."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -50,15 +50,6 @@ def replay(simulation: ServoSimulation, servos: Servos | None, runs: Sequence[Mo
         servos = simulation.nominal
     model = _free_model(simulation, servos)
     return [_replay_run(model, simulation, servos, run) for run in runs]
-
-
-def replay_paths(
-    simulation: ServoSimulation, servos: Servos, runs: Sequence[MotionRun], step_s: float
-) -> Iterator[Array]:
-    """The same with another step: positions (steps, joints) of recorded joints from their start on, rad."""
-    model = _free_model(simulation, servos)
-    model.opt.timestep = step_s
-    return (_path(model, simulation, servos, run)[:, list(simulation.joints)] for run in runs)
 
 
 def _free_model(simulation: ServoSimulation, servos: Servos | None) -> Any:

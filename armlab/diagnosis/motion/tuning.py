@@ -35,11 +35,14 @@ class MotionTuning:
         meaning="cut-off of measured minus simulated motion, which loads and couplings get beside the simulated one",
         least=0.1,
     )
-    coupling_step_s: float = tuned(
-        0.0005, unit="s", meaning="step of the replay of the arm that loads and couplings are taken of", least=1e-5
+    coupling_sweeps: int = tuned(
+        4, unit="sweeps", meaning="replays of all joints, one after another, that make their loads", least=1
     )
-    coupling_stride: int = tuned(
-        5, unit="steps", meaning="of that replay, between two instants at which loads are computed", least=1
+    coupling_rounds: int = tuned(
+        2, unit="rounds", meaning="in which the usual numbers and the loads take turns before the choice", least=1
+    )
+    coupling_choices: int = tuned(
+        3, unit="times", meaning="most that loads are made and numbers are chosen by turns", least=1
     )
     held_out_share: float = tuned(
         1 / 3, unit="of each run", meaning="its end, held out where no run validates", least=0.05, most=0.9
@@ -55,6 +58,11 @@ class MotionTuning:
         0.1,
         unit="rad/s (m/s)",
         meaning="rows of the regression that finds starts: above the noise of a differentiated encoder",
+    )
+    needed_limits: tuple[float, ...] = tuned(
+        (0.7, 1.0, 1.5),
+        unit="of the torque that the motion needs",
+        meaning="torque limits of the starts of a fit where the drive is not known: it may push fully most of the time",
     )
     max_start_windows: int = tuned(24, unit="windows", meaning="most windows of the fits that compare starts", least=2)
     starts: int = tuned(2, unit="starts", meaning="starts that are fitted on few windows", least=1)
@@ -119,6 +127,13 @@ class MotionTuning:
     )
     same_error: float = tuned(
         1.25, meaning="ratio of errors before and after, below which the simulation counts as right", least=1.0
+    )
+    widening: float = tuned(
+        2.5,
+        unit="of a standard error",
+        meaning="widens what correlated errors tell of a number: what the law leaves out is no noise",
+        source="125 intervals on a development set: 77 % held with 1.5",
+        least=1.0,
     )
     class_factor: float = tuned(
         3.0,

@@ -111,20 +111,17 @@ class Windows:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class TimedMotion:
-    """A motion of all recorded joints that makes loads and couplings; time: (samples,), s, of a run's stamps."""
-
-    time: Array
-    motion: Motion
-
-
 def smooth_motion(run: MotionRun, tuning: MotionTuning = DEFAULT) -> Motion:
-    """Measured positions through a zero-phase low-pass, with their derivatives, evenly from first to last stamp."""
-    time = np.linspace(run.time[0], run.time[-1], run.samples)
-    rate_hz = (run.samples - 1) / (run.time[-1] - run.time[0])
+    """Measured positions through a zero-phase low-pass, with their derivatives, at `even_time`."""
+    time = even_time(run)
+    rate_hz = 1 / (time[1] - time[0])
     even = np.stack([np.interp(time, run.time, column) for column in run.position.T], axis=1)
     return motion_of(low_pass(even, rate_hz, min(tuning.cutoff_hz, 0.2 * rate_hz)), rate_hz)
+
+
+def even_time(run: MotionRun) -> Array:
+    """As many instants as a run has samples, (samples,), s, evenly from its first stamp to its last."""
+    return np.linspace(run.time[0], run.time[-1], run.samples)
 
 
 def low_pass(signals: Array, rate_hz: float, cutoff_hz: float) -> Array:
@@ -140,37 +137,37 @@ def motion_of(position: Array, rate_hz: float) -> Motion:
     )
 
 
-Loads = tuple[Array, Array, Array]  # own inertia, load and slope
-
-
-def joint_loads(arm: Arm, joints: Sequence[int], motion: Motion) -> Loads:
-    """Own inertia, load and slope of the recorded joints, (samples, joints) each.
-
-    motion: of the recorded joints; the other joints of the arm are at zero and still.
-    """
-    whole = _whole_arm(arm, joints, motion)
-    still = np.zeros_like(whole.position)
-    weight = rigid_body_torque(arm, Motion(whole.position, still, still))
-    inertia, load, slope = (np.empty(motion.position.shape) for _ in range(3))
+def own_terms(arm: Arm, joints: Sequence[int], position: Array) -> tuple[Array, Array]:
+    """Own inertia of each recorded joint, kg m2, and slope of its gravity torque, N m/rad, (samples, joints) each."""
+    still = np.zeros_like(position)
+    whole = _whole_arm(arm, joints, Motion(position, still, still))
+    rest = np.zeros_like(whole.position)
+    weight = rigid_body_torque(arm, whole)
+    inertia, slope = np.empty(position.shape), np.empty(position.shape)
     for column, joint in enumerate(joints):
-        unit = still.copy()
+        unit = rest.copy()
         unit[:, joint] = 1.0
-        inertia[:, column] = (rigid_body_torque(arm, Motion(whole.position, still, unit)) - weight)[:, joint]
-        others = whole.acceleration.copy()
-        others[:, joint] = 0.0
-        load[:, column] = rigid_body_torque(arm, Motion(whole.position, whole.velocity, others))[:, joint]
-        ahead, behind = whole.position + SLOPE_STEP * unit, whole.position - SLOPE_STEP * unit
-        difference = rigid_body_torque(arm, Motion(ahead, still, still)) - rigid_body_torque(
-            arm, Motion(behind, still, still)
+        inertia[:, column] = (rigid_body_torque(arm, Motion(whole.position, rest, unit)) - weight)[:, joint]
+        ahead, behind = (
+            rigid_body_torque(arm, Motion(whole.position + side * SLOPE_STEP * unit, rest, rest)) for side in (1, -1)
         )
-        slope[:, column] = difference[:, joint] / (2 * SLOPE_STEP)
-    return inertia, load, slope
+        slope[:, column] = (ahead - behind)[:, joint] / (2 * SLOPE_STEP)
+    return inertia, slope
+
+
+def joint_torque(arm: Arm, joints: Sequence[int], motion: Motion) -> Array:
+    """Torque of links and gravity at the recorded joints, (samples, joints), N m; the other joints are at zero."""
+    return np.asarray(rigid_body_torque(arm, _whole_arm(arm, joints, motion))[:, list(joints)])
 
 
 def _loads_and_units(simulation: ServoSimulation, loaded: Arm, motion: Motion) -> tuple[Array, ...]:
     """The LOADS of a motion; loaded: the arm with 1 kg at the tool."""
-    own = joint_loads(simulation.arm, simulation.joints, motion)
-    more = joint_loads(loaded, simulation.joints, motion)
+    found = []
+    for arm in (simulation.arm, loaded):
+        inertia, slope = own_terms(arm, simulation.joints, motion.position)
+        torque = joint_torque(arm, simulation.joints, motion)
+        found.append((inertia, torque - inertia * motion.acceleration, slope))
+    own, more = found
     return (*own, *(each - before for each, before in zip(more, own, strict=True)))
 
 
@@ -194,25 +191,19 @@ class _Piece:
 
 
 def make_windows(
-    runs: Sequence[MotionRun],
-    simulation: ServoSimulation,
-    tuning: MotionTuning = DEFAULT,
-    motions: Sequence[TimedMotion] | None = None,
+    runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: MotionTuning = DEFAULT
 ) -> list[Windows]:
     """The windows of each recorded joint; runs are cut into stretches of about the same length.
 
-    motions: of the runs, that make loads and couplings; without them the measured ones through a low-pass.
+    Loads and couplings come from the measured motion through a low-pass.
     """
     pieces = _cut_runs(runs, tuning)
     sample = min(1 / run.rate_hz for run in runs)
     step = sample / np.ceil(sample / tuning.longest_step_s)
-    if motions is None:
-        motions = [
-            TimedMotion(np.linspace(run.time[0], run.time[-1], run.samples), smooth_motion(run, tuning)) for run in runs
-        ]
+    motions = [smooth_motion(run, tuning) for run in runs]
     loaded = simulation.with_payload(1.0).arm
-    loads = [_loads_and_units(simulation, loaded, each.motion) for each in motions]
-    steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.warm]) / step)) + 2 for p in pieces)
+    loads = [_loads_and_units(simulation, loaded, each) for each in motions]
+    steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.warm]) / step)) + 3 for p in pieces)
     history = int(np.ceil(tuning.history_s / step))
     made = []
     for joint in range(len(simulation.joints)):
@@ -277,7 +268,7 @@ def supply_factor(run: MotionRun, joint: int, time: Array, supply: float | None)
 
 def _column(
     run: MotionRun,
-    motion: TimedMotion,
+    motion: Motion,
     loads: tuple[Array, ...],
     piece: _Piece,
     joint: int,
@@ -286,19 +277,21 @@ def _column(
 ) -> dict[str, Array | None]:
     """One window of one joint on the grid: its step, the number of steps, and those before and after for delays."""
     step, steps, history = grid
-    start = run.time[piece.warm]
+    begun = np.floor((run.time[piece.warm] - run.time[0]) / step + 1e-9)
+    start = run.time[0] + step * begun
     time = start + step * np.arange(steps)
     inside = np.minimum(time, run.time[piece.last])
     around = start + step * np.arange(-history, steps + history)
-    own = [np.interp(inside + step / 2, motion.time, signal[:, joint]) for signal in loads]
+    even = even_time(run)
+    own = [np.interp(inside + step / 2, even, signal[:, joint]) for signal in loads]
     rows = (run.time[piece.first : piece.last + 1] - start) / step
     return {
         **dict(zip(LOADS, own, strict=True)),
         "command": mean_command(run, joint, around, step, simulation.rate_hz),
-        "measured": np.interp(inside, motion.time, motion.motion.position[:, joint]),
+        "measured": np.interp(inside, even, motion.position[:, joint]),
         "supply": supply_factor(run, joint, inside, simulation.supply),
-        "velocity": np.interp(start, motion.time, motion.motion.velocity[:, joint]),
-        "start": np.round((start - run.time[0]) / step),
+        "velocity": np.interp(start, even, motion.velocity[:, joint]),
+        "start": begun,
         "row": rows,
         "position": run.position[piece.first : piece.last + 1, joint],
     }
