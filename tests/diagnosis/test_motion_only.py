@@ -26,7 +26,7 @@ from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
-from armlab.diagnosis.motion.servo import NEUTRAL, USUAL, Servos, place
+from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Servos, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
@@ -101,6 +101,14 @@ def test_a_simulation_that_is_right_has_nothing_missing(tmp_path: Path) -> None:
     assert (result.status, result.findings) == ("none", ())
     assert result.servos is not None
     np.testing.assert_array_equal(result.servos.values, result.simulation.nominal.values)
+
+
+def test_what_was_free_when_a_finding_was_judged_is_no_rival_of_it(diagnosis: MotionDiagnosis) -> None:
+    for each in diagnosis.findings:
+        chosen = diagnosis.chosen[each.joint - 1]
+        assert chosen is not None
+        free = {PARAMETERS[number].effect for number in np.flatnonzero(chosen.fit.free)} - {each.effect}
+        assert not free & (set(each.rivals) - set(each.parameter.rivals) - {"rotor_inertia"})
 
 
 def test_without_a_controller_and_with_dropped_rows_the_gain_is_found_all_the_same(soft: Path, tmp_path: Path) -> None:

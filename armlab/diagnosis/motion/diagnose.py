@@ -368,7 +368,8 @@ def name_differences(
 ) -> list[ServoFinding]:
     """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's.
 
-    None raises the error on held-out windows above that with the simulation's number in its place.
+    None raises the error on held-out windows above that with the simulation's number in its place. A number that was
+    free when a finding was judged is no rival of it: it could not make up for the simulation's number.
     windows: of the runs that identify, and of those that are held out. mass_error: of a payload that was found, kg.
     """
     learned, judged = windows
@@ -392,7 +393,8 @@ def name_differences(
             said = _name_damping(chosen, simulation.nominal.values[number])
         if said.ends[0] <= said.nominal <= said.ends[1] or (np.isfinite(said.nominal) and _rms(error) < after):
             continue
-        rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in confused[place_of]))
+        others = [other for other in confused[place_of] if not (fit.free[other] and np.isfinite(said.nominal))]
+        rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in others))
         rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
         if said.effect != parameter.effect:
             rivals = (parameter.effect, *rivals)
