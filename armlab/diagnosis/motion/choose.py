@@ -87,7 +87,7 @@ def choose_servo(windows: Windows, nominal: Array, looks: int, tuning: MotionTun
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
     few = thin_windows(sound, tuning.max_judged_windows)
     fit, judged = _grow(few, start, nominal, tuning)
-    if np.isnan(nominal[place("kp")]) and base[place("limit")] >= INFINITE_LIMIT:
+    if tuning.needed_limits and np.isnan(nominal[place("kp")]) and base[place("limit")] >= INFINITE_LIMIT:
         limited = find_start(few, nominal, _with(np.array(USUAL), "limit"), tuning, tuning.needed_limits)
         other, errors = _grow(few, limited, nominal, tuning)
         if errors.sum() < (1 - tuning.min_gain) * judged.sum():

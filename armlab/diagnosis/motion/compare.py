@@ -108,7 +108,7 @@ def compare_motion(
     changes: list[ServoChange] = []
     for joint, pair in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {joint + 1} of {len(old.joints)}")
-        same_kd = replace(tuning, damping_rounds=0)  # one kd for both recordings: that of the simulation
+        same_kd = replace(tuning, damping_rounds=0, needed_limits=())  # that of the simulation for both recordings
         fits = [
             choose_servo(each, simulation.nominal.values[joint], looks, same_kd)
             for each, simulation in zip(pair, simulations, strict=True)

@@ -25,7 +25,7 @@ from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.payload import JointModel, Payload, estimate_mass, weigh_tool
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
-from armlab.diagnosis.motion.servo import PARAMETERS, ServoParameter, Servos, place
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
@@ -139,20 +139,26 @@ def diagnose_motion(
         progress("finding the clock of the drives")
         learned = hold_commands(learned, given, firsts, tuning)
         simulation = replace(given, rate_hz=None)
-    bare = fit_arm(learned, simulation, firsts, progress, tuning)
-    if not any(bare.chosen):
-        return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
-    progress("weighing the tool")
-    loaded = weigh_tool(learned, bare, progress, tuning)
-    progress("replaying held-out runs")
     bare_simulation = replace(given, rate_hz=simulation.rate_hz)
-    models: list[tuple[ArmFit, Payload | None]] = [(bare, None), *([] if loaded is None else [loaded])]
-    diagnoses = []
-    for fit, payload in models:
+
+    def conclude(fit: ArmFit, payload: Payload | None) -> MotionDiagnosis:
         taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
         judged = coupled_windows(taken, fit.simulation, fit.values, tuning)
         placed = replace(fit, chosen=_place_damping(fit, judged, tuning))
-        diagnoses.append(_conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning))
+        return _conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning)
+
+    limits = [()] if _knows_limits(simulation) else [(), tuning.needed_limits]
+    variants = [replace(tuning, needed_limits=each) for each in limits]
+    fits = [fit_arm(learned, simulation, firsts, progress, each) for each in variants]
+    if not any(any(fit.chosen) for fit in fits):
+        return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
+    progress("replaying held-out runs")
+    diagnoses = [conclude(fit, None) for fit in fits]
+    best = int(np.argmin([_held_out_cost(each, tuning) for each in diagnoses]))
+    progress("weighing the tool")
+    loaded = weigh_tool(learned, fits[best], progress, variants[best])
+    if loaded is not None:
+        diagnoses.append(conclude(*loaded))
     concluded = min(diagnoses, key=lambda each: _held_out_cost(each, tuning))
     if concluded.servos is None:
         return concluded
@@ -162,6 +168,12 @@ def diagnose_motion(
         odd=tuple(_odd_stretches(learned, concluded.chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
+
+
+def _knows_limits(simulation: ServoSimulation) -> bool:
+    """Whether the simulation has a torque limit or a gain of each joint."""
+    known = np.isfinite(simulation.nominal.get("kp")) | (simulation.nominal.get("limit") < INFINITE_LIMIT)
+    return bool(known.all())
 
 
 def reason_unusable(recording: MotionRecording) -> str | None:
