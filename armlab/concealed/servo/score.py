@@ -113,6 +113,7 @@ def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:
     limits = f"above {LEAST_MULTIPLE:g} limits"
     return [
         (Share("nulls with a false claim", sum(bool(each.wrong) for each in nulls), len(nulls)), "at most 2 %"),
+        *(_false_claims(nulls, knowledge) for knowledge in LACKING),
         (Share("nulls without a verdict", sum(bool(each.refused) for each in nulls), len(nulls)), ""),
         (Share("cases without a verdict", sum(bool(each.refused) for each in others), len(others)), ""),
         (Share(f"{limits}: right name", sum(own.named for own in known), len(known)), ""),
@@ -127,8 +128,14 @@ def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:
             "none",
         ),
         (Share("cases with a wrong claim", sum(bool(each.wrong) for each in others), len(others)), ""),
-        (Share("95 % intervals that hold", sum(each.held for each in numbers), len(numbers)), "90 to 98 %"),
+        (Share("intervals of 95 % that hold", sum(each.held for each in numbers), len(numbers)), "90 to 98 %"),
     ]
+
+
+def _false_claims(nulls: Sequence[MotionOutcome], knowledge: str) -> tuple[Share, str]:
+    """Of the nulls whose drives are known, partly or not."""
+    own = [each for each in nulls if each.knowledge == knowledge]
+    return Share(f"nulls with a false claim, drive {knowledge}", sum(bool(each.wrong) for each in own), len(own)), ""
 
 
 def _rows_of_kinds(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
