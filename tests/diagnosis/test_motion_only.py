@@ -160,6 +160,19 @@ def test_loads_of_replayed_joints_end_at_the_motion_of_the_arm(soft: Path) -> No
     np.testing.assert_array_equal(held.measured, make_windows(runs, simulation)[1].measured)
 
 
+def test_a_joint_whose_replay_runs_away_moves_as_measured_for_the_others(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
+    true = NEUTRAL.copy()
+    true[[place("kp"), place("damping"), place("friction")]] = 8.0, 0.5, 0.1
+    wild = true.copy()
+    wild[place("damping")] = -50.0
+    first, second = coupled_windows(runs, simulation, [true, wild])
+    still = coupled_windows(runs, simulation, [true, None])[0]
+    np.testing.assert_allclose(first.load, still.load, atol=1e-9)
+    assert np.isfinite(joint_errors(second, wild)).all()
+
+
 def test_a_limit_acts_on_the_command_before_and_after_its_change_within_a_step(soft: Path) -> None:
     recording = load_motion_recording(soft)
     runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)

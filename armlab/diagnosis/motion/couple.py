@@ -13,10 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import settle
-from armlab.diagnosis.motion.joint_replay import joint_errors, replay_paths
+from armlab.diagnosis.motion.joint_replay import FARTHEST, joint_errors, replay_paths
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import (
@@ -56,8 +57,8 @@ def coupled_windows(
             if values is None:
                 windows[joint] = loaded
                 continue
-            windows[joint], path = _replay(settle(loaded, values), values, runs, tuning)
-            paths = paths.with_joint(joint, path)
+            windows[joint], path, sound = _replay(settle(loaded, values), values, runs, tuning)
+            paths = paths.with_joint(joint, path, sound)
     return _with_units(windows, simulation, paths)
 
 
@@ -69,10 +70,11 @@ class _Paths:
     velocity: Array
     acceleration: Array
 
-    def with_joint(self, joint: int, path: Sequence[Array]) -> "_Paths":
+    def with_joint(self, joint: int, path: Sequence[Array], sound: NDArray[np.bool_]) -> "_Paths":
+        """The same with another motion of a joint in the windows that are sound, (windows,)."""
         signals = [each.copy() for each in (self.position, self.velocity, self.acceleration)]
         for signal, own in zip(signals, path, strict=True):
-            signal[..., joint] = own
+            signal[sound, :, joint] = own[sound]
         return _Paths(*signals)
 
     @property
@@ -149,32 +151,40 @@ def _with_units(windows: Sequence[Windows], simulation: ServoSimulation, paths: 
     ]
 
 
-def _replay(windows: Windows, values: Array, runs: Sequence[MotionRun], tuning: MotionTuning) -> tuple[Windows, Path]:
-    """A joint's motion in the middle of each step, and the windows with it as the measured one.
+def _replay(
+    windows: Windows, values: Array, runs: Sequence[MotionRun], tuning: MotionTuning
+) -> tuple[Windows, Path, NDArray[np.bool_]]:
+    """The windows with a joint's replay as the measured motion; this motion in the middle of each step; sound windows.
 
-    A window begins where the one before it in the run is at that instant.
+    A window begins where the one before it in the run is at that instant. Where a replay runs away, the window stays as
+    it is, and is not sound.
     """
     step, middle = windows.step_s, _middle_times(runs, windows)
     position, velocity = replay_paths(windows, values)
-    missed = _missed(windows, values, runs, tuning)
+    sound = np.asarray(np.all(np.abs(position) < FARTHEST, axis=1))  # no number is not below it either
+    position[~sound], velocity[~sound] = windows.measured[~sound], 0.0
+    missed = _missed(windows, values, runs, sound, tuning)
     begun, moved, _ = _at_windows(missed, windows, middle - step / 2)
     measured, first_velocity = position + begun, windows.first_velocity.copy()
     measured[:, 0] = windows.measured[:, 0]
-    for later in np.flatnonzero(np.diff(windows.run, prepend=-1) == 0).tolist():
+    measured[~sound] = windows.measured[~sound]
+    follows = (np.diff(windows.run, prepend=-1) == 0) & sound & np.roll(sound, 1)
+    for later in np.flatnonzero(follows).tolist():
         column = int(windows.start[later] - windows.start[later - 1])
         measured[later, 0] = position[later - 1, column] + begun[later - 1, column]
         first_velocity[later] = velocity[later - 1, column] + moved[later - 1, column]
     after = np.concatenate([velocity[:, 1:], velocity[:, -1:]], axis=1)
     replayed = position + step / 2 * velocity, (velocity + after) / 2, (after - velocity) / step
     path = tuple(own + slow for own, slow in zip(replayed, _at_windows(missed, windows, middle), strict=True))
-    return replace(windows, measured=measured, first_velocity=first_velocity), path
+    return replace(windows, measured=measured, first_velocity=first_velocity), path, sound
 
 
 def _missed(
-    windows: Windows, values: Array, runs: Sequence[MotionRun], tuning: MotionTuning
+    windows: Windows, values: Array, runs: Sequence[MotionRun], sound: NDArray[np.bool_], tuning: MotionTuning
 ) -> list[tuple[Array, Motion]]:
     """What a replay misses of each run, through a low-pass: its instants, s, and its motion, one column."""
     errors, of_run = -joint_errors(windows, values)[0], windows.run[windows.window]
+    errors[~sound[windows.window]] = 0.0
     rate_hz = 1 / (MISSED_STEPS * windows.step_s)
     missed = []
     for number, run in enumerate(runs):

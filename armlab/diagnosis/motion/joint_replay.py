@@ -25,6 +25,7 @@ from armlab.diagnosis.motion._joint_replay import ffi, lib
 from armlab.diagnosis.motion.servo import PARAMETERS, place
 from armlab.diagnosis.motion.windows import Windows
 
+FARTHEST = 1e6  # rad (m): a replay that goes farther has no bounds
 MAX_STEP_PHASE = 0.5  # of kp h^2 / m: above it the explicit drive would not be stable, whatever the payload
 
 
@@ -88,5 +89,6 @@ def replay_paths(windows: Windows, values: Array) -> tuple[Array, Array]:
 
 
 def joint_errors(windows: Windows, values: Array) -> Array:
-    """Simulated minus measured position, (sets, samples), rad."""
-    return replay_joint(windows, values) - windows.position
+    """Simulated minus measured position, (sets, samples), rad; FARTHEST where a replay runs away."""
+    errors = replay_joint(windows, values) - windows.position
+    return np.where(np.abs(errors) < FARTHEST, errors, FARTHEST)
