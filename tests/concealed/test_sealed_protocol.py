@@ -17,7 +17,7 @@ from armlab.concealed.formats import SetManifest, Truth, read_model
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, PLAN, draw_plan, target_multiple
 from armlab.concealed.prove import diagnose_all, judged_seed
-from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.cases import FAILURE_FILE, read_complaint
 from armlab.concealed.score.scoring import score_set
 from armlab.concealed.sets import (
     MANIFEST_FILE,
@@ -172,6 +172,15 @@ def test_a_diagnosis_that_fails_is_kept_as_failed(made: Path, tmp_path: Path) ->
     assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == [case]
     assert (tmp_path / "v" / case / FAILURE_FILE).is_file()
     assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == []
+
+
+def test_a_complaint_is_one_line_without_the_paths_of_a_traceback(tmp_path: Path) -> None:
+    assert read_complaint(tmp_path) == ""
+    failure = tmp_path / FAILURE_FILE
+    failure.write_text('Traceback\n  File "/home/one/engine.py", line 3, in fit\nValueError: no solution\n\n')
+    assert read_complaint(tmp_path) == "ValueError: no solution"
+    failure.write_text("")
+    assert read_complaint(tmp_path) == "no error output"
 
 
 def test_missing_and_broken_verdicts_count_against_and_stop_nothing(made: Path, tmp_path: Path) -> None:

@@ -68,6 +68,18 @@ def read_cases(folder: Path, verdicts: Path, names: Sequence[str]) -> list[Judge
     return out
 
 
+def read_complaint(folder: Path) -> str:
+    """Why there is no verdict in a folder, in one line; empty where there is one.
+
+    It is the last line of the error output: armlab's message, or the exception at the end of a traceback, without the
+    paths of the machine above it.
+    """
+    path = folder / FAILURE_FILE
+    lines = path.read_text(encoding="utf-8").split("\n") if path.is_file() else []
+    said = [line.strip() for line in lines if line.strip()]
+    return said[-1] if said else ("no error output" if path.is_file() else "")
+
+
 def _read_verdict(path: Path) -> dict[str, Any]:
     try:
         verdict = json.loads(path.read_text(encoding="utf-8"))

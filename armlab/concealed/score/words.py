@@ -4,9 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from armlab.concealed.formats import InjectedEffect
-from armlab.concealed.score.cases import FAILURE_FILE, JudgedCase, categorize_finding
-
-MAX_COMPLAINT_LENGTH = 240  # characters kept of the error message of a diagnosis
+from armlab.concealed.score.cases import JudgedCase, categorize_finding, read_complaint
 
 
 def describe_hidden(case: JudgedCase) -> str:
@@ -60,7 +58,8 @@ def describe_background(case: JudgedCase) -> str:
 def describe_said(case: JudgedCase) -> str:
     """What the verdict said; right findings of the background are counted, not listed."""
     if case.verdict["status"] == "invalid":
-        return f"no verdict{_read_complaint(case)}"
+        complaint = read_complaint(case.folder)
+        return f"no verdict: {complaint}" if complaint else "no verdict"
     told = [(finding, categorize_finding(case, finding)) for finding in case.findings]
     parts = [describe_finding(finding, what) for finding, what in told if what != "background"]
     parts += [_describe_unexplained(each) for each in case.verdict["unexplained"]]
@@ -99,12 +98,6 @@ def _describe_unexplained(part: dict[str, Any]) -> str:
     """Something that no name fits, and on what it depends."""
     depends = ", ".join(map(str, part.get("depends_on") or ()))
     return f"unexplained, {describe_place(part.get('joint'))}" + (f" (by {depends})" if depends else "")
-
-
-def _read_complaint(case: JudgedCase) -> str:
-    path = case.folder / FAILURE_FILE
-    text = " ".join(path.read_text(encoding="utf-8").split()) if path.is_file() else ""
-    return f": {text[-MAX_COMPLAINT_LENGTH:]}" if text else ""
 
 
 def _is_number(value: Any) -> bool:

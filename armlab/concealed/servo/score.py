@@ -16,7 +16,7 @@ import numpy as np
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.cases import read_complaint
 from armlab.concealed.sealed_set import Share
 
 MAX_CLASS = 4  # names
@@ -176,9 +176,9 @@ def _rows_of_misses(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]:
 def _judge(work: Path, case: str) -> MotionOutcome:
     truth = json.loads((work / "truth" / f"{case}.json").read_text(encoding="utf-8"))
     folder = work / "verdicts" / case
-    failed = (folder / FAILURE_FILE).is_file()
-    verdict = {} if failed else json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
-    return judge(truth, verdict, (folder / FAILURE_FILE).read_text(encoding="utf-8").strip() if failed else "")
+    refused = read_complaint(folder)
+    verdict = {} if refused else json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+    return judge(truth, verdict, refused)
 
 
 def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> MotionOutcome:

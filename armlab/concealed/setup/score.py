@@ -16,7 +16,7 @@ from scipy.stats import fisher_exact
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.concealed.score.cases import FAILURE_FILE
+from armlab.concealed.score.cases import read_complaint
 from armlab.concealed.sealed_set import Share
 from armlab.concealed.setup.plan import SetupCase
 
@@ -116,8 +116,8 @@ def physics_chance(outcomes: Sequence[SetupOutcome]) -> float:
 def _judge(work: Path, name: str) -> SetupOutcome:
     truth = json.loads((work / "truth" / f"{name}.json").read_text(encoding="utf-8"))
     folder = work / "verdicts" / name
-    failed = (folder / FAILURE_FILE).is_file()
-    verdict = {} if failed else json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+    refused = read_complaint(folder)
+    verdict = {} if refused else json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
     findings = verdict.get("findings", [])
     setup = [each for each in findings if each.get("kind") == "setup"]
     true = [_label(each) for each in truth["mistakes"]]
@@ -126,7 +126,6 @@ def _judge(work: Path, name: str) -> SetupOutcome:
     right = [any(_is_named(each, members, single) for members in classes) for each in truth["mistakes"]]
     false = sum(not any(_is_named(each, members, single) for each in truth["mistakes"]) for members in classes)
     named = [[each["effect"], each["joint"]] for each in findings if each.get("kind") != "setup"]
-    refused = (folder / FAILURE_FILE).read_text(encoding="utf-8").strip() if failed else ""
     return SetupOutcome(
         case=name,
         source=truth["source"],
