@@ -161,7 +161,7 @@ def _replay(
     """
     step, middle = windows.step_s, _middle_times(runs, windows)
     position, velocity = replay_paths(windows, values)
-    sound = np.asarray(np.all(np.abs(position) < FARTHEST, axis=1))  # no number is not below it either
+    sound = np.asarray(np.all(np.abs(position) < FARTHEST, axis=1))  # NaN is not below it either
     position[~sound], velocity[~sound] = windows.measured[~sound], 0.0
     missed = _missed(windows, values, runs, sound, tuning)
     begun, moved, _ = _at_windows(missed, windows, middle - step / 2)

@@ -11,7 +11,8 @@ from pathlib import Path
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.diagnosis.relations.relations import QUICK, RELATIONS, Desk, Outcome, check_relation
+from armlab.common.report.words import join_words
+from armlab.diagnosis.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, Outcome, check_relation
 from armlab.diagnosis.stored import code_digest, recording_digest
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import PUBLIC_RECORDINGS, is_available, open_public_recording
@@ -92,6 +93,11 @@ def relations_page(outcomes: Sequence[Outcome]) -> str:
         "Relations that hold whatever is true of the robot, so that no answer is needed to check them "
         "(`armlab relations`). A broken one is a fault of the diagnosis or of the comparison."
     )
-    parts = [markdown_table(("relation", *recordings), rows), "## Details"]
+    answered = [each for each in outcomes if each.relation in NULL_PAIRS and each.holds is not None]
+    count = (
+        f"Stretches that are independent of each other ({join_words(NULL_PAIRS)}): {len(answered)} answers, "
+        f"a change is named in {sum(each.holds is False for each in answered)}."
+    )
+    parts = [markdown_table(("relation", *recordings), rows), count, "## Details"]
     details = [(each.recording, each.relation, ANSWERS[each.holds], each.detail) for each in outcomes]
     return markdown_page("Relations", intro, *parts, markdown_table(("recording", "relation", "", "why"), details))

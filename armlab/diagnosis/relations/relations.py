@@ -261,6 +261,7 @@ RELATIONS: dict[str, Relation] = {
     "no finding raises the held-out error": findings_help,
     "predicts as well as identification": predicts_as_well_as_identification,
 }
+NULL_PAIRS = ("odd against even seconds", "first against second half", "run against run")  # independent stretches
 QUICK = (
     "X against X",
     "A to B mirrors B to A",
