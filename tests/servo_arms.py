@@ -55,9 +55,17 @@ def commands(seed: int, seconds: float) -> np.ndarray:
 
 
 def simulate(
-    text: str, command: np.ndarray, delay: float = 0.0, offset: float = 0.0, dead_band: float = 0.0
+    text: str,
+    command: np.ndarray,
+    delay: float = 0.0,
+    offset: float = 0.0,
+    dead_band: float = 0.0,
+    read_late: float = 0.0,
 ) -> np.ndarray:
-    """Positions (samples, 2) that encoders of 4096 counts read; the command is held between samples and late."""
+    """Positions (samples, 2) that encoders of 4096 counts read; the command is held between samples and late.
+
+    read_late: of the second joint after the first one, s.
+    """
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     steps, late = round(1 / RATE_HZ / model.opt.timestep), round(delay / model.opt.timestep)
@@ -68,6 +76,8 @@ def simulate(
     for number in range(len(command) * steps):
         if number % steps == 0:
             read.append(data.qpos.copy())
+        if number % steps == round(read_late / model.opt.timestep):
+            read[-1][1] = data.qpos[1]
         wanted = stream[number] + offset - data.qpos
         data.ctrl[:] = data.qpos + np.sign(wanted) * np.maximum(np.abs(wanted) - dead_band / 2, 0)
         mujoco.mj_step(model, data)
@@ -77,7 +87,7 @@ def simulate(
 def write_recording(folder: Path, truth: dict[str, float] | None = None, seconds: float = 40.0, **changes: Any) -> Path:
     """A recording of the arm with other numbers; its simulation is the nominal MJCF. changes: keys of its YAML."""
     numbers = dict(truth or {})
-    drive = {name: numbers.pop(name, 0.0) for name in ("delay", "offset", "dead_band")}
+    drive = {name: numbers.pop(name, 0.0) for name in ("delay", "offset", "dead_band", "read_late")}
     folder.mkdir(parents=True)
     (folder / "arm.xml").write_text(arm_text())
     runs = []

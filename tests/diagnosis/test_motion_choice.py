@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armlab.diagnosis.motion.choose import ChosenServo, Gain, chance_of_gain, first_guesses, is_hidden_by_encoder_steps
+from armlab.diagnosis.motion.choose import (
+    ChosenServo,
+    Gain,
+    chance_of_gain,
+    chance_of_match,
+    first_guesses,
+    is_hidden_by_encoder_steps,
+)
 from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, NEUTRAL, USUAL, Key, place
 from armlab.diagnosis.motion.windows import Windows
@@ -26,7 +33,7 @@ def chosen_servo(nominal: np.ndarray, *named: Key, **fitted: float) -> ChosenSer
     for key, value in fitted.items():
         values[KEYS.index(key)] = value
     fit = ServoFit(values, np.array(USUAL), np.eye(sum(USUAL)) * 1e-4, 1e-3, 24, np.zeros(1))
-    return ChosenServo(nominal, fit, {place(key): GAIN for key in named}, np.zeros(0, dtype=np.intp))
+    return ChosenServo(nominal, fit, fit.free, {place(key): GAIN for key in named}, np.zeros(0, dtype=np.intp))
 
 
 def test_a_change_of_damping_goes_into_the_drive_as_a_whole() -> None:
@@ -52,11 +59,11 @@ def test_named_numbers_alone_differ_from_the_simulation() -> None:
 def test_a_fit_of_a_torque_limit_starts_below_that_of_the_simulation(still: Windows) -> None:
     known = numbers(kp=20.0, limit=3.0)
     assert [each[place("limit")] for each in first_guesses(still, known, place("limit"))] == pytest.approx(
-        [1.2, 1.8, 2.25, 2.7]
+        [0.6, 1.2, 1.8, 2.25, 2.7]
     )
     weak = replace(still, measured=still.measured + 0.95)
     reached = [each[place("limit")] for each in first_guesses(weak, known, place("limit"))]
-    assert reached == pytest.approx([0.4, 0.6, 0.75, 0.9])
+    assert reached == pytest.approx([0.2, 0.4, 0.6, 0.75, 0.9])
 
 
 def test_windows_at_rest_do_not_make_a_gain_less_sure() -> None:
@@ -65,14 +72,41 @@ def test_windows_at_rest_do_not_make_a_gain_less_sure() -> None:
     assert chance_of_gain(np.zeros(4)) == 1.0
 
 
-def test_a_dead_band_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(still: Windows) -> None:
+def test_the_matched_filter_sees_what_few_windows_tell(still: Windows) -> None:
+    rng = np.random.default_rng(3)
+    count, samples = 20, 100
+    begin = samples * np.arange(count + 1)
+    windows = replace(still, measured=np.zeros((count, samples)), begin=begin, position=np.zeros(begin[-1]))
+    noise = rng.normal(0, 1e-3, begin[-1])
+    change = np.zeros(begin[-1])
+    assert chance_of_match(windows, noise, noise) == 1.0
+    change[: 2 * samples] = 4e-3 * np.sin(np.linspace(0, 30, 2 * samples))  # in two windows of twenty
+    assert chance_of_match(windows, noise + change, noise) < 1e-6
+    guesses = [change * rng.choice([-1, 1]) for _ in range(200)]  # learned from noise: without relation to the errors
+    chances = [
+        chance_of_match(windows, each, each - 0.1 * guess) for guess in guesses for each in [rng.permutation(noise)]
+    ]
+    assert np.mean(np.array(chances) < 0.05) < 0.05
+
+
+def test_a_dead_band_or_friction_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(still: Windows) -> None:
     counted = replace(still, position=0.0015 * np.array([0.0, 1.0, 2.0, 7.0]) + 1e-9 * np.arange(4))
     assert counted.encoder_step == pytest.approx(0.0015, rel=1e-5)
-    assert is_hidden_by_encoder_steps(place("dead_band"), 0.001, counted)
-    assert is_hidden_by_encoder_steps(place("dead_band"), -0.001, counted)
-    assert not is_hidden_by_encoder_steps(place("dead_band"), 0.002, counted)
-    assert not is_hidden_by_encoder_steps(place("offset"), 0.001, counted)
-    assert not is_hidden_by_encoder_steps(place("dead_band"), 1e-4, still)
+    base = numbers(kp=8.0, friction=0.02, dead_band=0.002)
+
+    def hidden(windows: Windows, key: Key, change: float) -> bool:
+        values = base.copy()
+        values[place(key)] += change
+        return is_hidden_by_encoder_steps(place(key), values, base, windows)
+
+    assert hidden(counted, "dead_band", 0.001)
+    assert hidden(counted, "dead_band", -0.001)
+    assert not hidden(counted, "dead_band", 0.002)
+    assert not hidden(counted, "offset", 0.001)
+    assert not hidden(still, "dead_band", 1e-4)
+    assert hidden(counted, "friction", -0.003)  # a step is 8 * 0.0015 = 0.012 N m, its noise 0.0035
+    assert not hidden(counted, "friction", -0.004)
+    assert not hidden(still, "friction", -0.003)
 
 
 def test_a_number_that_no_sample_tells_has_no_interval() -> None:

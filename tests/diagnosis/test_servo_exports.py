@@ -30,7 +30,7 @@ from problem.robot_file import load_arm
 SOURCES = yaml.safe_load((Path(__file__).parent / "simulator_fields.yaml").read_text())
 STEP_S = 0.001
 NUMBERS = {"kp": 8.0, "damping": 0.05, "friction": 0.08, "kd": 0.12, "armature": 0.011, "limit": 1.1, "delay": 0.0214}
-BEYOND_FIELDS = {"offset": 0.02, "dead_band": 0.03, "load_friction": 0.15}
+BEYOND_FIELDS = {"offset": 0.02, "dead_band": 0.03, "load_friction": 0.15, "static_excess": 0.04}
 
 
 def make_servos(**numbers: float) -> Servos:
@@ -214,7 +214,7 @@ def test_the_plug_in_integrates_as_the_replay_of_armlab_does(
     expected = replay(simulation, servos, [run])[0].position
     data = mujoco.MjData(model)
     data.qpos[:] = run.position[0]
-    data.qvel[:] = smooth_motion(run).velocity[0]
+    data.qvel[:] = smooth_motion(run, np.zeros(run.position.shape[1])).velocity[0]
     mujoco.mj_forward(model, data)
     weight = data.qfrc_bias - NUMBERS["kp"] * (run.reference_position[0] - run.position[0])
     with installed(model, read_servos(tmp_path / "servos.json")) as plugin:
@@ -240,6 +240,7 @@ def test_each_file_says_what_it_does_not_hold(simulation: ServoSimulation, tmp_p
         assert "shoulder: add 0.02 rad to the command" in text
         assert "dead band" in text
         assert "elbow: add 0.15 |load| to the friction" in text
+        assert "elbow: add 0.04 exp(-(velocity / 0.1 rad/s)^2) N m to the friction" in text
     assert all("the delay of 21.4 ms becomes 21 steps of 1 ms, 21 ms" in text for text in texts)
     assert "rotor inertia of 0.011 kg m2" in ros_urdf_text(simulation, servos)
     assert all("nothing" not in text for text in texts)
@@ -249,7 +250,7 @@ def follow(model: Any, run: Any) -> np.ndarray:
     """Positions (samples, joints) of a user's own loop: commands as they were logged, one `mj_step` after another."""
     data = mujoco.MjData(model)
     time = run.time - run.time[0]
-    data.qpos[:], data.qvel[:] = run.position[0], smooth_motion(run).velocity[0]
+    data.qpos[:], data.qvel[:] = run.position[0], smooth_motion(run, np.zeros(run.position.shape[1])).velocity[0]
     data.ctrl[:] = run.reference_position[0]
     mujoco.mj_forward(model, data)
     path, steps = [], int(np.ceil(time[-1] / model.opt.timestep)) + 1

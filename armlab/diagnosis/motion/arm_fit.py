@@ -60,7 +60,7 @@ def fit_arm(
         ]
     fit = _choose_all(runs, simulation, starts, progress, tuning)
     for _ in range(tuning.coupling_choices - 1):
-        if not any(each is not None and (each.fit.free & np.array(OPTIONAL)).any() for each in fit.chosen):
+        if not any(each is not None and (each.free & np.array(OPTIONAL)).any() for each in fit.chosen):
             break
         before = fit
         starts = [given if own is None else own for own, given in zip(fit.values, starts, strict=True)]

@@ -108,7 +108,9 @@ def compare_motion(
     changes: list[ServoChange] = []
     for joint, pair in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {joint + 1} of {len(old.joints)}")
-        same_kd = replace(tuning, damping_rounds=0, needed_limits=())  # that of the simulation for both recordings
+        same_kd = replace(
+            tuning, damping_rounds=0, needed_limits=(), integral_rates=()
+        )  # that of the simulation for both recordings
         fits = [
             choose_servo(each, simulation.nominal.values[joint], looks, same_kd)
             for each, simulation in zip(pair, simulations, strict=True)
@@ -117,7 +119,7 @@ def compare_motion(
             each.select(np.setdiff1d(np.arange(each.count), fit.odd)).with_integral(fit.fit.integral)
             for each, fit in zip(pair, fits, strict=True)
         ]
-        free = fits[0].fit.free | fits[1].fit.free
+        free = fits[0].free | fits[1].free
         thinned = tuple(thin_windows(each, tuning.max_judged_windows) for each in sound)
         first, last = (each.fit for each in fits)
         starts = (np.where(first.free, first.values, last.values), np.where(last.free, last.values, first.values))

@@ -17,15 +17,15 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
-from armlab.diagnosis.motion.choose import ChosenServo, first_fit
+from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit, window_squares
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.estimate import settle
+from armlab.diagnosis.motion.estimate import settle, thin_windows
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.payload import JointModel, Payload, estimate_mass, weigh_tool
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
-from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS, ServoParameter, Servos, place
+from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
@@ -33,6 +33,7 @@ from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
 
+EXACT_STEPS = 4  # of a replay that judges, within one of the simulation
 NO_SERVO = "no joint follows its command as a position servo does: check the columns, or the controller is another"
 Status = Literal["mismatch", "none", "inconclusive"]
 
@@ -60,6 +61,10 @@ class ServoFinding:
     def is_shorter(self, sample: float) -> bool:
         """Whether it is a delay or a late reading within one sample, s, which the clock of a drive that holds makes."""
         return self.parameter.key == "delay" and abs(abs(self.value) - abs(self.nominal)) < sample
+
+    def is_lead_of(self, step: float) -> bool:
+        """Whether it is a lead of less than half a step, s, of a simulator, whose integration makes that."""
+        return self.effect == "channel_skew" and 0 < self.value < step / 2
 
     @property
     def equation(self) -> str:
@@ -144,22 +149,19 @@ def diagnose_motion(
     def conclude(fit: ArmFit, payload: Payload | None) -> MotionDiagnosis:
         taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
         judged = coupled_windows(taken, fit.simulation, fit.values, tuning)
-        placed = replace(fit, chosen=_place_damping(fit, judged, tuning))
+        kept = replace(fit, chosen=_without_worse(fit, judged, tuning))
+        placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
         return _conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning)
 
-    limits = [()] if _knows_limits(simulation) else [(), tuning.needed_limits]
-    variants = [replace(tuning, needed_limits=each) for each in limits]
-    fits = [fit_arm(learned, simulation, firsts, progress, each) for each in variants]
-    if not any(any(fit.chosen) for fit in fits):
+    fit = fit_arm(learned, simulation, firsts, progress, tuning)
+    if not any(fit.chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("replaying held-out runs")
-    diagnoses = [conclude(fit, None) for fit in fits]
-    best = int(np.argmin([_held_out_cost(each, tuning) for each in diagnoses]))
+    concluded = conclude(fit, None)
     progress("weighing the tool")
-    loaded = weigh_tool(learned, fits[best], progress, variants[best])
+    loaded = weigh_tool(learned, fit, progress, tuning)
     if loaded is not None:
-        diagnoses.append(conclude(*loaded))
-    concluded = min(diagnoses, key=lambda each: _held_out_cost(each, tuning))
+        concluded = min(concluded, conclude(*loaded), key=lambda each: _held_out_cost(each, tuning))
     if concluded.servos is None:
         return concluded
     return replace(
@@ -168,12 +170,6 @@ def diagnose_motion(
         odd=tuple(_odd_stretches(learned, concluded.chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
-
-
-def _knows_limits(simulation: ServoSimulation) -> bool:
-    """Whether the simulation has a torque limit or a gain of each joint."""
-    known = np.isfinite(simulation.nominal.get("kp")) | (simulation.nominal.get("limit") < INFINITE_LIMIT)
-    return bool(known.all())
 
 
 def reason_unusable(recording: MotionRecording) -> str | None:
@@ -207,6 +203,35 @@ def _first_fits(runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: 
         None if np.ptp(joint.position) < MIN_MOVED else first_fit(joint, nominal, tuning).values
         for joint, nominal in zip(make_windows(runs, simulation, tuning), simulation.nominal.values, strict=True)
     ]
+
+
+def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
+    """The servos without the numbers that make held-out windows clearly worse than a fit of the others does.
+
+    Without an optional number the others are chosen anew.
+    """
+    out: list[ChosenServo | None] = []
+    looks = number_of_tests(len(fit.chosen))
+    given = fit.simulation.nominal.values
+    for each, nominal, learned, held in zip(fit.chosen, given, fit.windows, judged, strict=True):
+        barred: list[int] = []
+        while each is not None:
+            sound = learned.select(np.setdiff1d(np.arange(learned.count), each.odd))
+            numbers = [number for number in each.gains if np.isfinite(each.nominal[number])]
+            few = thin_windows(sound, tuning.max_judged_windows)
+            others = [each.without(number, few, tuning) for number in numbers]
+            own, *without = (window_squares(held, _settled_errors(held, one.fit.values)) for one in (each, *others))
+            rises = [_rise(other, own, tuning) for other in without]
+            if max(rises, default=0.0) <= 1:
+                break
+            worst = numbers[int(np.argmax(rises))]
+            if OPTIONAL[worst]:
+                barred.append(worst)
+                each = choose_servo(learned, nominal, looks, tuning, barred)
+            else:
+                each = each.without(worst, sound, tuning)
+        out.append(each)
+    return out
 
 
 def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
@@ -262,9 +287,11 @@ def _conclude(
     if recording.controller is not None and recording.controller.rate_hz is not None:
         sample = max(1 / run.rate_hz for run in held_out)
         named = [[each for each in own if not each.is_shorter(sample)] for own in named]
+    step = float(given.model().opt.timestep)
+    named = [[each for each in own if not each.is_lead_of(step)] for own in named]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(given, None, held_out)) if known else ()
-    servos, after, named = replay_named(simulation, chosen, named, before, held_out, tuning)
+    servos, after, named = replay_named((given, simulation), chosen, named, before, held_out, tuning)
     findings = [finding for own in named for finding in own]
     if payload is not None:
         findings.append(_name_payload(payload, fit, judged, tuning))
@@ -298,7 +325,7 @@ def _conclude(
 
 
 def replay_named(
-    simulation: ServoSimulation,
+    simulations: tuple[ServoSimulation, ServoSimulation],
     chosen: Sequence[ChosenServo | None],
     named: Sequence[list[ServoFinding]],
     before: tuple[Replayed, ...],
@@ -308,33 +335,49 @@ def replay_named(
     """The servos with what is named, their replay of the held-out runs, and the names of each joint that hold there.
 
     A joint whose replay its names make worse, the worst first, gets back the numbers of the simulation. A whole run of
-    sticking joints goes a little another way with any other number: worse is what exceeds the standard error over
-    stretches.
+    sticking joints goes a little another way with any other number: worse is what matters and exceeds the standard
+    error over stretches, also with steps so short that the simulator's own error is small.
+    simulations: as it is given, and with a payload that was found. before: replay of the first one.
     """
-    named = list(named)
+    named, sound, (given, simulation) = list(named), set[int](), simulations
+    exact_before: list[Replayed] = []
     while True:
         values = [_values_after(simulation, number, each, bool(named[number])) for number, each in enumerate(chosen)]
         servos = Servos(np.stack(values))
         after = tuple(replay(simulation, servos, held_out))
         rises = _rises(before, after, tuning) if before else np.zeros(len(named))
-        rises = np.where([bool(own) for own in named], rises, 0.0)
+        judged = [bool(own) and number not in sound for number, own in enumerate(named)]
+        rises = np.where(judged, rises, 0.0)
         worst = int(np.argmax(rises))
         if rises[worst] <= 1:
             return servos, after, named
-        named[worst] = []
+        exact_before = exact_before or replay(given, None, held_out, EXACT_STEPS)
+        if _rises(exact_before, replay(simulation, servos, held_out, EXACT_STEPS), tuning)[worst] > 1:
+            named[worst] = []
+        else:
+            sound.add(worst)
 
 
 def _rises(before: Sequence[Replayed], after: Sequence[Replayed], tuning: MotionTuning) -> Array:
-    """How much the squared error of each joint rises, (joints,), in standard errors over stretches of the runs."""
+    """How much the squared error of each joint rises, (joints,), as `_rise` has it, over stretches of the runs."""
     runs = [each.run for each in before]
     starts = [(name, first) for name, first, _ in window_stretches(runs, tuning)]
-    rises = []
-    for own, other in zip(before, after, strict=True):
-        edges = np.searchsorted(own.run.time, [first for name, first in starts if name == own.run.name])
-        rises.append(np.add.reduceat(other.error**2 - own.error**2, edges))
-    stretches = np.concatenate(rises)
-    error = np.std(stretches, axis=0, ddof=1) / np.sqrt(len(stretches)) if len(stretches) > 1 else np.zeros(1)
-    return np.asarray(stretches.mean(axis=0) / np.maximum(error, 1e-300))
+    squares: tuple[list[Array], list[Array]] = [], []
+    for pair in zip(before, after, strict=True):
+        edges = np.searchsorted(pair[0].run.time, [first for name, first in starts if name == pair[0].run.name])
+        for each, replayed in zip(squares, pair, strict=True):
+            each.append(np.add.reduceat(replayed.error**2, edges))
+    without, with_it = (np.concatenate(each) for each in squares)
+    return np.array([_rise(*pair, tuning) for pair in zip(without.T, with_it.T, strict=True)])
+
+
+def _rise(without: Array, with_it: Array, tuning: MotionTuning) -> float:
+    """How much the squared error of stretches, (stretches,), rises, in standard errors; 0 for little."""
+    if np.sum(with_it) * (1 - tuning.min_gain) <= np.sum(without):
+        return 0.0
+    rises = with_it - without
+    error = float(np.std(rises, ddof=1)) / np.sqrt(len(rises)) if len(rises) > 1 else 0.0
+    return float(np.mean(rises) / max(error, 1e-300))
 
 
 def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo | None, named: bool) -> Array:
@@ -380,14 +423,14 @@ def name_differences(
 ) -> list[ServoFinding]:
     """The findings of one joint: parameters that earned their place and whose interval leaves out the simulation's.
 
-    None raises the error on held-out windows above that with the simulation's number in its place. A number that was
-    free when a finding was judged is no rival of it: it could not make up for the simulation's number.
+    A number that was free when a finding was judged is no rival of it: it could not make up for the simulation's
+    number.
     windows: of the runs that identify, and of those that are held out. mass_error: of a payload that was found, kg.
     """
     learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
-    confused = confused_parameters(sound, fit, mass_error, tuning)
+    confused = confused_parameters(sound, replace(fit, free=chosen.free), mass_error, tuning)
     unknown_gain = bool(np.isnan(simulation.nominal.values[number, place("kp")]))
     scale: tuple[str, ...] = ("inertial_parameter_error",) if unknown_gain else ()
     if has_weak_load(sound, fit.values, tuning):
@@ -395,17 +438,16 @@ def name_differences(
     if not chosen.gains:
         return []
     errors = [_settled_errors(judged, _with_nominal(fit.values, chosen.nominal, each)) for each in chosen.gains]
-    after = _rms(_settled_errors(judged, fit.values))
-    found = []
+    after, found = _rms(_settled_errors(judged, fit.values)), []
     for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
         parameter = PARAMETERS[place_of]
         fitted, ends = float(fit.values[place_of]), (float(low[place_of]), float(high[place_of]))
         said = _named(parameter, fitted, ends, float(chosen.nominal[place_of]))
         if parameter.key == "damping":
             said = _name_damping(chosen, simulation.nominal.values[number])
-        if said.ends[0] <= said.nominal <= said.ends[1] or (np.isfinite(said.nominal) and _rms(error) < after):
+        if said.ends[0] <= said.nominal <= said.ends[1]:
             continue
-        others = [other for other in confused[place_of] if not (fit.free[other] and np.isfinite(said.nominal))]
+        others = [other for other in confused[place_of] if not (chosen.free[other] and np.isfinite(said.nominal))]
         rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in others))
         rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
         if said.effect != parameter.effect:

@@ -28,7 +28,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import HIGHEST, INFINITE_LIMIT, KEYS, LOWEST, NEUTRAL, SCALE, place
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
-from armlab.diagnosis.motion.windows import Windows
+from armlab.diagnosis.motion.windows import Windows, at_rest
 
 LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
 RELATIVE_STEP, SCALE_STEP = 0.01, 0.02  # of finite differences: large, because a joint that sticks is not smooth
@@ -96,9 +96,16 @@ def jacobian(windows: Windows, values: Array, free: NDArray[np.bool_]) -> Array:
 
 
 def fit_servo(
-    windows: Windows, start: Array, free: NDArray[np.bool_], evaluations: int = DEFAULT.max_evaluations
+    windows: Windows,
+    start: Array,
+    free: NDArray[np.bool_],
+    evaluations: int = DEFAULT.max_evaluations,
+    tolerance: float = 1e-5,
 ) -> ServoFit:
-    """The fit of the free parameters from a start, (parameters,); the others keep their values."""
+    """The fit of the free parameters from a start, (parameters,); the others keep their values.
+
+    tolerance: relative, of the cost and of the step of the last evaluation.
+    """
     values = np.clip(start, LOWEST, HIGHEST)
     chosen = np.flatnonzero(free)
     runs = np.unique(windows.run) if values[place("ki")] > 0 else np.zeros(0, dtype=np.int64)
@@ -127,8 +134,8 @@ def fit_servo(
         bounds=(low, high),
         x_scale=np.concatenate([np.where(LOGARITHMIC, 0.2, SCALE)[chosen], np.full(len(runs), push)]),
         max_nfev=evaluations,
-        ftol=1e-5,
-        xtol=1e-5,
+        ftol=tolerance,
+        xtol=tolerance,
     )
     moved, values = whole(solution.x)
     covariance = _covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
@@ -162,7 +169,7 @@ def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array
     clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
     least = correlated_variances(slopes @ inverse, errors, window)
     own = np.maximum(np.diag(clustered), 1e-300)
-    wider = np.sqrt(np.maximum(DEFAULT.widening**2 * least / own, 1.0))
+    wider = np.sqrt(np.clip(DEFAULT.widening**2 * least / own, 1.0, 1e200))
     return np.asarray(clustered * np.outer(wider, wider))
 
 
@@ -183,23 +190,38 @@ def correlated_variances(influence: Array, errors: Array, window: NDArray[np.int
     return np.array([float(weights @ (powers(each) * of_errors)) for each in influence.T]) / (2 * shape[1])
 
 
+@dataclass(frozen=True)
+class Unstated:
+    """What a fit tries that the simulation does not state.
+
+    limits: of torque, as shares of the torque that the motion needs; damping is within them. rates: of integral gains
+    over kp, 1/s. wound_up: limits of the integrals, as shares of the torque that the motion needs.
+    """
+
+    limits: tuple[float, ...] = ()
+    rates: tuple[float, ...] = ()
+    wound_up: tuple[float, ...] = ()
+
+
 def find_start(
     windows: Windows,
     nominal: Array,
     free: NDArray[np.bool_],
     tuning: MotionTuning = DEFAULT,
-    limits: tuple[float, ...] = (),
+    unstated: Unstated = Unstated(),
 ) -> ServoFit:
     """The best of several fits of the free parameters: from the regression, a grid of gains, and the simulation.
 
-    nominal: (parameters,), NaN where the simulation does not know a value. limits: of torque, in place of that of the
-    simulation, as shares of the torque that the motion needs; damping is within them.
+    nominal: (parameters,), NaN where the simulation does not know a value. unstated: tried in place of its numbers.
     """
     few = thin_windows(windows, tuning.max_start_windows)
-    starts = _starts(few, nominal, limits, tuning)
-    errors = joint_errors(few, starts)
+    starts = _starts(few, nominal, unstated, tuning)
+    if unstated.rates:
+        errors = np.concatenate([joint_errors(at_rest(few, start), start) for start in starts])
+    else:
+        errors = joint_errors(few, starts)
     best = _best_starts(starts, np.mean(errors**2, axis=1), tuning.starts)
-    fits = [fit_servo(few, starts[each], free, tuning.start_evaluations) for each in best]
+    fits = [fit_servo(at_rest(few, starts[each]), starts[each], free, tuning.start_evaluations) for each in best]
     first = min(fits, key=lambda fit: fit.rms)
     return fit_servo(windows.with_integral(first.integral), first.values, free, tuning.max_evaluations)
 
@@ -209,13 +231,6 @@ def _best_starts(starts: Array, squares: Array, count: int) -> list[int]:
     limits = starts[:, place("limit")]
     order = np.argsort(squares)
     return [each for level in np.unique(limits) for each in order[limits[order] == level][:count].tolist()]
-
-
-def with_found_limit(free: NDArray[np.bool_], values: Array, nominal: Array) -> NDArray[np.bool_]:
-    """The free parameters, and the torque limit where it is not that of the simulation any more."""
-    out, limit = free.copy(), place("limit")
-    out[limit] |= bool(values[limit] != fill_unknown(nominal)[limit])
-    return out
 
 
 def with_damping_inside(values: Array, base: Array) -> Array:
@@ -242,7 +257,7 @@ def fill_unknown(nominal: Array) -> Array:
     return np.where(np.isnan(nominal), NEUTRAL, nominal)
 
 
-def _starts(windows: Windows, nominal: Array, limits: tuple[float, ...], tuning: MotionTuning) -> Array:
+def _starts(windows: Windows, nominal: Array, unstated: Unstated, tuning: MotionTuning) -> Array:
     """Parameter sets (starts, parameters)."""
     base = fill_unknown(nominal)
     mass = float(np.median(windows.inertia)) + base[place("armature")]
@@ -259,12 +274,26 @@ def _starts(windows: Windows, nominal: Array, limits: tuple[float, ...], tuning:
                 found.append(one)
     if regressed[place("kp")] > 0:
         found.append(regressed)
-    if limits:
-        inside = [with_damping_inside(one, base) for one in found]
-        found = [one.copy() for one in inside for _ in limits]
-        for one, level in zip(found, limits * len(inside), strict=True):
-            one[place("limit")] = level * needed
+    if unstated.limits:
+        found = [
+            _with(with_damping_inside(one, base), limit=level * needed) for one in found for level in unstated.limits
+        ]
+    if unstated.rates:
+        found = [
+            _with(one, ki=rate * float(one[place("kp")]), integral_limit=level * needed)
+            for one in found
+            for rate in unstated.rates
+            for level in unstated.wound_up
+        ]
     return np.clip(np.stack(found), LOWEST, HIGHEST)
+
+
+def _with(values: Array, **numbers: float) -> Array:
+    """The parameters with other numbers by their keys."""
+    changed = values.copy()
+    for key, number in numbers.items():
+        changed[KEYS.index(key)] = number
+    return changed
 
 
 def _regress(windows: Windows, base: Array, moving_speed: float) -> tuple[Array, float]:

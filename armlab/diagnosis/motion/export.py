@@ -67,8 +67,14 @@ def lines_without_field(simulation: ServoSimulation, servos: Servos, with_field:
             yield f"{name}: send the position itself where |command - position| is below {band / 2:.4g} rad (dead band)"
         if share:
             yield (
-                f"{name}: add {share:.4g} |load| to the friction at each step; load: torque of gravity and velocities, "
-                "qfrc_bias in MuJoCo (friction that grows with load)"
+                f"{name}: add {share:.4g} |load| to the friction at each step; load: torque that moves and holds the "
+                "links, mj_rne with accelerations in MuJoCo (friction that grows with load)"
+            )
+        excess, speed = float(servos.get("static_excess")[row]), float(servos.get("stribeck_speed")[row])
+        if excess:
+            yield (
+                f"{name}: add {excess:.4g} exp(-(velocity / {speed:.4g} rad/s)^2) N m to the friction at each step "
+                "(Stribeck friction)"
             )
         gain = float(servos.get("ki")[row])
         if gain and "integral gain" not in with_field:

@@ -20,8 +20,8 @@
 
 /* In the order of PARAMETERS in servo.py. */
 typedef struct {
-    double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, ki, integral_limit,
-        payload;
+    double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, static_excess,
+        stribeck_speed, ki, integral_limit, payload;
 } Servo;
 
 /* One joint in all windows. command: (windows, columns); measured, supply: (windows, steps), supply may be null; inertia,
@@ -37,6 +37,13 @@ typedef struct {
     const int64_t *begin, *row, *run, *start;
     const double *fraction;
 } Stretch;
+
+/* Masses of an arm at every `every` steps. mass: (windows, rows, joints, joints), two rows at least, and one after the
+ * last step; moves: (windows, joints), 1 for a joint that is replayed, else 0. */
+typedef struct {
+    int64_t rows, every;
+    const double *mass, *moves;
+} MassTable;
 
 static double clip(double value, double bound) { return value > bound ? bound : value < -bound ? -bound : value; }
 
@@ -96,6 +103,18 @@ INLINE Vector clip_each(Vector value, Vector bound) {
 
 INLINE Vector size_of(Vector value) { return choose(value < 0, -value, value); }
 
+/* The level of friction at a velocity, without that of the load. */
+INLINE Vector level_at(const Servo *servo, Vector velocity) {
+    Vector level = {0};
+    level += servo->friction;
+    if (servo->static_excess > 0)
+        for (int lane = 0; lane < WIDTH; lane++) {
+            const double slip = velocity[lane] / servo->stribeck_speed;
+            level[lane] += servo->static_excess * exp(-slip * slip);
+        }
+    return level;
+}
+
 /* What the drive asks of an error, its integral not counted: the dead band takes half its width, `band`. */
 INLINE Vector pull_of(const Servo *servo, Vector error, Vector band) {
     return servo->kp * (servo->dead_band > 0 ? error - clip_each(error, band) : error);
@@ -112,124 +131,213 @@ INLINE void take(const double *table, const int64_t from[LANES], int64_t step, V
     }
 }
 
-/* Positions at the beginning of each step, (steps + 1, LANES), of LANES windows at once, which are independent of each
- * other: a processor computes several in one instruction.
+/* LANES windows of one joint that are replayed at once: a processor computes several in one instruction. */
+typedef struct {
+    int64_t from[LANES], commands[LANES], own[LANES]; /* places of their first step, first command, and own number */
+} Lanes;
+
+INLINE Lanes lanes_of(const Stretch *at, const int64_t window[LANES]) {
+    Lanes lanes;
+    for (int lane = 0; lane < LANES; lane++) {
+        lanes.from[lane] = window[lane] * at->steps;
+        lanes.commands[lane] = window[lane] * at->columns;
+        lanes.own[lane] = window[lane];
+    }
+    return lanes;
+}
+
+/* At the beginning of a step. passed: the measured position there; earlier, thrust: the command and the torque that
+ * accelerated the link in the step before. */
+typedef struct {
+    Vector position[PARTS], velocity[PARTS], integral[PARTS], passed[PARTS], earlier[PARTS], thrust[PARTS];
+} State;
+
+INLINE State first_state(const Stretch *at, const Lanes *lanes, const Servo *servo, const double *integrals) {
+    const int64_t last = at->columns - 1, before = (int64_t)floor((double)at->history - servo->delay / at->step) - 1;
+    State state;
+    take(at->measured, lanes->from, 0, state.position);
+    take(at->measured, lanes->from, 0, state.passed);
+    take(at->first_velocity, lanes->own, 0, state.velocity);
+    take(integrals, lanes->own, 0, state.integral);
+    take(at->command, lanes->commands, column_at(before, last), state.earlier);
+    memset(state.thrust, 0, sizeof state.thrust);
+    return state;
+}
+
+/* One step of a joint. pushed: torque by the accelerations of other joints beside the load.
  *
  * The torque limit acts on the command before its change within a step and on that after it, which are the means of the
  * steps around it: a limit on the torque of the mean command would cut too little, and a fit would find it too low. */
+INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const Servo *servo,
+    const Vector pushed[PARTS], State *state) {
+    const double h = at->step, half = 0.5 * h;
+    const Vector none = {0}, full = none + 1.0, widest = none + servo->limit, band = none + 0.5 * servo->dead_band;
+    const Vector wound_up = none + servo->integral_limit;
+    const int64_t last = at->columns - 1;
+    Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
+    Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS];
+    const double place = (double)(at->history + step) - servo->delay / h, whole = floor(place), share = place - whole;
+    const int64_t row = (int64_t)whole;
+    take(at->command, lanes->commands, column_at(row, last), before);
+    take(at->command, lanes->commands, row < 0 ? 0 : column_at(row + 1, last), after);
+    if (share > 0)
+        take(at->command, lanes->commands, column_at(row + 2, last), later);
+    else
+        EACH_PART later[part] = after[part];
+    take(at->inertia, lanes->from, step, mass);
+    take(at->load, lanes->from, step, load);
+    take(at->slope, lanes->from, step, slope);
+    take(at->measured, lanes->from, step + 1 < at->steps ? step + 1 : step, next);
+    EACH_PART {
+        mass[part] += servo->armature;
+        load[part] += pushed[part];
+    }
+    if (servo->payload != 0) {
+        Vector unit_mass[PARTS], unit_load[PARTS], unit_slope[PARTS];
+        take(at->unit_inertia, lanes->from, step, unit_mass);
+        take(at->unit_load, lanes->from, step, unit_load);
+        take(at->unit_slope, lanes->from, step, unit_slope);
+        EACH_PART {
+            const Vector least = LEAST_MASS * mass[part], loaded = mass[part] + servo->payload * unit_mass[part];
+            mass[part] = choose(loaded > least, loaded, least);
+            load[part] += servo->payload * unit_load[part];
+            slope[part] += servo->payload * unit_slope[part];
+        }
+    }
+    EACH_PART supply[part] = full;
+    if (at->supply)
+        take(at->supply, lanes->from, step, supply);
+    Mask beyond = {0};
+    EACH_PART {
+        const Vector velocity = state->velocity[part], middle = state->position[part] + half * velocity;
+        load[part] += slope[part] * (middle - 0.5 * (state->passed[part] + next[part]));
+        state->passed[part] = next[part];
+        away[part] = servo->offset - middle;
+        asked[part] = before[part] + share * (after[part] - before[part]);
+        const Vector proportional = pull_of(servo, asked[part] + away[part], band);
+        Vector pull = proportional;
+        if (servo->ki > 0) {
+            const Vector more = h * servo->ki / servo->kp * proportional;
+            state->integral[part] = clip_each(state->integral[part] + more, wound_up);
+            pull += state->integral[part];
+        }
+        slow[part] = half * (servo->damping + supply[part] * servo->kd);
+        free[part] = (mass[part] - slow[part]) * velocity + h * (supply[part] * pull - load[part]);
+        free[part] /= mass[part] + slow[part];
+        torque[part] = pull - 0.5 * servo->kd * (velocity + free[part]);
+        beyond |= size_of(torque[part]) + servo->kp * size_of(later[part] - state->earlier[part]) > widest;
+    }
+    if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
+        EACH_PART {
+            const Vector earlier = state->earlier[part];
+            const Vector done = (asked[part] - earlier) / (later[part] - earlier);
+            const Vector rest = torque[part] - pull_of(servo, asked[part] + away[part], band);
+            const Mask changes = (done > 0) & (done < 1);
+            const Vector old = choose(changes, earlier, asked[part]);
+            const Vector new = choose(changes, later[part], asked[part]);
+            const Vector first = rest + pull_of(servo, old + away[part], band);
+            const Vector second = rest + pull_of(servo, new + away[part], band);
+            const Mask over = (size_of(first) > widest) | (size_of(second) > widest);
+            const Vector begun = clip_each(first, widest), ended = clip_each(second, widest);
+            const Vector held = supply[part] * (begun + choose(changes, done, none) * (ended - begun));
+            const Vector outside = none + half * servo->damping;
+            const Vector driven = (mass[part] - outside) * state->velocity[part] + h * (held - load[part]);
+            free[part] = choose(over, driven / (mass[part] + outside), free[part]);
+            slow[part] = choose(over, outside, slow[part]);
+        }
+    EACH_PART {
+        const Vector carried = size_of(load[part] + state->thrust[part]), before_step = state->velocity[part];
+        const Vector friction = level_at(servo, before_step) + servo->load_friction * carried;
+        const Vector moved = state->position[part] + half * before_step;
+        state->velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
+        state->position[part] = moved + half * state->velocity[part];
+        state->thrust[part] = (mass[part] - servo->armature) * (state->velocity[part] - before_step) / h;
+        state->earlier[part] = before[part];
+    }
+}
+
+/* Positions of a joint at the beginning of each step, (steps + 1, LANES). */
 SEVERAL_PROCESSORS
 static void replay_lanes(const Stretch *at, const int64_t window[LANES], int64_t steps, const Servo *servo,
     const double *integrals, double *path) {
-    const double h = at->step, half = 0.5 * h, late = servo->delay / h, limit = servo->limit;
-    const Vector none = {0}, full = none + 1.0, widest = none + limit, band = none + 0.5 * servo->dead_band;
-    const Vector wound_up = none + servo->integral_limit;
-    const int64_t last = at->columns - 1;
-    Vector position[PARTS], velocity[PARTS], integral[PARTS], passed[PARTS], earlier[PARTS];
-    int64_t from[LANES], commands[LANES], own[LANES];
-    for (int lane = 0; lane < LANES; lane++) {
-        from[lane] = window[lane] * at->steps;
-        commands[lane] = window[lane] * at->columns;
-        own[lane] = window[lane];
-    }
-    take(at->measured, from, 0, position);
-    take(at->measured, from, 0, passed);
-    take(at->first_velocity, own, 0, velocity);
-    take(integrals, own, 0, integral);
-    take(at->command, commands, column_at((int64_t)floor((double)at->history - late) - 1, last), earlier);
+    const Vector nothing[PARTS] = {{0}};
+    const Lanes lanes = lanes_of(at, window);
+    State state = first_state(at, &lanes, servo, integrals);
     for (int64_t step = 0; step < steps; step++) {
-        Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
-        Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS];
-        const double place = (double)(at->history + step) - late, whole = floor(place), share = place - whole;
-        const int64_t row = (int64_t)whole;
-        take(at->command, commands, column_at(row, last), before);
-        take(at->command, commands, row < 0 ? 0 : column_at(row + 1, last), after);
-        if (share > 0)
-            take(at->command, commands, column_at(row + 2, last), later);
-        else
-            EACH_PART later[part] = after[part];
-        take(at->inertia, from, step, mass);
-        take(at->load, from, step, load);
-        take(at->slope, from, step, slope);
-        take(at->measured, from, step + 1 < at->steps ? step + 1 : step, next);
-        EACH_PART mass[part] += servo->armature;
-        if (servo->payload != 0) {
-            Vector unit_mass[PARTS], unit_load[PARTS], unit_slope[PARTS];
-            take(at->unit_inertia, from, step, unit_mass);
-            take(at->unit_load, from, step, unit_load);
-            take(at->unit_slope, from, step, unit_slope);
-            EACH_PART {
-                const Vector least = LEAST_MASS * mass[part], loaded = mass[part] + servo->payload * unit_mass[part];
-                mass[part] = choose(loaded > least, loaded, least);
-                load[part] += servo->payload * unit_load[part];
-                slope[part] += servo->payload * unit_slope[part];
-            }
-        }
-        EACH_PART supply[part] = full;
-        if (at->supply)
-            take(at->supply, from, step, supply);
-        Mask beyond = {0};
-        EACH_PART {
-            const Vector middle = position[part] + half * velocity[part];
-            load[part] += slope[part] * (middle - 0.5 * (passed[part] + next[part]));
-            passed[part] = next[part];
-            away[part] = servo->offset - middle;
-            asked[part] = before[part] + share * (after[part] - before[part]);
-            const Vector proportional = pull_of(servo, asked[part] + away[part], band);
-            Vector pull = proportional;
-            if (servo->ki > 0) {
-                integral[part] = clip_each(integral[part] + h * servo->ki / servo->kp * proportional, wound_up);
-                pull += integral[part];
-            }
-            slow[part] = half * (servo->damping + supply[part] * servo->kd);
-            free[part] = (mass[part] - slow[part]) * velocity[part] + h * (supply[part] * pull - load[part]);
-            free[part] /= mass[part] + slow[part];
-            torque[part] = pull - 0.5 * servo->kd * (velocity[part] + free[part]);
-            beyond |= size_of(torque[part]) + servo->kp * size_of(later[part] - earlier[part]) > widest;
-        }
-        if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
-            EACH_PART {
-                const Vector done = (asked[part] - earlier[part]) / (later[part] - earlier[part]);
-                const Vector rest = torque[part] - pull_of(servo, asked[part] + away[part], band);
-                const Mask changes = (done > 0) & (done < 1);
-                const Vector old = choose(changes, earlier[part], asked[part]);
-                const Vector new = choose(changes, later[part], asked[part]);
-                const Vector first = rest + pull_of(servo, old + away[part], band);
-                const Vector second = rest + pull_of(servo, new + away[part], band);
-                const Mask over = (size_of(first) > widest) | (size_of(second) > widest);
-                const Vector begun = clip_each(first, widest), ended = clip_each(second, widest);
-                const Vector held = supply[part] * (begun + choose(changes, done, none) * (ended - begun));
-                const Vector outside = none + half * servo->damping;
-                const Vector pushed = (mass[part] - outside) * velocity[part] + h * (held - load[part]);
-                free[part] = choose(over, pushed / (mass[part] + outside), free[part]);
-                slow[part] = choose(over, outside, slow[part]);
-            }
-        EACH_PART {
-            const Vector friction = servo->friction + servo->load_friction * size_of(load[part]);
-            const Vector moved = position[part] + half * velocity[part];
-            memcpy(path + step * LANES + part * WIDTH, position + part, sizeof(Vector));
-            velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
-            position[part] = moved + half * velocity[part];
-            earlier[part] = before[part];
-        }
+        memcpy(path + step * LANES, state.position, sizeof state.position);
+        advance(at, &lanes, step, servo, nothing, &state);
     }
-    memcpy(path + steps * LANES, position, sizeof position);
+    memcpy(path + steps * LANES, state.position, sizeof state.position);
+}
+
+#define MOST_SWEEPS 200
+#define SAME_VELOCITY 1e-8 /* rad/s (m/s): a change of all velocities below it ends the sweeps */
+#define FARTHEST 1e6       /* rad (m): a joint that would go farther is there */
+
+/* One step of all joints that push each other: a step of one joint after the other with the accelerations of the others
+ * (Gauss-Seidel), which converges because a mass matrix is positive definite. mass: (joints, joints) of each part. */
+INLINE void advance_arm(const Stretch *at, const Lanes *lanes, int64_t step, int64_t joints, const Servo *servos,
+    const Vector *mass, const Vector *moves, State *states, Vector *accelerations) {
+    const double h = at->step;
+    State next[MOST_JOINTS];
+    for (int sweep = 0; sweep < MOST_SWEEPS; sweep++) {
+        Mask changed = {0};
+        for (int64_t joint = 0; joint < joints; joint++) {
+            Vector pushed[PARTS] = {{0}};
+            for (int64_t other = 0; other < joints; other++)
+                if (other != joint)
+                    EACH_PART pushed[part] += mass[(joint * joints + other) * PARTS + part] *
+                        accelerations[other * PARTS + part];
+            next[joint] = states[joint];
+            advance(at + joint, lanes, step, servos + joint, pushed, next + joint);
+            EACH_PART {
+                Vector *own = accelerations + joint * PARTS + part;
+                const Vector turned = next[joint].velocity[part] - states[joint].velocity[part];
+                const Vector change = moves[joint * PARTS + part] * turned;
+                changed |= size_of(change - h * *own) > SAME_VELOCITY;
+                *own = change / h;
+            }
+        }
+        if (!(changed[0] | changed[1] | changed[2] | changed[3]))
+            break;
+    }
+    for (int64_t joint = 0; joint < joints; joint++) {
+        EACH_PART {
+            const Vector none = {0}, farthest = none + FARTHEST;
+            const Mask near = size_of(next[joint].position[part]) < FARTHEST, goes = moves[joint * PARTS + part] != 0;
+            next[joint].position[part] = choose(near, next[joint].position[part], farthest);
+            next[joint].velocity[part] = choose(near & goes, next[joint].velocity[part], none);
+            next[joint].position[part] = choose(goes, next[joint].position[part], states[joint].position[part]);
+        }
+        states[joint] = next[joint];
+    }
+}
+
+/* The next LANES windows, or the last one again; how many they are. */
+static int next_windows(int64_t windows, int64_t first, int64_t window[LANES]) {
+    const int lanes = windows - first < LANES ? (int)(windows - first) : LANES;
+    for (int lane = 0; lane < LANES; lane++)
+        window[lane] = first + (lane < lanes ? lane : lanes - 1);
+    return lanes;
+}
+
+static void start_integrals(const Stretch *at, const Servo *servo, double *integrals) {
+    for (int64_t window = 0; window < at->windows; window++)
+        integrals[window] = 0;
+    if (servo->ki > 0)
+        integrate_runs(at, servo, integrals);
 }
 
 /* servos: (sets). out: (sets, samples), simulated positions; integrals: (sets, windows), room for those of the sets;
  * path: (steps + 1, LANES), room for positions. */
 void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *integrals, double *path, double *out) {
     const int64_t samples = at->begin[at->windows];
-    for (int64_t set = 0; set < sets; set++) {
-        for (int64_t window = 0; window < at->windows; window++)
-            integrals[set * at->windows + window] = 0;
-        if (servos[set].ki > 0)
-            integrate_runs(at, servos + set, integrals + set * at->windows);
-    }
+    for (int64_t set = 0; set < sets; set++)
+        start_integrals(at, servos + set, integrals + set * at->windows);
     for (int64_t first = 0; first < at->windows; first += LANES) {
         int64_t window[LANES], steps = 0;
-        int lanes = at->windows - first < LANES ? (int)(at->windows - first) : LANES;
+        const int lanes = next_windows(at->windows, first, window);
         for (int lane = 0; lane < LANES; lane++) {
-            window[lane] = first + (lane < lanes ? lane : lanes - 1);
             int64_t end = at->begin[window[lane] + 1];
             if (end > at->begin[window[lane]] && at->row[end - 1] >= steps)
                 steps = at->row[end - 1] + 1;
@@ -242,5 +350,49 @@ void replay_joint(const Stretch *at, int64_t sets, const Servo *servos, double *
                     out[set * samples + sample] = before[0] + at->fraction[sample] * (before[LANES] - before[0]);
                 }
         }
+    }
+}
+
+/* All joints of LANES windows. As in replay_arm. */
+SEVERAL_PROCESSORS
+static void replay_arm_lanes(int64_t joints, const Stretch *at, const Servo *servos, const MassTable *table,
+    const int64_t window[LANES], int count, const double *integrals, double *position, double *velocity) {
+    const int64_t steps = at->steps, windows = at->windows, square = joints * joints;
+    const Lanes lanes = lanes_of(at, window);
+    State states[MOST_JOINTS];
+    Vector mass[MOST_JOINTS * MOST_JOINTS * PARTS], moves[MOST_JOINTS * PARTS], accelerations[MOST_JOINTS * PARTS] = {{0}};
+    for (int64_t joint = 0; joint < joints; joint++) {
+        states[joint] = first_state(at + joint, &lanes, servos + joint, integrals + joint * windows);
+        for (int lane = 0; lane < LANES; lane++)
+            ((double *)(moves + joint * PARTS))[lane] = table->moves[window[lane] * joints + joint];
+    }
+    for (int64_t step = 0; step < steps; step++) {
+        const int64_t row = step / table->every;
+        const double share = (double)(step % table->every) / (double)table->every;
+        for (int64_t entry = 0; entry < square; entry++)
+            for (int lane = 0; lane < LANES; lane++) {
+                const double *before = table->mass + (window[lane] * table->rows + row) * square + entry;
+                ((double *)(mass + entry * PARTS))[lane] = before[0] + share * (before[square] - before[0]);
+            }
+        for (int64_t joint = 0; joint < joints; joint++)
+            for (int lane = 0; lane < count; lane++) {
+                const int64_t place = (joint * windows + window[lane]) * steps + step;
+                position[place] = ((double *)states[joint].position)[lane];
+                velocity[place] = ((double *)states[joint].velocity)[lane];
+            }
+        advance_arm(at, &lanes, step, joints, servos, mass, moves, states, accelerations);
+    }
+}
+
+/* servos, at: (joints). position, velocity: (joints, windows, steps), at the beginning of each step; integrals: (joints,
+ * windows), room for those of the drives. */
+void replay_arm(int64_t joints, const Stretch *at, const Servo *servos, const MassTable *table, double *integrals,
+    double *position, double *velocity) {
+    for (int64_t joint = 0; joint < joints; joint++)
+        start_integrals(at + joint, servos + joint, integrals + joint * at->windows);
+    for (int64_t first = 0; first < at->windows; first += LANES) {
+        int64_t window[LANES];
+        const int lanes = next_windows(at->windows, first, window);
+        replay_arm_lanes(joints, at, servos, table, window, lanes, integrals, position, velocity);
     }
 }

@@ -31,6 +31,7 @@ from armlab.diagnosis.motion.choose import (
     gain_over_windows,
     is_finding,
     learned_errors,
+    window_squares,
 )
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo
@@ -185,8 +186,9 @@ def _errors_without_and_with(joints: Sequence[JointModel], mass: float, tuning: 
         learned = [JointModel(half, joint.values, joint.free) for joint, (half, _) in zip(joints, halves, strict=True)]
         more = estimate_mass(learned, tuning)[0]
         for row, (joint, parts) in enumerate(zip(joints, halves, strict=True)):
-            without[row, test] = learned_errors(parts, joint.loaded(-mass), joint.free, tuning)
-            with_it[row, test] = learned_errors(parts, joint.loaded(more), joint.free, tuning)
+            for squares, load in ((without, -mass), (with_it, more)):
+                errors = learned_errors(parts, joint.loaded(load), joint.free, tuning)
+                squares[row, test] = window_squares(parts[1], errors)
     return without, with_it
 
 
@@ -226,8 +228,8 @@ def _cost(fit: ArmFit, other: ArmFit, tuning: MotionTuning) -> float:
 
 
 def _mean_square(model: JointModel, tuning: MotionTuning) -> float:
-    """Mean squared error of the windows, by numbers that were learned on the other half."""
-    return max(float(np.mean(errors_on_other_half(model.windows, model.values, model.free, tuning))), 1e-300)
+    """Mean squared error, by numbers that were learned on the other half."""
+    return max(float(np.mean(errors_on_other_half(model.windows, model.values, model.free, tuning) ** 2)), 1e-300)
 
 
 def _odd_windows(chosen: Sequence[ChosenServo | None]) -> NDArray[np.intp]:

@@ -34,7 +34,7 @@ from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco
 
 WINDOWS = 24  # all of the SO-101's would take mujoco.sysid most of an hour on two processors
-NO_FIELD = ("dead_band", "load_friction")
+NO_FIELD = ("dead_band", "load_friction", "static_excess")
 DIFFERENCE = 1e-3  # of a coordinate; with the default of 1.5e-8 the fit stopped after 3 iterations on 24 windows
 SAME_COST = 1.01  # times the last cost: what comes after it need not be charged
 
@@ -167,7 +167,7 @@ def servo_task(diagnosis: MotionDiagnosis, count: int, tuning: MotionTuning = DE
     free = np.zeros(start.shape, dtype=bool)
     for row, chosen in enumerate(diagnosis.chosen):
         if chosen is not None:
-            start[row], free[row] = chosen.nominal, chosen.fit.free
+            start[row], free[row] = chosen.nominal, chosen.free
     free[:, [KEYS.index(key) for key in NO_FIELD]] = False
     if not np.isfinite(start).all():
         raise InputError("the simulation has no controller: mujoco.sysid has no number to start from")
@@ -197,7 +197,7 @@ def fit_with_sysid(task: ServoTask, tuning: MotionTuning = DEFAULT) -> SysidFit:
     def position_errors(parameters: Any, _: Any, measured: Any, *__: Any, state: Array, **___: Any) -> tuple[Any, ...]:
         delay = _servos_of(task, parameters).get("delay")
         simulated = [
-            np.interp(measured.times - delay[row], state[:, 0], state[:, 1 + joint])
+            np.interp(measured.times + task.simulation.read_delay[row] - delay[row], state[:, 0], state[:, 1 + joint])
             for row, joint in enumerate(task.simulation.joints)
         ]
         return np.stack(simulated, axis=1) - measured.data, measured, measured
@@ -272,7 +272,10 @@ def _with_values(model: Any, task: ServoTask, parameters: Any) -> Any:
 def _measured_windows(sysid: Any, task: ServoTask, model: Any, spec: Any, tuning: MotionTuning) -> Any:
     """The windows of armlab's fit as mujoco.sysid takes them: first states, held commands, measured positions."""
     joints, runs = list(task.simulation.joints), {run.name: run for run in task.runs}
-    motions = {name: smooth_motion(runs[name], tuning) for name in {name for name, _, _ in task.chosen}}
+    motions = {
+        name: smooth_motion(runs[name], task.simulation.read_delay, tuning)
+        for name in {name for name, _, _ in task.chosen}
+    }
     names, states, controls, positions = [], [], [], []
     for name, first, last in task.chosen:
         run = runs[name]

@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.motion.servo import Servos
+from armlab.diagnosis.motion.servo import Key, Servos
 from armlab.diagnosis.motion.servo_plugin import STICKING, set_fields
 from armlab.diagnosis.motion.simulation import ServoSimulation, actuator_of
 from armlab.diagnosis.motion.windows import held_command, smooth_motion, supply_factor
 from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco
+
+BEYOND_FIELDS: tuple[Key, ...] = ("dead_band", "load_friction", "static_excess", "ki")  # of MuJoCo
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,16 +41,19 @@ def with_servos(model: Any, simulation: ServoSimulation, servos: Servos) -> Any:
     return model
 
 
-def replay(simulation: ServoSimulation, servos: Servos | None, runs: Sequence[MotionRun]) -> list[Replayed]:
+def replay(
+    simulation: ServoSimulation, servos: Servos | None, runs: Sequence[MotionRun], finer: int = 1
+) -> list[Replayed]:
     """The runs sent through the simulation, each from its first measured state.
 
     servos: in place of the simulation's numbers; None for the simulation as it is given. Contact, joint limits and
     limits of the command are off: only drives and inertias are compared. Joints that were not recorded are held at
-    zero.
+    zero. finer: steps within one of the simulation.
     """
     if servos is None and not simulation.as_given:
         servos = simulation.nominal
     model = _free_model(simulation, servos)
+    model.opt.timestep /= finer
     return [_replay_run(model, simulation, servos, run) for run in runs]
 
 
@@ -73,7 +78,8 @@ def _hold_others(model: Any, simulation: ServoSimulation) -> None:
 def _replay_run(model: Any, simulation: ServoSimulation, servos: Servos | None, run: MotionRun) -> Replayed:
     joints, path = list(simulation.joints), _path(model, simulation, servos, run)
     time = run.time[0] + model.opt.timestep * np.arange(len(path))
-    position = np.stack([np.interp(run.time, time, path[:, joint]) for joint in joints], axis=1)
+    read = zip(joints, simulation.read_delay.tolist(), strict=True)
+    position = np.stack([np.interp(run.time + late, time, path[:, joint]) for joint, late in read], axis=1)
     distance = np.linalg.norm(
         tool_positions(model, joints, position) - tool_positions(model, joints, run.position), axis=1
     )
@@ -85,10 +91,11 @@ def _path(model: Any, simulation: ServoSimulation, servos: Servos | None, run: M
     mujoco = import_mujoco()
     data = mujoco.MjData(model)
     joints = list(simulation.joints)
-    steps = int(np.ceil((run.time[-1] - run.time[0]) / model.opt.timestep)) + 1
+    last = run.time[-1] + float(simulation.read_delay.max())
+    steps = int(np.ceil((last - run.time[0]) / model.opt.timestep)) + 1
     time = run.time[0] + model.opt.timestep * np.arange(steps)
     data.qpos[joints] = run.position[0]
-    data.qvel[joints] = smooth_motion(run).velocity[0]
+    data.qvel[joints] = smooth_motion(run, simulation.read_delay).velocity[0]
     mujoco.mj_forward(model, data)
     control = np.zeros((steps, model.nu))
     for row, joint in enumerate(joints):
@@ -102,7 +109,7 @@ def _path(model: Any, simulation: ServoSimulation, servos: Servos | None, run: M
 
 def _needs_steps(simulation: ServoSimulation, servos: Servos, run: MotionRun) -> bool:
     """Whether the law has parts that no field of MuJoCo holds."""
-    parts = (servos.get("dead_band"), servos.get("load_friction"), servos.get("ki"))
+    parts = [servos.get(key) for key in BEYOND_FIELDS]
     return any(part.any() for part in parts) or (simulation.supply is not None and run.voltage is not None)
 
 
@@ -121,20 +128,25 @@ def _roll_out(model: Any, data: Any, control: Array) -> Array:
 def _step_through(
     model: Any, data: Any, simulation: ServoSimulation, servos: Servos, run: MotionRun, control: Array
 ) -> Array:
-    """The same step by step, with dead band, load friction and supply voltage."""
+    """The same step by step, with what no field holds, and the supply voltage.
+
+    Friction follows the velocity and the load as the plug-in finds them within the step before.
+    """
     mujoco = import_mujoco()
     joints = np.array(simulation.joints)
     actuators = np.array([actuator_of(model, joint) for joint in simulation.joints])
     half, share, level = servos.get("dead_band") / 2, servos.get("load_friction"), servos.get("friction")
+    excess, speed, velocity = servos.get("static_excess"), servos.get("stribeck_speed"), data.qvel.copy()
     limit, kp, kd = servos.get("limit"), servos.get("kp"), servos.get("kd")
     wound_up, gain = servos.get("integral_limit"), servos.get("ki") * model.opt.timestep
     integral = _resting_integral(data, simulation, servos, control[0][actuators])
     time = run.time[0] + model.opt.timestep * np.arange(len(control))
     factors = [supply_factor(run, row, time, simulation.supply) for row in range(len(joints))]
     supplies = [(row, factor) for row, factor in enumerate(factors) if factor is not None]
-    loads_friction, has_dead_band = bool(share.any()), bool(half.any())
+    varies, has_dead_band = bool(share.any() or excess.any()), bool(half.any())
     path = np.empty((len(control), model.nq))
     position, bias, asked = data.qpos, data.qfrc_bias, data.ctrl  # views of what MuJoCo computes
+    pushed, earlier = np.zeros(model.nv), np.zeros(model.nv)
     for number, command in enumerate(control[:, actuators]):
         path[number] = position
         now = position[joints]
@@ -143,8 +155,12 @@ def _step_through(
             error -= np.minimum(np.maximum(error, -half), half)
         integral = np.minimum(np.maximum(integral + gain * error, -wound_up), wound_up)
         asked[actuators] = now + error + integral / kp
-        if loads_friction:
-            model.dof_frictionloss[joints] = level + share * np.abs(bias[joints])
+        if varies:
+            mujoco.mj_mulM(model, data, pushed, earlier)
+            carried = bias + pushed - model.dof_armature * earlier
+            static = excess * np.exp(-((velocity[joints] / speed) ** 2))
+            model.dof_frictionloss[joints] = level + static + share * np.abs(carried[joints])
+            earlier, velocity = data.qacc * (number > 0), data.qvel.copy()
         for row, factor in supplies:
             scaled = factor[number] * np.array([-kp[row], -kd[row]])
             model.actuator_gainprm[actuators[row], 0] = -scaled[0]

@@ -12,7 +12,8 @@ from armlab.diagnosis.motion.servo import INFINITE_LIMIT, OPTIONAL, SHARED, USUA
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
-TORQUE_SCALED = ("kp", "kd", "damping", "friction", "limit", "armature")  # one factor for all, and for the inertia
+# one factor for all of them, and for the inertia
+TORQUE_SCALED = ("kp", "kd", "damping", "friction", "static_excess", "limit", "armature")
 
 
 def confused_parameters(
@@ -23,7 +24,7 @@ def confused_parameters(
     mass_error: standard error of a payload that was found on all joints together, kg. What the other joints tell of it
     counts as one measurement more.
     """
-    every = np.array(USUAL) | np.array(OPTIONAL) | np.array(SHARED)
+    every = np.array(USUAL) | np.array(OPTIONAL) | np.array(SHARED) | fit.free
     every[place("limit")] = fit.values[place("limit")] < INFINITE_LIMIT
     slopes = jacobian(windows, fit.values, every)
     columns = dict(zip(np.flatnonzero(every).tolist(), slopes.T, strict=True))

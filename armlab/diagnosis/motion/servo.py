@@ -3,7 +3,8 @@
     torque  = s clip(kp e - kd qd + i, -limit, limit)
     e       = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
     i'      = ki e,  |i| <= integral_limit
-    torque  = (inertia + armature) qdd + load + damping qd + (friction + load_friction |load|) f
+    torque  = (inertia + armature) qdd + load + damping qd + level f
+    level   = friction + static_excess exp(-(qd / stribeck_speed)^2) + load_friction |inertia qdd + load|
 
 Inertia and load also hold a mass at the tool, `payload`, which is the same at all joints. f is the sign of the
 velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load is the torque of
@@ -25,9 +26,8 @@ class ServoParameter:
     """One parameter of the law. effect, name: in a verdict. neutral: the value without effect.
 
     lowest, highest: bounds of a fit; scale: a step that matters. role: a `usual` one is part of every fit, an
-    `optional` one has to earn its place, a `shared` one is that of all joints, a `given` one is never fitted.
-    hidden_by_encoder_steps: whether the steps of an encoder do the same as a small one, so that a difference below a
-    step is none.
+    `optional` one has to earn its place, an `unstated` one is part of a law that is tried where the simulation says
+    nothing of the drive, a `shared` one is that of all joints, a `given` one is never fitted.
     equation: for the verdict, with {value} and {joint}. rivals: effects that fit these data as well, or nearly. mjcf:
     the field of MJCF that holds it.
     """
@@ -40,12 +40,11 @@ class ServoParameter:
     lowest: float
     highest: float
     scale: float
-    role: Literal["usual", "optional", "shared", "given"]
+    role: Literal["usual", "optional", "unstated", "shared", "given"]
     equation: str
     rivals: tuple[str, ...] = ()
     mjcf: str = ""
     experiment: str = ""
-    hidden_by_encoder_steps: bool = False
 
 
 INFINITE_LIMIT = 1e3  # N m: no servo of this law has more
@@ -182,7 +181,6 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         ("coulomb_friction", "backlash"),
         "",
         "record slow ramps in both directions with two gains",
-        hidden_by_encoder_steps=True,
     ),
     ServoParameter(
         "load_friction",
@@ -191,13 +189,40 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         "1",
         0.0,
         0.0,
-        2.0,
+        1.0,
         0.05,
         "optional",
         "tau_{joint} += {value} |tau_rigid_{joint}| sgn(qd_{joint})",
         (),
         "",
         "repeat one motion with two payloads",
+    ),
+    ServoParameter(
+        "static_excess",
+        "stribeck_friction",
+        "static_excess",
+        "N.m",
+        0.0,
+        0.0,
+        1e3,
+        0.02,
+        "optional",
+        "tau_{joint} += {value} exp(-(qd_{joint} / v)^2) sgn(qd_{joint})",
+        (),
+        "",
+        "record slow creeping in both directions",
+    ),
+    ServoParameter(
+        "stribeck_speed",
+        "stribeck_friction",
+        "velocity",
+        "rad/s",
+        0.1,
+        1e-3,
+        1e2,
+        0.05,
+        "given",
+        "v = {value}",
     ),
     ServoParameter(
         "ki",
@@ -208,7 +233,7 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         0.0,
         1e6,
         1.0,
-        "given",
+        "unstated",
         "tau_{joint} += {value} integral of (command_{joint} - q_{joint})",
     ),
     ServoParameter(
@@ -220,7 +245,7 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         0.0,
         INFINITE_LIMIT,
         0.5,
-        "given",
+        "unstated",
         "|integral part of tau_{joint}| <= {value}",
     ),
     ServoParameter(
@@ -243,6 +268,7 @@ KEYS = tuple(parameter.key for parameter in PARAMETERS)
 USUAL = tuple(parameter.role == "usual" for parameter in PARAMETERS)
 SHARED = tuple(parameter.role == "shared" for parameter in PARAMETERS)
 OPTIONAL = tuple(parameter.role == "optional" for parameter in PARAMETERS)
+UNSTATED = tuple(parameter.role == "unstated" for parameter in PARAMETERS)
 Key = Literal[
     "kp",
     "damping",
@@ -254,6 +280,8 @@ Key = Literal[
     "offset",
     "dead_band",
     "load_friction",
+    "static_excess",
+    "stribeck_speed",
     "ki",
     "integral_limit",
     "payload",

@@ -12,7 +12,9 @@ The law of a joint, with q and qd as MuJoCo has them and c the command that held
     torque = s clip(kp e - kd qd + i, -limit, limit)
     e      = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
     i'     = ki e,  |i| <= integral_limit
-    friction loss = friction + load_friction |qfrc_bias|
+    friction loss = friction + static_excess exp(-(qd / stribeck_speed)^2) + load_friction |gear|
+
+gear is the torque that moves and holds the links, mj_rne with the accelerations of the step before.
 
 kp, kd, limit, damping, friction and armature are written into the model. A callback (`mujoco.set_mjcb_passive`) adds
 to `qfrc_passive` what the torque of the law has more than that of the actuator, and sets the friction loss of the next
@@ -29,7 +31,8 @@ from typing import Any
 import numpy as np
 
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
-LAW = ("kp", "kd", "ki", "integral_limit", "limit", "delay", "offset", "dead_band", "friction", "load_friction")
+DRIVE = ("kp", "kd", "ki", "integral_limit", "limit", "delay", "offset", "dead_band")
+LAW = (*DRIVE, "friction", "load_friction", "static_excess", "stribeck_speed")
 NUMBERS = (*LAW, "damping", "armature")
 SAME_TIME_S = 1e-9  # below it two instants are one
 JOINT_TRANSMISSION = 0  # mjTRN_JOINT
@@ -89,6 +92,7 @@ class ServoPlugin:
             key: np.array([np.inf if entry[key] is None else entry[key] for entry in entries], dtype=float)
             for key in LAW
         }
+        self._started = np.inf  # time of the first evaluation
         self._times: list[float] = []
         self._commands: list[Any] = []
         self._load = np.zeros(model.nv)
@@ -108,10 +112,12 @@ class ServoPlugin:
         actuator = law["kp"] * (command - position) - law["kd"] * velocity
         actuator = np.clip(actuator, -law["limit"], law["limit"])
         data.qfrc_passive[self._dofs] += self.supply * drive - actuator
-        if law["load_friction"].any():
-            mujoco.mj_rne(model, data, 0, self._load)
-            level = law["friction"] + law["load_friction"] * np.abs(self._load[self._dofs])
-            model.dof_frictionloss[self._dofs] = level
+        if law["load_friction"].any() or law["static_excess"].any():
+            has_moved = data.time > self._started + SAME_TIME_S
+            mujoco.mj_rne(model, data, int(has_moved), self._load)
+            static = law["static_excess"] * np.exp(-((velocity / law["stribeck_speed"]) ** 2))
+            loaded = law["load_friction"] * np.abs(self._load[self._dofs])
+            model.dof_frictionloss[self._dofs] = law["friction"] + static + loaded
 
     def _integrate(self, time: float, step: float, error: Any) -> None:
         """The integrals at the end of a step; an evaluation at the time of the last one replaces its result."""
@@ -121,8 +127,9 @@ class ServoPlugin:
         self.integral = np.clip(self._begun[1] + step * self._law["ki"] * error, -limit, limit)
 
     def _remember(self, time: float, command: Any) -> None:
+        self._started = min(self._started, time)
         if self._times and time < self._times[-1] - SAME_TIME_S:
-            self._times, self._commands = [], []
+            self._times, self._commands, self._started = [], [], time
             self._begun = (-np.inf, np.zeros_like(self.integral))
             self.integral = self._begun[1]
         if self._times and np.array_equal(command, self._commands[-1]):

@@ -9,7 +9,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, NEUTRAL, Servos, place
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, NEUTRAL, UNSTATED, Servos, place
 from armlab.diagnosis.motion.servo_plugin import find_actuator
 from armlab.identification.export import SimulatorModel, mjcf_document
 from armlab.identification.structure import Structure
@@ -32,7 +32,8 @@ class ServoSimulation:
 
     path: of the robot's file; document: its MJCF where the file is another format. nominal: of the recorded joints, NaN
     where unknown. joints: places of the recorded joints in the arm. as_given: the MJCF alone is the simulation.
-    rate_hz: how often the command is taken over. supply: nominal supply voltage, V, of drives that command a voltage;
+    read_delay: of the position of each recorded joint after its stamp, (joints,), s. rate_hz: how often the command is
+    taken over. supply: nominal supply voltage, V, of drives that command a voltage;
     None for others. payload: mass that is added at the tool, kg.
     """
 
@@ -42,6 +43,7 @@ class ServoSimulation:
     joints: tuple[int, ...]
     nominal: Servos
     as_given: bool
+    read_delay: Array
     rate_hz: float | None = None
     supply: float | None = None
     payload: float = 0.0
@@ -104,6 +106,8 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
         nominal[:, place("armature")] = _rotors(recording)
     if controller is not None:
         nominal = _with_controller(nominal, controller)
+    else:
+        nominal[np.isnan(nominal[:, [place("kp")]]) & np.array(UNSTATED)] = np.nan
     return ServoSimulation(
         arm=recording.arm,
         path=path,
@@ -111,6 +115,7 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
         joints=recording.joints,
         nominal=Servos(nominal),
         as_given=from_mjcf and controller is None,
+        read_delay=_read_delays(controller, len(recording.joints)),
         rate_hz=controller.rate_hz if controller is not None else None,
         supply=controller.supply if controller is not None else None,
     )
@@ -190,10 +195,14 @@ def _with_controller(nominal: Array, controller: ControllerEntry) -> Array:
         for row, value in enumerate(numbers or ()):
             if value is not None:
                 values[row, KEYS.index(key)] = value
-    late = np.broadcast_to(np.asarray(controller.delay), (joints,))
-    read = np.zeros(joints) if controller.read_delay is None else np.asarray(controller.read_delay)
-    values[:, place("delay")] = late - read
+    values[:, place("delay")] = np.broadcast_to(np.asarray(controller.delay), (joints,))
     return values
+
+
+def _read_delays(controller: ControllerEntry | None, joints: int) -> Array:
+    if controller is None or controller.read_delay is None:
+        return np.zeros(joints)
+    return np.asarray(controller.read_delay, dtype=float)
 
 
 def _mjcf_of_arm(recording: MotionRecording) -> str:

@@ -35,8 +35,8 @@ class MotionTuning:
         meaning="cut-off of measured minus simulated motion, which loads and couplings get beside the simulated one",
         least=0.1,
     )
-    coupling_sweeps: int = tuned(
-        4, unit="sweeps", meaning="replays of all joints, one after another, that make their loads", least=1
+    coupling_replays: int = tuned(
+        3, unit="replays", meaning="of all joints together, each along the path of the one before", least=1
     )
     coupling_rounds: int = tuned(
         2, unit="rounds", meaning="in which the usual numbers and the loads take turns before the choice", least=1
@@ -78,10 +78,29 @@ class MotionTuning:
         meaning="parameters that are fitted in each round, of those that a linear model gains most from",
         least=1,
     )
+    min_promise: float = tuned(
+        0.2,
+        unit="of the least gain",
+        meaning="that a linear model of the errors promises: with less a parameter is not tried",
+        least=0.0,
+        most=1.0,
+    )
     limit_levels: tuple[float, ...] = tuned(
-        (0.4, 0.6, 0.75, 0.9),
+        (0.2, 0.4, 0.6, 0.75, 0.9),
         unit="of the limit, or of the torque that a drive without one reaches",
         meaning="starts of a torque limit: it may cut a little or much",
+    )
+    stribeck_speeds: tuple[float, ...] = tuned(
+        (0.03, 0.1, 0.3), unit="rad/s (m/s)", meaning="of static friction, from which the choice takes one"
+    )
+    integral_rates: tuple[float, ...] = tuned(
+        (0.5, 2.0, 8.0), unit="1/s", meaning="starts of an integral gain over kp, where nothing is said of the drive"
+    )
+    slowest_rate: float = tuned(
+        0.1, unit="1/s", meaning="an integral gain over kp that is lower does not move within a run", least=0.0
+    )
+    wound_up_levels: tuple[float, ...] = tuned(
+        (0.2, 0.6), unit="of the torque that the motion needs", meaning="starts of the limit of an integral"
     )
     damping_rounds: int = tuned(
         6, unit="fits", meaning="most by which the damping of an unknown drive goes into its torque limit", least=0

@@ -1,6 +1,7 @@
 """The files of a motion-only verdict: verdict.json, model.yaml and the simulation with the found numbers."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -190,11 +191,32 @@ def _components(diagnosis: MotionDiagnosis) -> list[dict[str, Any]]:
                 continue
             fitted = chosen is not None and bool(chosen.fit.free[place])
             interval = [float(ends[0, place]), float(ends[1, place])] if fitted and ends is not None else None
-            unit = {"value": value, "ci95": interval, "unit": parameter.unit}
             entry = {"effect": parameter.effect, "joint": joint, "joints": [joint]}
-            entry |= {"claimed": (parameter.effect, row + 1) in claimed, "parameters": {parameter.name: unit}}
-            entries.append(entry)
+            entry |= {"claimed": (parameter.effect, row + 1) in claimed}
+            entries.append(entry | {"parameters": {parameter.name: _number(value, interval, parameter.unit)}})
+        entries += _stribeck_component(diagnosis, row, joint, claimed)
     return entries
+
+
+def _number(value: float, interval: list[float] | None, unit: str) -> dict[str, Any]:
+    return {"value": value, "ci95": interval, "unit": unit}
+
+
+def _stribeck_component(
+    diagnosis: MotionDiagnosis, row: int, joint: int, claimed: set[tuple[str, int]]
+) -> Iterator[dict[str, Any]]:
+    """What a joint's friction is at rest beyond its Coulomb friction: a Stribeck friction without level."""
+    assert diagnosis.servos is not None
+    excess, speed = (float(diagnosis.servos.get(key)[row]) for key in ("static_excess", "stribeck_speed"))
+    if excess > 0:
+        numbers = {
+            "level": _number(0.0, None, "N.m"),
+            "static_level": _number(excess, None, "N.m"),
+            "velocity": _number(speed, None, "rad/s"),
+            "exponent": _number(2.0, None, "1"),
+        }
+        entry = {"effect": "stribeck_friction", "joint": joint, "joints": [joint]}
+        yield entry | {"claimed": ("stribeck_friction", row + 1) in claimed, "parameters": numbers}
 
 
 def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:
@@ -210,5 +232,5 @@ def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:
     if servos.get("ki").any():
         bounds = servos.get("integral_limit").tolist()
         entry |= {"integral_limit": [each if each < INFINITE_LIMIT else None for each in bounds]}
-    others["read_delay"] = np.maximum(-delays, 0.0)
+    others["read_delay"] = diagnosis.simulation.read_delay + np.maximum(-delays, 0.0)
     return entry | {name: values.tolist() for name, values in others.items() if values.any()}

@@ -111,11 +111,15 @@ class Windows:
         )
 
 
-def smooth_motion(run: MotionRun, tuning: MotionTuning = DEFAULT) -> Motion:
-    """Measured positions through a zero-phase low-pass, with their derivatives, at `even_time`."""
+def smooth_motion(run: MotionRun, read_delay: Array, tuning: MotionTuning = DEFAULT) -> Motion:
+    """Measured positions through a zero-phase low-pass, with their derivatives, at `even_time`.
+
+    read_delay: of each joint's position after its stamp, (joints,), s.
+    """
     time = even_time(run)
     rate_hz = 1 / (time[1] - time[0])
-    even = np.stack([np.interp(time, run.time, column) for column in run.position.T], axis=1)
+    read = zip(run.position.T, read_delay.tolist(), strict=True)
+    even = np.stack([np.interp(time, run.time + late, column) for column, late in read], axis=1)
     return motion_of(low_pass(even, rate_hz, min(tuning.cutoff_hz, 0.2 * rate_hz)), rate_hz)
 
 
@@ -138,21 +142,22 @@ def motion_of(position: Array, rate_hz: float) -> Motion:
 
 
 def own_terms(arm: Arm, joints: Sequence[int], position: Array) -> tuple[Array, Array]:
-    """Own inertia of each recorded joint, kg m2, and slope of its gravity torque, N m/rad, (samples, joints) each."""
+    """Masses of the recorded joints, (samples, joints, joints), kg m2, and slope of each one's gravity torque, N m/rad,
+    (samples, joints)."""
     still = np.zeros_like(position)
     whole = _whole_arm(arm, joints, Motion(position, still, still))
     rest = np.zeros_like(whole.position)
     weight = rigid_body_torque(arm, whole)
-    inertia, slope = np.empty(position.shape), np.empty(position.shape)
+    mass, slope = np.empty((*position.shape, position.shape[1])), np.empty(position.shape)
     for column, joint in enumerate(joints):
         unit = rest.copy()
         unit[:, joint] = 1.0
-        inertia[:, column] = (rigid_body_torque(arm, Motion(whole.position, rest, unit)) - weight)[:, joint]
+        mass[:, :, column] = (rigid_body_torque(arm, Motion(whole.position, rest, unit)) - weight)[:, list(joints)]
         ahead, behind = (
             rigid_body_torque(arm, Motion(whole.position + side * SLOPE_STEP * unit, rest, rest)) for side in (1, -1)
         )
         slope[:, column] = (ahead - behind)[:, joint] / (2 * SLOPE_STEP)
-    return inertia, slope
+    return mass, slope
 
 
 def joint_torque(arm: Arm, joints: Sequence[int], motion: Motion) -> Array:
@@ -164,7 +169,8 @@ def _loads_and_units(simulation: ServoSimulation, loaded: Arm, motion: Motion) -
     """The LOADS of a motion; loaded: the arm with 1 kg at the tool."""
     found = []
     for arm in (simulation.arm, loaded):
-        inertia, slope = own_terms(arm, simulation.joints, motion.position)
+        mass, slope = own_terms(arm, simulation.joints, motion.position)
+        inertia = np.diagonal(mass, axis1=1, axis2=2)
         torque = joint_torque(arm, simulation.joints, motion)
         found.append((inertia, torque - inertia * motion.acceleration, slope))
     own, more = found
@@ -200,10 +206,11 @@ def make_windows(
     pieces = _cut_runs(runs, tuning)
     sample = min(1 / run.rate_hz for run in runs)
     step = sample / np.ceil(sample / tuning.longest_step_s)
-    motions = [smooth_motion(run, tuning) for run in runs]
+    motions = [smooth_motion(run, simulation.read_delay, tuning) for run in runs]
     loaded = simulation.with_payload(1.0).arm
     loads = [_loads_and_units(simulation, loaded, each) for each in motions]
-    steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.warm]) / step)) + 3 for p in pieces)
+    late = float(simulation.read_delay.max())
+    steps = max(int(np.ceil((runs[p.run].time[p.last] - runs[p.run].time[p.warm] + late) / step)) + 3 for p in pieces)
     history = int(np.ceil(tuning.history_s / step))
     made = []
     for joint in range(len(simulation.joints)):
@@ -213,7 +220,7 @@ def make_windows(
         ]
         paths = [_path(run, joint, simulation, step, history) for run in runs]
         windows = _stack(columns, paths, np.array([p.run for p in pieces], dtype=np.int64), step, history)
-        made.append(windows.with_integral(_resting_integrals(windows, simulation.nominal.values[joint])))
+        made.append(at_rest(windows, simulation.nominal.values[joint]))
     return made
 
 
@@ -284,7 +291,7 @@ def _column(
     around = start + step * np.arange(-history, steps + history)
     even = even_time(run)
     own = [np.interp(inside + step / 2, even, signal[:, joint]) for signal in loads]
-    rows = (run.time[piece.first : piece.last + 1] - start) / step
+    rows = (run.time[piece.first : piece.last + 1] + simulation.read_delay[joint] - start) / step
     return {
         **dict(zip(LOADS, own, strict=True)),
         "command": mean_command(run, joint, around, step, simulation.rate_hz),
@@ -301,18 +308,22 @@ def _path(run: MotionRun, joint: int, simulation: ServoSimulation, step: float, 
     """Commands from `history` steps before a run on, and measured positions, on a grid of the whole run."""
     time = run.time[0] + step * np.arange(int(np.ceil((run.time[-1] - run.time[0]) / step)) + 1)
     around = np.concatenate([time[0] + step * np.arange(-history, 0), time])
-    return mean_command(run, joint, around, step, simulation.rate_hz), np.interp(time, run.time, run.position[:, joint])
+    measured = np.interp(time, run.time + simulation.read_delay[joint], run.position[:, joint])
+    return mean_command(run, joint, around, step, simulation.rate_hz), measured
 
 
-def _resting_integrals(windows: Windows, nominal: Array) -> Array:
-    """What an integral gain would hold at the first sample of each run, (runs,), N m: a start for its fit."""
-    kp, ki, limit = (float(nominal[place(key)]) for key in ("kp", "ki", "integral_limit"))
+def at_rest(windows: Windows, values: Array) -> Windows:
+    """The windows with what an integral gain holds at the first sample of each run if the drive is at rest there.
+
+    values: (parameters,), which may be unknown.
+    """
+    kp, ki, limit = (float(values[place(key)]) for key in ("kp", "ki", "integral_limit"))
     held = np.zeros(len(windows.path_command))
     if ki > 0 and np.isfinite(kp):
         for window in np.flatnonzero(windows.start == 0):
             error = windows.command[window, windows.history] - windows.measured[window, 0]
             held[windows.run[window]] = np.clip(windows.load[window, 0] - kp * error, -limit, limit)
-    return held
+    return windows.with_integral(held)
 
 
 def _stack(
