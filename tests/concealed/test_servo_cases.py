@@ -54,6 +54,12 @@ def test_an_arm_without_a_difference_has_no_detection_limit_of_one():
     assert Oracle(case, arm).multiple(Hidden("offset", 0), arm, arm) == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_hidden_delay_is_one_that_the_engine_takes():
+    arm = small_case("one").drawn[0]
+    hidden = Hidden("delay", 0, size=0.00262)
+    assert hidden.parameters(hidden.apply(arm))["seconds"][0] == pytest.approx(arm.servos[0].delay + 0.0025)
+
+
 def test_a_payload_adds_its_mass_and_the_moments_of_a_point():
     arm = small_case("one").drawn[0]
     before, after = arm.bodies[-1], Hidden("payload", 0, size=0.5).apply(arm).bodies[-1]

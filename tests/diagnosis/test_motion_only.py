@@ -216,6 +216,23 @@ def test_an_unstated_drive_that_integrates_is_recognised(soft: Path) -> None:
     assert choose_servo(windows, stated, 20).fit.values[place("ki")] == 0
 
 
+@pytest.mark.parametrize(
+    ("key", "value"), [("load_friction", 0.4), ("static_excess", 0.1), ("limit", 0.4), ("armature", 0.03)]
+)
+def test_one_wrong_number_is_not_explained_by_several_others(soft: Path, key: Key, value: float) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    nominal = NEUTRAL.copy()
+    known: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
+    nominal[[place(each) for each in known]] = 8.0, 0.4, 0.1, 0.1, 0.01, 3.0
+    true = nominal.copy()
+    true[place(key)] = value
+    replayed = replay_joint(windows, true)[0]
+    chosen = choose_servo(replace(windows, position=np.round(replayed / 1e-4) * 1e-4), nominal, 20)
+    assert list(chosen.gains) == [place(key)]
+    assert chosen.fit.values[place(key)] == pytest.approx(value, rel=0.02)
+
+
 def test_a_joint_whose_replay_runs_away_moves_as_measured_for_the_others(soft: Path) -> None:
     recording = load_motion_recording(soft)
     runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from armlab.concealed.servo.engine import Body, Servo, ServoArm
+from armlab.concealed.servo.engine import STEP_S, Body, Servo, ServoArm
 
 Parameters = dict[str, tuple[float, str]]
 
@@ -125,6 +125,11 @@ def _added(field: str) -> Callable[[Servo, Hidden], Servo]:
     return lambda servo, hidden: replace(servo, **{field: getattr(servo, field) + hidden.sign * hidden.size})
 
 
+def _change_delay(servo: Servo, hidden: Hidden) -> Servo:
+    """A later command, by whole steps of the engine, at which it takes commands over."""
+    return replace(servo, delay=servo.delay + STEP_S * round(hidden.size / STEP_S))
+
+
 def _change_limit(servo: Servo, hidden: Hidden) -> Servo:
     """A lower limit; or one that falls with speed, by the size over 5 rad/s, and with the supply."""
     if hidden.falling:
@@ -142,7 +147,7 @@ CHANGES: dict[str, Callable[[Servo, Hidden], Servo]] = {
     "friction": _scaled("friction"),
     "damping": _scaled("damping"),
     "armature": _scaled("armature"),
-    "delay": _added("delay"),
+    "delay": _change_delay,
     "saturation": _change_limit,
     "dead band": _added("dead_band"),
     "offset": _added("offset"),

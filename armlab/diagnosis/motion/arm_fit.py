@@ -5,7 +5,9 @@ chosen a number beyond the usual ones, the loads are made and the numbers are ch
 errors.
 """
 
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,13 +89,20 @@ def _choose_all(
     progress: Callable[[str], None],
     tuning: MotionTuning,
 ) -> ArmFit:
-    windows, chosen = coupled_windows(runs, simulation, starts, tuning), list[ChosenServo | None]()
-    for number, joint in enumerate(windows):
-        progress(f"fitting joint {number + 1} of {len(windows)}")
-        moves = starts[number] is not None
-        nominal = simulation.nominal.values[number]
-        fitted = choose_servo(joint, nominal, number_of_tests(len(windows)), tuning) if moves else None
-        chosen.append(fitted if fitted is not None and _explains(joint, fitted, tuning) else None)
+    windows = coupled_windows(runs, simulation, starts, tuning)
+    looks = number_of_tests(len(windows))
+
+    def choose(number: int) -> ChosenServo | None:
+        if starts[number] is None:
+            return None
+        fitted = choose_servo(windows[number], simulation.nominal.values[number], looks, tuning)
+        return fitted if _explains(windows[number], fitted, tuning) else None
+
+    chosen = list[ChosenServo | None]()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # replays in C leave Python to other threads
+        for number, each in enumerate(pool.map(choose, range(len(windows)))):
+            chosen.append(each)
+            progress(f"fitted joint {number + 1} of {len(windows)}")
     return ArmFit(simulation, starts, windows, chosen)
 
 

@@ -13,7 +13,7 @@ parameter, learned on the other half, and e the errors without it,
 S is the mean power spectrum of the errors with the parameter; the widening is that of the intervals (see estimate.py).
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from armlab.diagnosis.motion.estimate import (
     find_start,
     fit_servo,
     jacobian,
+    needed_torque,
     settle,
     thin_windows,
     to_coordinates,
@@ -122,19 +123,21 @@ def choose_servo(
 
     The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
     """
-    starts = _first_fits(windows, nominal, tuning)
+    given, starts = nominal, _first_fits(windows, nominal, tuning)
     odd = _odd_with_any_limit(windows.with_integral(starts[-1][0].integral), starts[-1][0], tuning)
     sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
     few = thin_windows(sound, tuning.max_judged_windows)
     unstated = _find_unstated(few, nominal, tuning)
     if unstated is not None and _cost(unstated, tuning) < _cost(starts[-1][0], tuning):
         starts = [(unstated, nominal)]
-    starts += _saturated(few, starts, tuning)
     best, judged, nominal = _grow(few, *starts[0], tuning, barred)
     for another in starts[1:]:
         other, errors, own = _grow(few, *another, tuning, barred)
         if _cost(other, tuning) < _cost(best, tuning):
             best, judged, nominal = other, errors, own
+    single = _with_one_difference(few, given, tuning)
+    if single is not None and _cost(single, tuning) < _cost(best, tuning):
+        best, judged, nominal = _grow(few, single, given, tuning, barred)
     few, base = few.with_integral(best.integral), fill_unknown(nominal)
     fit = fit_servo(sound.with_integral(best.integral), best.values, best.free, tuning.max_evaluations)
     gains = {number: _gain_of(few, best, number, (base, judged), tuning) for number in _differing(fit, base)}
@@ -165,10 +168,7 @@ def _cost(fit: ServoFit, tuning: MotionTuning) -> float:
 
 
 def _find_unstated(windows: Windows, nominal: Array, tuning: MotionTuning) -> ServoFit | None:
-    """The best fit with what the simulation does not state of the drive: a torque limit, an integral gain, or both.
-
-    An integral that is too slow to move within a run is an offset of each run, and no gain.
-    """
+    """The best fit with what the simulation does not state of the drive: a torque limit, an integral gain, or both."""
     limits = tuning.needed_limits if np.isinf(_stated_limit(nominal)) else ()
     rates = tuning.integral_rates if np.isnan(nominal[place("ki")]) else ()
     best, least = None, np.inf
@@ -180,7 +180,7 @@ def _find_unstated(windows: Windows, nominal: Array, tuning: MotionTuning) -> Se
         free[[place("ki"), place("integral_limit")]] |= bool(unstated.rates)
         tried = replace(unstated, wound_up=tuning.wound_up_levels if unstated.rates else ())
         fit = find_start(windows, nominal, free, tuning, tried)
-        if unstated.rates and fit.values[place("ki")] < tuning.slowest_rate * fit.values[place("kp")]:
+        if unstated.rates and not _integrates(fit, tuning):
             continue
         cost = _total(errors_on_other_half(windows.with_integral(fit.integral), fit.values, fit.free, tuning))
         if cost < (1 - tuning.min_gain) * least:
@@ -188,19 +188,32 @@ def _find_unstated(windows: Windows, nominal: Array, tuning: MotionTuning) -> Se
     return best
 
 
-def _saturated(
-    windows: Windows, starts: Sequence[tuple[ServoFit, Array]], tuning: MotionTuning
-) -> list[tuple[ServoFit, Array]]:
-    """The fit from the numbers of the simulation with another torque limit, where that is better than all starts.
+def _integrates(fit: ServoFit, tuning: MotionTuning) -> bool:
+    """Whether a fit has an integral gain: one that its windows tell, and that moves as that of a controller does.
 
-    A drive that pushes fully most of the time is far from any fit without that.
+    A slower one is an offset of each run, a faster one a friction.
     """
-    first, nominal = starts[0]
+    gain, error = float(fit.values[place("ki")]), float(fit.standard_errors()[place("ki")])
+    slowest, fastest = tuning.rate_bounds
+    return bool(tuning.told * error < gain and slowest <= gain / fit.values[place("kp")] <= fastest)
+
+
+def _with_one_difference(windows: Windows, nominal: Array, tuning: MotionTuning) -> ServoFit | None:
+    """The best fit of one number with all others as the simulation has them, then with the usual ones free, too.
+
+    Several wrong numbers may explain a motion as well as the right one. None where the simulation does not state all.
+    """
     if np.isnan(nominal).any():
-        return []
-    limited = _with_limit(windows, replace(first, values=nominal), tuning)
-    least = min(fit.rms for fit, _ in starts)
-    return [(limited, nominal)] if limited.rms**2 < (1 - tuning.min_gain) * least**2 else []
+        return None
+    fits = []
+    for number in np.flatnonzero(np.array(USUAL) | np.array(OPTIONAL)).tolist():
+        starts = [nominal] if USUAL[number] else first_guesses(windows, nominal, number, tuning)
+        best = starts[int(np.argmin(np.sum(joint_errors(windows, np.stack(starts)) ** 2, axis=1)))]
+        alone = np.zeros(len(nominal), dtype=bool)
+        alone[number] = True
+        fits.append(fit_servo(windows, best, alone, tuning.refit_evaluations))
+    found = min(fits, key=lambda fit: fit.rms)
+    return fit_servo(windows, found.values, found.free | np.array(USUAL), tuning.max_evaluations)
 
 
 def _stated_limit(nominal: Array) -> float:
@@ -358,7 +371,7 @@ def is_hidden_by_encoder_steps(number: int, values: Array, base: Array, windows:
     if number == place("dead_band"):
         return bool(difference < step)
     if number == place("load_friction"):
-        difference *= float(np.sqrt(np.mean(windows.load**2)))
+        difference *= float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
     frictions: tuple[Key, ...] = ("friction", "static_excess", "load_friction")
     return bool(number in [place(key) for key in frictions] and difference < shaken)
 

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
-from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit, window_squares
+from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import settle, thin_windows
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
@@ -149,7 +149,9 @@ def diagnose_motion(
     def conclude(fit: ArmFit, payload: Payload | None) -> MotionDiagnosis:
         taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
         judged = coupled_windows(taken, fit.simulation, fit.values, tuning)
-        kept = replace(fit, chosen=_without_worse(fit, judged, tuning))
+        whole = replace(tuning, wanted_windows=1, longest_window_s=np.inf)
+        runs = coupled_windows(taken, fit.simulation, fit.values, whole)
+        kept = replace(fit, chosen=_without_worse(fit, runs, tuning))
         placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
         return _conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning)
 
@@ -206,9 +208,10 @@ def _first_fits(runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: 
 
 
 def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
-    """The servos without the numbers that make held-out windows clearly worse than a fit of the others does.
+    """The servos without the numbers that make held-out runs clearly worse than a fit of the others does.
 
-    Without an optional number the others are chosen anew.
+    judged: whole runs, because a joint that sticks at another place stays there. Without an optional number the others
+    are chosen anew.
     """
     out: list[ChosenServo | None] = []
     looks = number_of_tests(len(fit.chosen))
@@ -217,10 +220,10 @@ def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning)
         barred: list[int] = []
         while each is not None:
             sound = learned.select(np.setdiff1d(np.arange(learned.count), each.odd))
-            numbers = [number for number in each.gains if np.isfinite(each.nominal[number])]
+            numbers = np.flatnonzero(each.fit.free & np.isfinite(each.nominal)).tolist()
             few = thin_windows(sound, tuning.max_judged_windows)
             others = [each.without(number, few, tuning) for number in numbers]
-            own, *without = (window_squares(held, _settled_errors(held, one.fit.values)) for one in (each, *others))
+            own, *without = (_stretch_squares(held, one.fit.values, tuning) for one in (each, *others))
             rises = [_rise(other, own, tuning) for other in without]
             if max(rises, default=0.0) <= 1:
                 break
@@ -232,6 +235,12 @@ def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning)
                 each = each.without(worst, sound, tuning)
         out.append(each)
     return out
+
+
+def _stretch_squares(windows: Windows, values: Array, tuning: MotionTuning) -> Array:
+    """Squared error of a replay over stretches of the runs, as many as there are windows of a recording."""
+    parts = np.array_split(_settled_errors(windows, values) ** 2, tuning.wanted_windows)
+    return np.array([float(part.sum()) for part in parts])
 
 
 def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:

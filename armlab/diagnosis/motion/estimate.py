@@ -301,14 +301,9 @@ def _regress(windows: Windows, base: Array, moving_speed: float) -> tuple[Array,
 
     And the torque that the motion needs beside damping and friction, N m: few rows are above it.
     """
-    steps = windows.measured.shape[1]
-    stride = max(round(0.02 / windows.step_s), 1)
-    velocity = np.gradient(windows.measured[:, ::stride], stride * windows.step_s, axis=1)
-    velocity = 0.5 * velocity + 0.25 * (np.roll(velocity, 1, axis=1) + np.roll(velocity, -1, axis=1))
-    acceleration = np.gradient(velocity, stride * windows.step_s, axis=1)
-    command = windows.command[:, windows.history : windows.history + steps : stride]
+    stride, velocity, known = needed_torque(windows, float(base[place("armature")]))
+    command = windows.command[:, windows.history : windows.history + windows.measured.shape[1] : stride]
     error = command - windows.measured[:, ::stride]
-    known = (windows.inertia[:, ::stride] + base[place("armature")]) * acceleration + windows.load[:, ::stride]
     rows = np.abs(velocity) > moving_speed
     found, needed = base.copy(), float(np.quantile(np.abs(known), NEEDED_QUANTILE))
     if rows.sum() < 10:
@@ -317,6 +312,18 @@ def _regress(windows: Windows, base: Array, moving_speed: float) -> tuple[Array,
     solution = np.linalg.lstsq(columns, known[rows], rcond=None)[0]
     found[[place("kp"), place("damping"), place("friction")]] = np.maximum(solution, 0.0)
     return found, needed
+
+
+def needed_torque(windows: Windows, armature: float) -> tuple[int, Array, Array]:
+    """Torque that the measured motion needs beside friction, N m, and the velocity, rad/s, (windows, instants) each.
+
+    The instants are those of every n-th step; n comes first.
+    """
+    stride = max(round(0.02 / windows.step_s), 1)
+    velocity = np.gradient(windows.measured[:, ::stride], stride * windows.step_s, axis=1)
+    velocity = 0.5 * velocity + 0.25 * (np.roll(velocity, 1, axis=1) + np.roll(velocity, -1, axis=1))
+    acceleration = np.gradient(velocity, stride * windows.step_s, axis=1)
+    return stride, velocity, (windows.inertia[:, ::stride] + armature) * acceleration + windows.load[:, ::stride]
 
 
 def unsaturated_limit(windows: Windows, values: Array) -> float:

@@ -73,7 +73,7 @@ class MotionTuning:
         60, unit="windows", meaning="most windows of the choice; the numbers come from all", least=4
     )
     tried_parameters: int = tuned(
-        4,
+        3,
         unit="parameters",
         meaning="parameters that are fitted in each round, of those that a linear model gains most from",
         least=1,
@@ -96,8 +96,11 @@ class MotionTuning:
     integral_rates: tuple[float, ...] = tuned(
         (0.5, 2.0, 8.0), unit="1/s", meaning="starts of an integral gain over kp, where nothing is said of the drive"
     )
-    slowest_rate: float = tuned(
-        0.1, unit="1/s", meaning="an integral gain over kp that is lower does not move within a run", least=0.0
+    rate_bounds: tuple[float, ...] = tuned(
+        (0.1, 50.0), unit="1/s", meaning="of an integral gain over kp: slower is an offset, faster is friction"
+    )
+    told: float = tuned(
+        3.0, unit="times a standard error", meaning="that an integral gain is above zero, to be one", least=0.0
     )
     wound_up_levels: tuple[float, ...] = tuned(
         (0.2, 0.6), unit="of the torque that the motion needs", meaning="starts of the limit of an integral"
