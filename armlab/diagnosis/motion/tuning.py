@@ -73,7 +73,7 @@ class MotionTuning:
         60, unit="windows", meaning="most windows of the choice; the numbers come from all", least=4
     )
     tried_parameters: int = tuned(
-        3,
+        4,
         unit="parameters",
         meaning="parameters that are fitted in each round, of those that a linear model gains most from",
         least=1,
