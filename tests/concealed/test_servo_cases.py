@@ -193,3 +193,10 @@ def test_a_gain_is_no_wrong_claim_where_kp_is_unknown_but_a_single_wrong_number_
 def test_damping_is_that_of_joint_and_drive_where_nothing_is_known_of_the_drive():
     verdict = {"findings": [finding("viscous_friction", 1, coefficient=(0.31, 0.29, 0.33))]}
     assert judge({**TRUTH, "knowledge": "unknown"}, verdict).numbers[0].held
+
+
+def test_damping_is_that_of_the_joint_where_the_drives_kd_has_a_number_of_its_own():
+    gains = finding("controller_gain_error", 1, kd=(0.21, 0.19, 0.23))
+    verdict = {"findings": [gains, finding("viscous_friction", 1, coefficient=(0.31, 0.29, 0.33))]}
+    kd, damping = judge({**TRUTH, "knowledge": "unknown"}, verdict).numbers
+    assert (kd.parameter, kd.held, damping.parameter, damping.held) == ("kd", True, "coefficient", False)

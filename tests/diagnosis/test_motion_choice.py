@@ -15,9 +15,9 @@ from armlab.diagnosis.motion.choose import (
 )
 from armlab.diagnosis.motion.estimate import ServoFit
 from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, NEUTRAL, USUAL, Key, place
-from armlab.diagnosis.motion.windows import Windows
+from armlab.diagnosis.motion.windows import Windows, smallest_step
 
-GAIN = Gain(share=0.5, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
+GAIN = Gain(share=0.5, enough=0.02, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
 
 
 def numbers(**values: float) -> np.ndarray:
@@ -32,7 +32,7 @@ def chosen_servo(nominal: np.ndarray, *named: Key, **fitted: float) -> ChosenSer
     values = nominal.copy()
     for key, value in fitted.items():
         values[KEYS.index(key)] = value
-    fit = ServoFit(values, np.array(USUAL), np.eye(sum(USUAL)) * 1e-4, 1e-3, 24, np.zeros(1))
+    fit = ServoFit(values, np.array(USUAL), lambda: np.eye(sum(USUAL)) * 1e-4, 1e-3, 1e-4, 24, np.zeros(1))
     return ChosenServo(nominal, fit, fit.free, {place(key): GAIN for key in named}, np.zeros(0, dtype=np.intp))
 
 
@@ -72,26 +72,30 @@ def test_windows_at_rest_do_not_make_a_gain_less_sure() -> None:
     assert chance_of_gain(np.zeros(4)) == 1.0
 
 
-def test_the_matched_filter_sees_what_few_windows_tell(still: Windows) -> None:
+def test_the_matched_filter_sees_what_few_windows_tell_and_not_what_one_tells() -> None:
     rng = np.random.default_rng(3)
     count, samples = 20, 100
-    begin = samples * np.arange(count + 1)
-    windows = replace(still, measured=np.zeros((count, samples)), begin=begin, position=np.zeros(begin[-1]))
-    noise = rng.normal(0, 1e-3, begin[-1])
-    change = np.zeros(begin[-1])
-    assert chance_of_match(windows, noise, noise) == 1.0
-    change[: 2 * samples] = 4e-3 * np.sin(np.linspace(0, 30, 2 * samples))  # in two windows of twenty
-    assert chance_of_match(windows, noise + change, noise) < 1e-6
+    window = np.repeat(np.arange(count), samples)
+    noise = rng.normal(0, 1e-3, len(window))
+    wave = 4e-3 * np.sin(np.linspace(0, 30, samples))
+    assert chance_of_match(window, noise, noise, 1e-3) == 1.0
+    change = np.where(window < 3, np.tile(wave, count), 0.0)
+    assert chance_of_match(window, noise + change, noise, 1e-3) < 1e-6
+    assert chance_of_match(window, noise + np.where(window == 7, change, 0.0), noise, 1e-3) > 0.05
+    widened = chance_of_match(window, noise + 0.1 * change, noise, 0.0)  # no encoder: what the law leaves out
+    assert chance_of_match(window, noise + 0.1 * change, noise, 1e-3) < widened
     guesses = [change * rng.choice([-1, 1]) for _ in range(200)]  # learned from noise: without relation to the errors
-    chances = [
-        chance_of_match(windows, each, each - 0.1 * guess) for guess in guesses for each in [rng.permutation(noise)]
-    ]
-    assert np.mean(np.array(chances) < 0.05) < 0.05
+    chances = []
+    for guess in guesses:
+        errors = rng.permutation(noise)
+        chances.append(chance_of_match(window, errors, errors - 0.1 * guess, 1e-3))
+    assert np.mean(np.array(chances) < 0.05) < 0.1
 
 
 def test_a_dead_band_or_friction_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(still: Windows) -> None:
-    counted = replace(still, position=0.0015 * np.array([0.0, 1.0, 2.0, 7.0]) + 1e-9 * np.arange(4))
-    assert counted.encoder_step == pytest.approx(0.0015, rel=1e-5)
+    step = smallest_step(0.0015 * np.array([0.0, 1.0, 2.0, 7.0]) + 1e-9 * np.arange(4))
+    assert step == pytest.approx(0.0015, rel=1e-5)
+    counted = replace(still, encoder_step=step)
     base = numbers(kp=8.0, friction=0.02, dead_band=0.002)
 
     def hidden(windows: Windows, key: Key, change: float) -> bool:
@@ -106,12 +110,13 @@ def test_a_dead_band_or_friction_below_a_step_of_the_encoder_is_none_and_an_offs
     assert not hidden(still, "dead_band", 1e-4)
     assert hidden(counted, "friction", -0.003)  # a step is 8 * 0.0015 = 0.012 N m, its noise 0.0035
     assert not hidden(counted, "friction", -0.004)
+    assert not hidden(counted, "friction", 0.003)  # steps make no friction
     assert not hidden(still, "friction", -0.003)
 
 
 def test_a_number_that_no_sample_tells_has_no_interval() -> None:
     free = np.array([key in ("kp", "limit") for key in KEYS])
-    fit = ServoFit(numbers(kp=8.0, limit=2.0), free, np.diag([1e-4, 0.0]), 1e-3, 20, np.zeros(1))
+    fit = ServoFit(numbers(kp=8.0, limit=2.0), free, lambda: np.diag([1e-4, 0.0]), 1e-3, 1e-4, 20, np.zeros(1))
     low, high = fit.interval()
     limit, kp = place("limit"), place("kp")
     assert (low[limit], high[limit]) == (LOWEST[limit], HIGHEST[limit])
@@ -121,7 +126,7 @@ def test_a_number_that_no_sample_tells_has_no_interval() -> None:
 @pytest.fixture
 def still() -> Windows:
     """One window of a joint that stands 1 rad from its command."""
-    steps, none = 10, np.zeros((1, 10))
+    steps, none = 60, np.zeros((1, 60))
     integers = np.zeros(1, dtype=np.int64)
     return Windows(
         step_s=1e-3,
@@ -145,4 +150,5 @@ def still() -> Windows:
         row=integers,
         fraction=np.zeros(1),
         position=np.zeros(1),
+        encoder_step=0.0,
     )

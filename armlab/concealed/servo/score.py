@@ -7,7 +7,7 @@ of its drives is true, too: gains where kp is unknown; damping and torque limits
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -185,7 +185,8 @@ def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> 
     """Judges a verdict (verdict/1, empty where there is none) by an answer (motion-truth/1)."""
     classes = [(finding, _class_of(finding)) for finding in verdict.get("findings", [])]
     lacking = LACKING[truth["knowledge"]]
-    numbers = [(finding, number) for finding, _ in classes for number in _compare(finding, truth, lacking)]
+    with_kd = {finding["joint"] for finding, _ in classes if "kd" in finding["parameters"]}
+    numbers = [(finding, number) for finding, _ in classes for number in _compare(finding, truth, lacking, with_kd)]
     single = [number for finding, number in numbers if len(_class_of(finding)) == 1 and not number.held]
     return MotionOutcome(
         case=truth["case"],
@@ -233,18 +234,21 @@ def _is_true(name: Name, truth: dict[str, Any], lacking: Sequence[str]) -> bool:
     return name[0] in lacking or name in parts or any(_names(name, each) for each in truth["injected"])
 
 
-def _compare(finding: dict[str, Any], truth: dict[str, Any], lacking: Sequence[str]) -> Iterator[Number]:
-    """The numbers of a finding whose own name is true, beside the true ones."""
+def _compare(
+    finding: dict[str, Any], truth: dict[str, Any], lacking: Sequence[str], with_kd: Collection[int | None]
+) -> Iterator[Number]:
+    """The numbers of a finding whose own name is true, beside the true ones.
+
+    with_kd: joints whose kd has a finding. At the others, damping is that of joint and drive where nothing is known.
+    """
     effect, joint = finding["effect"], finding["joint"]
     own = [each for each in truth["injected"] if each["effect"] == effect and each["joint"] in (None, joint)]
     if joint is None or not (own or effect in lacking) or any(each["falling"] for each in own):
         return
     drive = truth["drives"][joint - 1]
     true = {**drive.get(effect, {}), **(own[0]["parameters"] if own else {})}
-    if "viscous_friction" in lacking:  # kd is in one column with it, and no part of the simulation
-        true = {name: value for name, value in true.items() if name != "kd"}
-        if effect == "viscous_friction":
-            true["coefficient"] += drive["controller_gain_error"]["kd"]
+    if effect == "viscous_friction" and effect in lacking and joint not in with_kd:
+        true["coefficient"] += drive["controller_gain_error"]["kd"]
     for name, reported in finding["parameters"].items():
         interval = reported["ci95"]
         if name in true and interval is not None and np.ndim(interval) == 1 and interval[1] > interval[0]:

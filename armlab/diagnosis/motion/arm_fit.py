@@ -1,26 +1,26 @@
 """Fits the servos of all joints: their replays make the loads, then each joint chooses its numbers alone.
 
-Numbers and loads depend on each other. So the usual numbers and the loads take turns first, and where a joint has
-chosen a number beyond the usual ones, the loads are made and the numbers are chosen again as long as that lowers the
-errors.
+Numbers and loads depend on each other. So the usual numbers and the loads take turns first. Where a joint has chosen a
+number beyond the usual ones, the loads are made again, and each joint whose fit they change chooses anew, until all are
+settled.
 """
 
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.motion.choose import ChosenServo, choose_servo
+from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, free_at_first
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.estimate import fit_servo, thin_windows
+from armlab.diagnosis.motion.estimate import fit_servo, thin_windows, to_coordinates
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import LOWEST, OPTIONAL, USUAL, place
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
-from armlab.diagnosis.motion.windows import Windows
+from armlab.diagnosis.motion.windows import Windows, at_rest
 from armlab.recordings.recording import MotionRun
 
 
@@ -28,10 +28,11 @@ from armlab.recordings.recording import MotionRun
 class ArmFit:
     """The servos of an arm with the inertias of a simulation.
 
-    starts: numbers, (parameters,) of each joint, with which the arm was replayed; windows: of each joint; chosen: its
-    servo, None for one that stands still or follows no servo.
+    runs: with the commands that the drives take; starts: numbers, (parameters,) of each joint, with which the arm was
+    replayed; windows: of each joint; chosen: its servo, None for one that stands still or follows no servo.
     """
 
+    runs: Sequence[MotionRun]
     simulation: ServoSimulation
     starts: Sequence[Array | None]
     windows: list[Windows]
@@ -44,7 +45,7 @@ class ArmFit:
 
 
 def fit_arm(
-    runs: Sequence[MotionRun],
+    taken: Callable[[Sequence[Array | None]], Sequence[MotionRun]],
     simulation: ServoSimulation,
     starts: Sequence[Array | None],
     progress: Callable[[str], None],
@@ -52,58 +53,72 @@ def fit_arm(
 ) -> ArmFit:
     """The servos of all joints.
 
+    taken: the runs with the commands that drives with these numbers take.
     starts: numbers, (parameters,) of each joint; None for a joint that stands still.
     """
     progress("replaying the joints together")
     for _ in range(tuning.coupling_rounds):
-        windows = coupled_windows(runs, simulation, starts, tuning)
+        windows = coupled_windows(taken(starts), simulation, starts, tuning)
         starts = [
-            None if values is None else _refit(own, values, tuning) for own, values in zip(windows, starts, strict=True)
+            None if values is None else _refit(own, values, nominal, tuning)
+            for own, values, nominal in zip(windows, starts, simulation.nominal.values, strict=True)
         ]
-    fit = _choose_all(runs, simulation, starts, progress, tuning)
-    for _ in range(tuning.coupling_choices - 1):
+    runs = taken(starts)
+    windows = coupled_windows(runs, simulation, starts, tuning)
+    fit = ArmFit(runs, simulation, starts, windows, [None] * len(windows))
+    unsettled = [number for number, start in enumerate(starts) if start is not None]
+    for _ in range(tuning.coupling_choices):
+        fit = _choose(fit, unsettled, progress, tuning)
         if not any(each is not None and (each.free & np.array(OPTIONAL)).any() for each in fit.chosen):
             break
-        before = fit
         starts = [given if own is None else own for own, given in zip(fit.values, starts, strict=True)]
-        fit = _choose_all(runs, simulation, starts, progress, tuning)
-        if _log_squares(fit) > _log_squares(before) + np.log(1 - tuning.min_gain):
+        fit, unsettled = _renew_loads(replace(fit, runs=taken(starts), starts=starts), tuning)
+        if not unsettled:
             break
     return fit
 
 
-def _log_squares(fit: ArmFit) -> float:
-    """Sum of the logarithms of the squared errors of all joints."""
-    return float(2 * sum(np.log(max(each.fit.rms, 1e-300)) for each in fit.chosen if each is not None))
-
-
-def _refit(windows: Windows, values: Array, tuning: MotionTuning) -> Array:
+def _refit(windows: Windows, values: Array, nominal: Array, tuning: MotionTuning) -> Array:
     few = thin_windows(windows, tuning.max_start_windows)
-    return fit_servo(few, values, np.array(USUAL), tuning.refit_evaluations).values
+    free = free_at_first(values, nominal)
+    return fit_servo(at_rest(few, values), values, free, tuning.refit_evaluations).values
 
 
-def _choose_all(
-    runs: Sequence[MotionRun],
-    simulation: ServoSimulation,
-    starts: Sequence[Array | None],
-    progress: Callable[[str], None],
-    tuning: MotionTuning,
-) -> ArmFit:
-    windows = coupled_windows(runs, simulation, starts, tuning)
+def _renew_loads(fit: ArmFit, tuning: MotionTuning) -> tuple[ArmFit, list[int]]:
+    """The fit with loads that its servos make, and the joints whose fit is another one with them.
+
+    It is the same where no number moves by more than a standard error, and the squared error by less than what a number
+    is worth.
+    """
+    windows = coupled_windows(fit.runs, fit.simulation, fit.starts, tuning)
+    chosen, unsettled = list(fit.chosen), list[int]()
+    for number, each in enumerate(chosen):
+        if each is None:
+            continue
+        renewed = each.refitted(windows[number], tuning)
+        moved = np.abs(to_coordinates(renewed.fit.values) - to_coordinates(each.fit.values))
+        change = 2 * abs(np.log(max(renewed.fit.rms, 1e-300) / max(each.fit.rms, 1e-300)))
+        if change > -np.log(1 - tuning.min_gain) or np.any(moved > each.fit.standard_errors()):
+            unsettled.append(number)
+        chosen[number] = renewed
+    return replace(fit, windows=windows, chosen=chosen), unsettled
+
+
+def _choose(fit: ArmFit, joints: Sequence[int], progress: Callable[[str], None], tuning: MotionTuning) -> ArmFit:
+    """The fit with servos of some joints that are chosen anew, in its windows."""
+    windows, nominal = fit.windows, fit.simulation.nominal.values
     looks = number_of_tests(len(windows))
 
     def choose(number: int) -> ChosenServo | None:
-        if starts[number] is None:
-            return None
-        fitted = choose_servo(windows[number], simulation.nominal.values[number], looks, tuning)
+        fitted = choose_servo(windows[number], nominal[number], looks, tuning, start=fit.starts[number])
         return fitted if _explains(windows[number], fitted, tuning) else None
 
-    chosen = list[ChosenServo | None]()
+    chosen = list(fit.chosen)
     with ThreadPoolExecutor(os.cpu_count()) as pool:  # replays in C leave Python to other threads
-        for number, each in enumerate(pool.map(choose, range(len(windows)))):
-            chosen.append(each)
+        for number, each in zip(joints, pool.map(choose, joints), strict=True):
+            chosen[number] = each
             progress(f"fitted joint {number + 1} of {len(windows)}")
-    return ArmFit(simulation, starts, windows, chosen)
+    return replace(fit, chosen=chosen)
 
 
 def number_of_tests(joints: int) -> int:

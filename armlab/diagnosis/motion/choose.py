@@ -4,16 +4,17 @@ Even and odd windows take turns: parameters are fitted on one half and judged on
 where the model without it (the parameter at the value of the simulation) predicts the other half worse, by a share that
 matters and hardly by chance. It is a finding where that holds after a correction for all tests.
 
-Two tests say what chance does. Signed ranks of the windows need no assumption, and see little where few windows tell
-much. So where the ranks agree at all, a matched filter may decide: with d the change of the predictions by the
+Two tests say what chance does, and either may decide. Signed ranks of the windows need no assumption, and see little
+where few windows tell much. A matched filter sees these: with d the change of the predictions by the
 parameter, learned on the other half, and e the errors without it,
 
-    z = sum d e / (widening sqrt(sum_w sum_f |D_w(f)|^2 S(f)))
+    z = sum d e / sqrt(sum_w sum_f |D_w(f)|^2 S(f))
 
-S is the mean power spectrum of the errors with the parameter; the widening is that of the intervals (see estimate.py).
+S is the mean power spectrum of the errors with the parameter, widened as that of the intervals (see estimate.py). The
+window that tells most is left out: nothing is found that shows in one window alone.
 """
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,13 +26,17 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.motion.estimate import (
     ServoFit,
     Unstated,
+    coordinate_scales,
     correlated_variances,
     fill_unknown,
     find_start,
     fit_servo,
     jacobian,
+    least_gain,
     needed_torque,
+    price_of_number,
     settle,
+    shaking_torque,
     thin_windows,
     to_coordinates,
     unsaturated_limit,
@@ -41,23 +46,27 @@ from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import (
     INFINITE_LIMIT,
     OPTIONAL,
-    SCALE,
     USUAL,
     Key,
     place,
 )
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
-from armlab.diagnosis.motion.windows import Windows
+from armlab.diagnosis.motion.windows import Windows, at_rest
 
+TESTS_OF_GAIN = 2  # ranks and the matched filter, of which the better one counts
 JUDGED_TOLERANCE = 1e-4  # of fits that are judged on the other half, where a gain of percents matters
 
 
 @dataclass(frozen=True)
 class Gain:
-    """What one parameter is worth on windows that took no part. share: of the squared error without it; p_value: of
-    no gain, one-sided, not corrected. rms_without, rms_with: rad."""
+    """What one parameter is worth on windows that took no part.
+
+    share: of the squared error without it; enough: the share that matters. p_value: of no gain, one-sided, by the
+    better of two tests, not corrected. rms_without, rms_with: rad.
+    """
 
     share: float
+    enough: float
     p_value: float
     rms_without: float
     rms_with: float
@@ -92,12 +101,17 @@ class ChosenServo:
         values[[kd, damping]] = moved, self.nominal[damping]
         return replace(self, fit=replace(self.fit, values=values))
 
+    def refitted(self, windows: Windows, tuning: MotionTuning = DEFAULT) -> "ChosenServo":
+        """The same numbers, fitted anew in the windows with other loads."""
+        sound, own = _without_odd(windows, self.odd), self.fit
+        fit = fit_servo(sound.with_integral(own.integral), own.values, own.free, tuning.refit_evaluations)
+        return replace(self, fit=fit)
+
     def without(self, number: int, windows: Windows, tuning: MotionTuning = DEFAULT) -> "ChosenServo":
         """The same with the number of the simulation at a place, and the others fitted anew in these windows."""
-        values, free, judged = self.fit.values.copy(), self.fit.free.copy(), self.free.copy()
-        values[number], free[number], judged[number] = self.nominal[number], False, False
-        if number == place("damping"):  # of joint and drive together
-            values[place("kd")] = self.nominal[place("kd")]
+        values, free = _with_nominal(self.fit, self.nominal, number)
+        judged = self.free.copy()
+        judged[number] = False
         fit = fit_servo(windows.with_integral(self.fit.integral), values, free, tuning.max_evaluations)
         gains = {other: gain for other, gain in self.gains.items() if other != number}
         return replace(self, fit=fit, free=judged, gains=gains)
@@ -115,30 +129,54 @@ def choose_servo(
     nominal: Array,
     looks: int,
     tuning: MotionTuning = DEFAULT,
-    barred: Collection[int] = (),
+    start: Array | None = None,
 ) -> ChosenServo:
     """The servo of one joint. nominal: (parameters,), NaN where unknown. looks: number of tests in the diagnosis.
 
-    barred: places of optional parameters that have none in the model.
+    start: numbers, (parameters,), that `first_fit` found in windows with nearly the same loads; without them they are
+    searched here.
 
     The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
     """
-    given, starts = nominal, _first_fits(windows, nominal, tuning)
-    odd = _odd_with_any_limit(windows.with_integral(starts[-1][0].integral), starts[-1][0], tuning)
-    sound = windows.select(np.setdiff1d(np.arange(windows.count), odd))
-    few = thin_windows(sound, tuning.max_judged_windows)
-    unstated = _find_unstated(few, nominal, tuning)
-    if unstated is not None and _cost(unstated, tuning) < _cost(starts[-1][0], tuning):
-        starts = [(unstated, nominal)]
-    best, judged, nominal = _grow(few, *starts[0], tuning, barred)
-    for another in starts[1:]:
-        other, errors, own = _grow(few, *another, tuning, barred)
-        if _cost(other, tuning) < _cost(best, tuning):
-            best, judged, nominal = other, errors, own
-    single = _with_one_difference(few, given, tuning)
+    starts = _start_fits(windows, nominal, start, tuning)
+    first = _cheapest(starts, tuning)
+    odd = _odd_with_any_limit(windows.with_integral(first.integral), first, nominal, tuning)
+    few = thin_windows(_without_odd(windows, odd), tuning.max_judged_windows)
+    grown = [(*_grow(few, fit, base, tuning), base) for fit, base in starts]
+    best, judged, base = min(grown, key=lambda each: _cost(each[0], tuning))
+    single = _with_one_difference(few, nominal, tuning)
     if single is not None and _cost(single, tuning) < _cost(best, tuning):
-        best, judged, nominal = _grow(few, single, given, tuning, barred)
-    few, base = few.with_integral(best.integral), fill_unknown(nominal)
+        base = nominal
+        best, judged = _grow(few, single, base, tuning)
+    return _judge(windows, (best, judged), (base, odd), looks, tuning)
+
+
+def judge_again(windows: Windows, chosen: ChosenServo, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
+    """A servo whose free parameters have become fewer, fitted and judged with those that are left."""
+    few = thin_windows(_without_odd(windows, chosen.odd), tuning.max_judged_windows)
+    few = few.with_integral(chosen.fit.integral)
+    fit = fit_servo(few, chosen.fit.values, chosen.free, tuning.max_evaluations)
+    judged = errors_on_other_half(few, fit.values, fit.free, tuning)
+    return _judge(windows, (fit, judged), (chosen.nominal, chosen.odd), looks, tuning)
+
+
+def _judge(
+    windows: Windows,
+    found: tuple[ServoFit, Array],
+    given: tuple[Array, NDArray[np.intp]],
+    looks: int,
+    tuning: MotionTuning,
+) -> ChosenServo:
+    """A servo with what each of its parameters is worth. What is no finding gets the number of the simulation.
+
+    Static friction refines Coulomb friction, and each may stand for the other: where it is no finding, it leaves, and
+    the others are judged without it.
+
+    found: a fit, and its errors on the other half of some windows. given: numbers of the simulation, and odd windows.
+    """
+    (best, judged), (nominal, odd) = found, given
+    sound, base, static = _without_odd(windows, odd), fill_unknown(nominal), place("static_excess")
+    few = thin_windows(sound, tuning.max_judged_windows).with_integral(best.integral)
     fit = fit_servo(sound.with_integral(best.integral), best.values, best.free, tuning.max_evaluations)
     gains = {number: _gain_of(few, best, number, (base, judged), tuning) for number in _differing(fit, base)}
     worth = {
@@ -146,14 +184,32 @@ def choose_servo(
         for number, gain in gains.items()
         if is_finding(gain, looks, tuning) and not is_hidden_by_encoder_steps(number, fit.values, base, sound)
     }
+    if best.free[static] and static not in worth:
+        best = fit_servo(few, *_with_nominal(best, base, static), tuning.max_evaluations)
+        judged = errors_on_other_half(few.with_integral(best.integral), best.values, best.free, tuning)
+        return _judge(windows, (best, judged), given, looks, tuning)
     free = np.isnan(nominal) & fit.free
     free[list(worth)] = True
     start = np.where(free | ~fit.free, fit.values, nominal)
     fewer = fit_servo(sound.with_integral(fit.integral), start, free, tuning.max_evaluations)
-    predicts = _total(errors_on_other_half(few, start, free, tuning)) * (1 - tuning.min_gain) <= _total(judged)
+    others = _total(errors_on_other_half(few, start, free, tuning))
+    predicts = others * (1 - least_gain(fit.rms**2, fit.noise, tuning)) <= _total(judged)
     if predicts and _cost(fewer, tuning) <= _cost(fit, tuning):
         fit = fewer
     return ChosenServo(nominal, fit, best.free, worth, odd)
+
+
+def _without_odd(windows: Windows, odd: NDArray[np.intp]) -> Windows:
+    return windows.select(np.setdiff1d(np.arange(windows.count), odd))
+
+
+def _with_nominal(fit: ServoFit, base: Array, number: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Numbers of a fit with that of the simulation at a place, and which of them are free then."""
+    values, free = fit.values.copy(), fit.free.copy()
+    values[number], free[number] = base[number], False
+    if number == place("damping") and not free[place("kd")]:  # of joint and drive together
+        values[place("kd")] = base[place("kd")]
+    return values, free
 
 
 def _differing(fit: ServoFit, base: Array) -> list[int]:
@@ -164,28 +220,36 @@ def _differing(fit: ServoFit, base: Array) -> list[int]:
 
 def _cost(fit: ServoFit, tuning: MotionTuning) -> float:
     """Of a fit: the logarithm of its squared error, with the price of its numbers."""
-    return float(2 * np.log(max(fit.rms, 1e-300)) - np.log(1 - tuning.min_gain) * fit.free.sum())
+    price = price_of_number(fit.rms**2, fit.noise, tuning)
+    return float(2 * np.log(max(fit.rms, 1e-300)) + price * fit.free.sum())
 
 
 def _find_unstated(windows: Windows, nominal: Array, tuning: MotionTuning) -> ServoFit | None:
     """The best fit with what the simulation does not state of the drive: a torque limit, an integral gain, or both."""
-    limits = tuning.needed_limits if np.isinf(_stated_limit(nominal)) else ()
-    rates = tuning.integral_rates if np.isnan(nominal[place("ki")]) else ()
-    best, least = None, np.inf
-    for unstated in dict.fromkeys([Unstated(limits), Unstated((), rates), Unstated(limits, rates)]):
+    limited = Unstated(limits=() if _states_limit(nominal) else tuning.needed_limits)
+    inside = replace(limited, inside=bool(limited.limits) and not nominal[place("kd")])
+    integrating = Unstated()
+    if np.isnan(nominal[place("ki")]):
+        integrating = Unstated(rates=tuning.integral_rates, wound_up=tuning.wound_up_levels)
+    both = replace(inside, rates=integrating.rates, wound_up=integrating.wound_up)
+    few, best, least = thin_windows(windows, tuning.max_start_windows), None, np.inf
+    for unstated in dict.fromkeys((limited, inside, integrating, both)):
         if unstated == Unstated():
             continue
         free = np.array(USUAL)
-        free[[place("limit")]] |= bool(unstated.limits)
+        free[place("limit")] |= bool(unstated.limits)
+        if unstated.inside:
+            free[place("kd")], free[place("damping")] = True, False
         free[[place("ki"), place("integral_limit")]] |= bool(unstated.rates)
-        tried = replace(unstated, wound_up=tuning.wound_up_levels if unstated.rates else ())
-        fit = find_start(windows, nominal, free, tuning, tried)
+        fit = find_start(few, nominal, free, tuning, unstated)
         if unstated.rates and not _integrates(fit, tuning):
             continue
-        cost = _total(errors_on_other_half(windows.with_integral(fit.integral), fit.values, fit.free, tuning))
-        if cost < (1 - tuning.min_gain) * least:
+        cost = _total(errors_on_other_half(few.with_integral(fit.integral), fit.values, fit.free, tuning))
+        if cost < (1 - least_gain(fit.rms**2, fit.noise, tuning)) * least:
             best, least = fit, cost
-    return best
+    if best is None:
+        return None
+    return fit_servo(windows.with_integral(best.integral), best.values, best.free, tuning.max_evaluations)
 
 
 def _integrates(fit: ServoFit, tuning: MotionTuning) -> bool:
@@ -201,92 +265,131 @@ def _integrates(fit: ServoFit, tuning: MotionTuning) -> bool:
 def _with_one_difference(windows: Windows, nominal: Array, tuning: MotionTuning) -> ServoFit | None:
     """The best fit of one number with all others as the simulation has them, then with the usual ones free, too.
 
-    Several wrong numbers may explain a motion as well as the right one. None where the simulation does not state all.
+    Several wrong numbers may explain a motion as well as the right one. kd is one of them where it explains more than
+    damping in the joint does. None where the simulation does not state all.
     """
     if np.isnan(nominal).any():
         return None
-    fits = []
-    for number in np.flatnonzero(np.array(USUAL) | np.array(OPTIONAL)).tolist():
-        starts = [nominal] if USUAL[number] else first_guesses(windows, nominal, number, tuning)
+    alone = {}
+    tried = np.array(USUAL) | np.array(OPTIONAL)
+    tried[place("kd")] = nominal[place("kd")] > 0
+    for number in np.flatnonzero(tried).tolist():
+        starts = first_guesses(windows, nominal, number, tuning) if OPTIONAL[number] else [nominal]
         best = starts[int(np.argmin(np.sum(joint_errors(windows, np.stack(starts)) ** 2, axis=1)))]
-        alone = np.zeros(len(nominal), dtype=bool)
-        alone[number] = True
-        fits.append(fit_servo(windows, best, alone, tuning.refit_evaluations))
-    found = min(fits, key=lambda fit: fit.rms)
-    return fit_servo(windows, found.values, found.free | np.array(USUAL), tuning.max_evaluations)
+        free = np.zeros(len(nominal), dtype=bool)
+        free[number] = True
+        alone[number] = fit_servo(windows, best, free, tuning.refit_evaluations)
+    kd, damping = alone.get(place("kd")), alone[place("damping")]
+    if kd is not None and kd.rms**2 > (1 - least_gain(damping.rms**2, damping.noise, tuning)) * damping.rms**2:
+        del alone[place("kd")]
+    found = min(alone.values(), key=lambda fit: fit.rms)
+    free = found.free | np.array(USUAL)
+    free[place("damping")] = not found.free[place("kd")]
+    return fit_servo(windows, found.values, free, tuning.max_evaluations)
 
 
-def _stated_limit(nominal: Array) -> float:
-    """The torque limit of the simulation, infinite where it says nothing of the drive."""
-    limit = float(fill_unknown(nominal)[place("limit")])
-    return np.inf if np.isnan(nominal[place("kp")]) and limit >= INFINITE_LIMIT else limit
+def _states_limit(nominal: Array) -> bool:
+    """Whether the simulation says something of the torque limit: of a drive that it knows, it does."""
+    return not np.isnan(nominal[place("kp")]) or bool(fill_unknown(nominal)[place("limit")] < INFINITE_LIMIT)
 
 
-def _grow(
-    windows: Windows, start: ServoFit, nominal: Array, tuning: MotionTuning, barred: Collection[int] = ()
-) -> tuple[ServoFit, Array, Array]:
-    """The fit from a start with all parameters that are worth a place; its errors on the other half, (samples,).
-
-    The nominal numbers come back as they are.
-    """
+def _grow(windows: Windows, start: ServoFit, nominal: Array, tuning: MotionTuning) -> tuple[ServoFit, Array]:
+    """The fit from a start with all parameters that are worth a place; its errors on the other half, (samples,)."""
     windows = windows.with_integral(start.integral)
-    base, unknown = fill_unknown(nominal), bool(np.isnan(nominal[place("kp")]))
+    base = fill_unknown(nominal)
     fit = fit_servo(windows, start.values, start.free, tuning.max_evaluations)
     judged = errors_on_other_half(windows, fit.values, fit.free, tuning)
-    if unknown and fit.free[place("limit")]:
-        fit, judged = _with_damping_inside(windows, fit, judged, base, tuning)
-    waiting = [number for number in np.flatnonzero(np.array(OPTIONAL) & ~fit.free).tolist() if number not in barred]
+    optional = np.array(OPTIONAL) | np.array(USUAL)
+    waiting = np.flatnonzero(optional & ~fit.free).tolist()
     while waiting:
         windows = windows.with_integral(fit.integral)
-        tried = {}
-        for number, guess in _most_promising(windows, fit, waiting, tuning):
-            more = _with_parameter(windows, fit, number, guess, tuning)
-            if more.rms**2 <= (1 - tuning.min_gain) * fit.rms**2:
-                tried[number] = more, errors_on_other_half(windows, more.values, more.free, tuning)
-        gains = {number: gain_of(windows, judged, errors, tuning) for number, (_, errors) in tried.items()}
+        promising = _most_promising(windows, fit, waiting, tuning)
+        fits = {number: _with_parameter(windows, fit, number, guess, nominal, tuning) for number, guess in promising}
+        tried = {
+            number: (more, errors_on_other_half(windows, more.values, more.free, tuning))
+            for number, more in sorted(fits.items(), key=lambda each: each[1].rms)[: tuning.judged_parameters]
+            if more.rms**2 <= (1 - least_gain(fit.rms**2, fit.noise, tuning)) * fit.rms**2
+        }
+        gains = {number: gain_of(windows, judged, errors, fit.noise, tuning) for number, (_, errors) in tried.items()}
         if not gains:
             break
         best = max(gains, key=lambda number: gains[number].share)
-        if gains[best].share < tuning.min_gain or gains[best].p_value > tuning.max_joining_p_value:
+        if gains[best].share < gains[best].enough or gains[best].p_value > tuning.max_joining_p_value:
             break
         waiting.remove(best)
         if is_hidden_by_encoder_steps(best, tried[best][0].values, base, windows):
             continue
         fit, judged = tried[best]
-        if best == place("limit") and unknown:
-            fit, judged = _with_damping_inside(windows, fit, judged, base, tuning)
-    return fit, judged, nominal
+    return fit, judged
 
 
 def first_fit(windows: Windows, nominal: Array, tuning: MotionTuning = DEFAULT) -> ServoFit:
-    """The fit of the usual parameters."""
-    return _first_fits(windows, nominal, tuning)[-1][0]
+    """The fit of the usual parameters, and of what the simulation does not state of the drive."""
+    return _cheapest(_start_fits(windows, nominal, None, tuning), tuning)
 
 
-def _first_fits(windows: Windows, nominal: Array, tuning: MotionTuning) -> list[tuple[ServoFit, Array]]:
+def _cheapest(starts: Sequence[tuple[ServoFit, Array]], tuning: MotionTuning) -> ServoFit:
+    return min((fit for fit, _ in starts), key=lambda fit: _cost(fit, tuning))
+
+
+def _start_fits(
+    windows: Windows, nominal: Array, start: Array | None, tuning: MotionTuning
+) -> list[tuple[ServoFit, Array]]:
     """The fit of the usual parameters with the simulation's kd, and, where that is clearly better, one with all damping
-    outside the drive.
+    outside the drive. Or one with what the simulation does not state of the drive.
 
-    Each with the nominal numbers of which it is a change: the same sum of kd and damping, and the kd of the fit.
+    Each with the nominal numbers of which it is a change: the same sum of kd and damping, and the kd of the fit. start:
+    as in `choose_servo`.
     """
-    start, kd = find_start(windows, nominal, np.array(USUAL), tuning), nominal[place("kd")]
-    if not kd:
-        return [(start, nominal)]
-    outside = nominal.copy()
+    kd, outside = float(nominal[place("kd")]), nominal.copy()
     outside[[place("kd"), place("damping")]] = 0.0, nominal[place("damping")] + kd
-    other = find_start(windows, outside, np.array(USUAL), tuning)
-    if other.rms**2 >= (1 - tuning.min_gain) * start.rms**2:
-        return [(start, nominal)]
-    return [(start, nominal), (other, outside)]
+    bases = [nominal, outside] if kd else [nominal]
+    if start is None:
+        fits = [(find_start(windows, base, np.array(USUAL), tuning), base) for base in bases]
+        unstated = _find_unstated(windows, nominal, tuning)
+        if unstated is not None and _cost(unstated, tuning) < _cost(fits[0][0], tuning):
+            return [(unstated, nominal)]
+    else:
+        fits = [(_fit_from(windows, start, base, tuning), base) for base in bases]
+        if fits[0][0].free[place("limit")] and not kd:
+            moved = _with_damping_moved(start, nominal)
+            return [min(fits[0], (_fit_from(windows, moved, nominal, tuning), nominal), key=lambda each: each[0].rms)]
+    first, last = fits[0][0], fits[-1][0]
+    clearly = last.rms**2 < (1 - least_gain(first.rms**2, first.noise, tuning)) * first.rms**2
+    return fits if clearly else fits[:1]
 
 
-def _with_limit(windows: Windows, fit: ServoFit, tuning: MotionTuning) -> ServoFit:
-    """The fit with a torque limit that is free, too."""
-    starts = first_guesses(windows, fit.values, place("limit"), tuning)
-    best = starts[int(np.argmin(np.sum(joint_errors(windows, np.stack(starts)) ** 2, axis=1)))]
-    free = fit.free.copy()
-    free[place("limit")] = True
-    return fit_servo(windows, best, free, tuning.refit_evaluations)
+def _with_damping_moved(start: Array, nominal: Array) -> Array:
+    """The same with the damping that is in the drive outside it, or the other way round."""
+    kd, damping = place("kd"), place("damping")
+    if not start[kd]:
+        return with_damping_inside(start, nominal)
+    moved = start.copy()
+    moved[[kd, damping]] = 0.0, start[kd] + start[damping]
+    return moved
+
+
+def _fit_from(windows: Windows, start: Array, nominal: Array, tuning: MotionTuning) -> ServoFit:
+    """The fit of what is `free_at_first`, from numbers, (parameters,); the others are those of the simulation."""
+    kd, damping = place("kd"), place("damping")
+    free = free_at_first(start, nominal)
+    values = np.where(free, start, fill_unknown(nominal))
+    if free[damping]:
+        values[damping] = max(float(start[kd] + start[damping] - values[kd]), 0.0)
+    return fit_servo(at_rest(windows, values), values, free, tuning.max_evaluations)
+
+
+def free_at_first(start: Array, nominal: Array) -> NDArray[np.bool_]:
+    """The usual parameters, and those of a start, (parameters,), that the simulation does not state of the drive."""
+    free, kd = np.array(USUAL), place("kd")
+    differs = start != fill_unknown(nominal)
+    if not _states_limit(nominal):
+        free[place("limit")] = differs[place("limit")]
+        free[kd] = differs[kd] and not nominal[kd]
+        free[place("damping")] = not free[kd]
+    if np.isnan(nominal[place("ki")]):
+        free[[place("ki"), place("integral_limit")]] = differs[[place("ki"), place("integral_limit")]]
+    return free
 
 
 def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEFAULT) -> NDArray[np.intp]:
@@ -300,13 +403,16 @@ def find_odd_windows(windows: Windows, values: Array, tuning: MotionTuning = DEF
     return np.sort(odd[np.argsort(-sizes[odd])][: int(tuning.max_odd_share * windows.count)])
 
 
-def _odd_with_any_limit(windows: Windows, fit: ServoFit, tuning: MotionTuning) -> NDArray[np.intp]:
+def _odd_with_any_limit(windows: Windows, fit: ServoFit, nominal: Array, tuning: MotionTuning) -> NDArray[np.intp]:
     """Windows that are odd with a torque limit, too: a drive that pushes fully in a few windows is no contact."""
     odd = find_odd_windows(windows, fit.values, tuning)
     if len(odd) == 0:
         return odd
     spread = np.linspace(0, windows.count - 1, min(tuning.max_start_windows, windows.count)).astype(int)
-    limited = _with_limit(windows.select(np.union1d(spread, odd)), fit, tuning)
+    few = windows.select(np.union1d(spread, odd))
+    starts = first_guesses(few, fit.values, place("limit"), tuning)
+    best = starts[int(np.argmin(np.sum(joint_errors(few, np.stack(starts)) ** 2, axis=1)))]
+    limited = _with_parameter(few, fit, place("limit"), best, nominal, tuning)
     still = find_odd_windows(windows.with_integral(limited.integral), limited.values, tuning)
     return np.intersect1d(odd, still)
 
@@ -326,7 +432,7 @@ def _most_promising(
     columns = columns - slopes @ (slopes.T @ columns)
     sizes = np.linalg.norm(columns, axis=0)
     gains = np.abs(left @ columns) / np.where(sizes > 0, sizes, np.inf)
-    enough = tuning.min_promise * tuning.min_gain * _total(errors[0])
+    enough = tuning.min_promise * least_gain(fit.rms**2, fit.noise, tuning) * _total(errors[0])
     best: dict[int, Array] = {}
     for place_of in np.argsort(-gains).tolist():
         if gains[place_of] ** 2 > enough:
@@ -334,29 +440,20 @@ def _most_promising(
     return list(best.items())[: tuning.tried_parameters]
 
 
-def _with_parameter(windows: Windows, fit: ServoFit, number: int, start: Array, tuning: MotionTuning) -> ServoFit:
-    """The fit with one parameter more."""
+def _with_parameter(
+    windows: Windows, fit: ServoFit, number: int, start: Array, nominal: Array, tuning: MotionTuning
+) -> ServoFit:
+    """The fit with one parameter more.
+
+    nominal: numbers of the simulation. A torque limit may act on the damping of a drive of which nothing is stated.
+    """
     free = fit.free.copy()
     free[number] = True
-    return fit_servo(windows, start, free, tuning.refit_evaluations)
-
-
-def _with_damping_inside(
-    windows: Windows, fit: ServoFit, judged: Array, base: Array, tuning: MotionTuning
-) -> tuple[ServoFit, Array]:
-    """The same, or the fit of an unknown drive whose damping acts within its torque limit, where that is better.
-
-    What the joint has beyond the simulation's damping goes into kd, again and again while that lowers the error.
-    judged: errors on the other half. base: the simulation's numbers, with the damping of the joint.
-    """
-    for _ in range(tuning.damping_rounds):
-        inside = with_damping_inside(fit.values, base)
-        other = fit_servo(windows, inside, fit.free, tuning.refit_evaluations)
-        errors = errors_on_other_half(windows, other.values, fit.free, tuning)
-        if _total(errors) >= _total(judged):
-            break
-        fit, judged = other, errors
-    return fit, judged
+    fits = [fit_servo(windows, start, free, tuning.refit_evaluations)]
+    if number == place("limit") and not _states_limit(nominal) and not (free[place("kd")] or nominal[place("kd")]):
+        free[place("kd")], free[place("damping")] = True, False
+        fits.append(fit_servo(windows, with_damping_inside(start, nominal), free, tuning.refit_evaluations))
+    return min(fits, key=lambda each: each.rms)
 
 
 def is_hidden_by_encoder_steps(number: int, values: Array, base: Array, windows: Windows) -> bool:
@@ -364,26 +461,25 @@ def is_hidden_by_encoder_steps(number: int, values: Array, base: Array, windows:
 
     A drive that reads its position in counts does not act on an error within a count either. And at each count its
     torque jumps, which shakes the joint loose: friction looks less than it is, by a part of what the drive makes of the
-    noise of a step. values, base: (parameters,), fitted and of the simulation.
+    noise of a step; more friction is not made so. values, base: (parameters,), fitted and of the simulation.
     """
-    difference, step = abs(float(values[number] - base[number])), windows.encoder_step
-    shaken = float(values[place("kp")]) * step / np.sqrt(12)
+    differences = values - base
     if number == place("dead_band"):
-        return bool(difference < step)
-    if number == place("load_friction"):
-        difference *= float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
-    frictions: tuple[Key, ...] = ("friction", "static_excess", "load_friction")
-    return bool(number in [place(key) for key in frictions] and difference < shaken)
+        return bool(abs(differences[number]) < windows.encoder_step)
+    carried = float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
+    levels: dict[Key, float] = {"friction": 1.0, "static_excess": 1.0, "load_friction": carried}
+    level = sum(size * float(differences[place(key)]) for key, size in levels.items())
+    return bool(number in map(place, levels) and -shaking_torque(windows, values) < level < 0)
 
 
 def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
     """Whether a gain matters, and is hardly chance. looks: number of tests in the diagnosis."""
-    return gain.share > tuning.min_gain and gain.p_value * looks < tuning.max_p_value
+    return gain.share > gain.enough and gain.p_value * TESTS_OF_GAIN * looks < tuning.max_p_value
 
 
 def first_guesses(windows: Windows, values: Array, number: int, tuning: MotionTuning = DEFAULT) -> list[Array]:
     """Starts from which a parameter that was not fitted yet has a slope; a limit cuts a little or much."""
-    starts = [float(values[number] + 2 * SCALE[number])]
+    starts = [float(values[number] + 2 * coordinate_scales(windows, values)[number])]
     if number == place("limit"):
         starts = [
             level * min(float(values[number]), unsaturated_limit(windows, values)) for level in tuning.limit_levels
@@ -437,30 +533,39 @@ def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, A
     """What a fitted parameter is worth. known: the simulation's numbers; the errors (samples,) with the parameter."""
     base, judged = known
     if not np.isfinite(base[number]):
-        return Gain(1.0, 0.0, np.inf, float(np.sqrt(np.mean(judged**2))))
-    fixed, held = fit.free.copy(), fit.values.copy()
-    fixed[number], held[number] = False, base[number]
-    if number == place("damping"):  # of joint and drive together
-        held[place("kd")] = base[place("kd")]
-    return gain_of(windows, errors_on_other_half(windows, held, fixed, tuning), judged, tuning)
+        return Gain(1.0, tuning.min_gain, 0.0, np.inf, float(np.sqrt(np.mean(judged**2))))
+    held, fixed = _with_nominal(fit, base, number)
+    return gain_of(windows, errors_on_other_half(windows, held, fixed, tuning), judged, fit.noise, tuning)
 
 
-def gain_of(windows: Windows, without: Array, with_it: Array, tuning: MotionTuning = DEFAULT) -> Gain:
-    """What a parameter is worth: errors without and with it, (samples,) each, learned on the other half."""
-    gain = gain_over_windows(len(without), window_squares(windows, without), window_squares(windows, with_it))
-    if gain.p_value > tuning.max_p_value:
-        return gain
-    return replace(gain, p_value=min(gain.p_value, chance_of_match(windows, without, with_it, tuning)))
+def gain_of(windows: Windows, without: Array, with_it: Array, noise: float, tuning: MotionTuning = DEFAULT) -> Gain:
+    """What a parameter is worth: errors without and with it, (samples,) each, learned on the other half; noise: of
+    reading, rad."""
+    squares = [window_squares(windows, errors) for errors in (without, with_it)]
+    match = chance_of_match(windows.window, without, with_it, noise)
+    before, after = (float(np.mean(errors**2)) for errors in (without, with_it))
+    return Gain(
+        share=1 - after / max(before, 1e-300),
+        enough=least_gain(before, noise, tuning),
+        p_value=min(chance_of_gain(squares[0] - squares[1]), match),
+        rms_without=float(np.sqrt(before)),
+        rms_with=float(np.sqrt(after)),
+    )
 
 
-def chance_of_match(windows: Windows, without: Array, with_it: Array, tuning: MotionTuning = DEFAULT) -> float:
-    """P-value of no gain by the matched filter; errors without and with a parameter, (samples,) each."""
+def chance_of_match(window: NDArray[np.intp], without: Array, with_it: Array, noise: float) -> float:
+    """P-value of no gain by the matched filter, without the window that tells most.
+
+    window: of each sample, (samples,). without, with_it: errors without and with a parameter, (samples,) each. noise:
+    of the encoder, in the same unit.
+    """
     change = without - with_it
-    variance = float(correlated_variances(change[:, None], with_it, windows.window)[0])
+    told = np.bincount(window, change * without)
+    change = np.where(window == int(np.argmax(told)), 0.0, change)
+    variance = float(correlated_variances(change[:, None], with_it, window, noise)[0])
     if variance <= 0:
         return 1.0
-    size = float(change @ without) / (tuning.widening * np.sqrt(variance))
-    return float(student.sf(size, max(windows.count - 1, 1)))
+    return float(student.sf(float(change @ without) / np.sqrt(variance), max(len(told) - 1, 1)))
 
 
 def chance_of_gain(difference: Array) -> float:
@@ -471,14 +576,3 @@ def chance_of_gain(difference: Array) -> float:
     """
     told = difference[difference != 0]
     return float(wilcoxon(told, alternative="greater").pvalue) if len(told) else 1.0
-
-
-def gain_over_windows(samples: int, without: Array, with_it: Array) -> Gain:
-    """Squared errors of each window without and with a parameter, (windows,) each; samples: of all windows."""
-    difference = without - with_it
-    return Gain(
-        share=float(difference.sum() / max(without.sum(), 1e-300)),
-        p_value=chance_of_gain(difference),
-        rms_without=float(np.sqrt(without.sum() / samples)),
-        rms_with=float(np.sqrt(with_it.sum() / samples)),
-    )

@@ -15,17 +15,19 @@ from scipy.stats import t as student
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.diagnosis.motion.choose import chance_of_gain, choose_servo
+from armlab.diagnosis.motion.choose import ChosenServo, chance_of_gain, choose_servo
 from armlab.diagnosis.motion.diagnose import reason_unusable
 from armlab.diagnosis.motion.estimate import (
     LOGARITHMIC,
+    coordinate_scales,
     from_coordinates,
     jacobian,
     thin_windows,
     to_coordinates,
+    with_damping_inside,
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
-from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, SCALE, ServoParameter
+from armlab.diagnosis.motion.servo import HIGHEST, LOWEST, PARAMETERS, ServoParameter, place
 from armlab.diagnosis.motion.simulation import read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows
@@ -108,23 +110,36 @@ def compare_motion(
     changes: list[ServoChange] = []
     for joint, pair in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {joint + 1} of {len(old.joints)}")
-        same_kd = replace(
-            tuning, damping_rounds=0, needed_limits=(), integral_rates=()
-        )  # that of the simulation for both recordings
+        proportional = replace(tuning, needed_limits=(), integral_rates=())
         fits = [
-            choose_servo(each, simulation.nominal.values[joint], looks, same_kd)
+            choose_servo(each, simulation.nominal.values[joint], looks, proportional)
             for each, simulation in zip(pair, simulations, strict=True)
         ]
         sound = [
             each.select(np.setdiff1d(np.arange(each.count), fit.odd)).with_integral(fit.fit.integral)
             for each, fit in zip(pair, fits, strict=True)
         ]
-        free = fits[0].free | fits[1].free
         thinned = tuple(thin_windows(each, tuning.max_judged_windows) for each in sound)
-        first, last = (each.fit for each in fits)
-        starts = (np.where(first.free, first.values, last.values), np.where(last.free, last.values, first.values))
+        starts, free = _common_start(fits, simulations[0].nominal.values[joint])
         changes += _compare_joint((thinned[0], thinned[1]), starts, free, (joint, looks), tuning)
     return MotionComparison(names, new.recorded_arm, "", tuple(changes), tuple(_notes(old, new)))
+
+
+def _common_start(fits: Sequence[ChosenServo], nominal: Array) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
+    """Numbers of both recordings, (parameters,) each, from which a fit of both starts, and which are free in it.
+
+    Where one of them has its damping in the drive, the other one has, too.
+    """
+    kd, damping = place("kd"), place("damping")
+    inside = any(each.free[kd] for each in fits)
+    values, free = [], []
+    for each in fits:
+        moves = inside and not each.free[kd]
+        values.append(with_damping_inside(each.fit.values, nominal) if moves else each.fit.values)
+        free.append(each.free.copy())
+        free[-1][[kd, damping]] = (True, False) if moves else each.free[[kd, damping]]
+    starts = np.where(free[0], values[0], values[1]), np.where(free[1], values[1], values[0])
+    return starts, free[0] | free[1]
 
 
 def _notes(old: MotionRecording, new: MotionRecording) -> list[str]:
@@ -179,7 +194,7 @@ def _fit_pair(
         beside = np.concatenate([np.zeros((len(blocks[0]), len(moved))), blocks[1][:, columns]])
         return np.concatenate([np.concatenate(blocks), beside], axis=1)
 
-    scale = np.where(LOGARITHMIC, 0.2, SCALE)
+    scale = coordinate_scales(pair[0], from_coordinates(first_old))
     first, sizes = (
         np.concatenate([first_old[fitted], first_change[moved]]),
         np.concatenate([scale[fitted], scale[moved]]),

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
-from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, first_fit
+from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, first_fit, judge_again
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import settle, thin_windows
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
@@ -28,7 +28,7 @@ from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters,
 from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
-from armlab.diagnosis.motion.windows import Windows, make_windows, window_stretches
+from armlab.diagnosis.motion.windows import Windows, make_windows, smallest_step, window_stretches
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
@@ -63,8 +63,8 @@ class ServoFinding:
         return self.parameter.key == "delay" and abs(abs(self.value) - abs(self.nominal)) < sample
 
     def is_lead_of(self, step: float) -> bool:
-        """Whether it is a lead of less than half a step, s, of a simulator, whose integration makes that."""
-        return self.effect == "channel_skew" and 0 < self.value < step / 2
+        """Whether it may be a lead of half a step, s, of a simulator, whose integration makes that."""
+        return self.effect == "channel_skew" and self.value > 0 and self.interval[0] < step / 2
 
     @property
     def equation(self) -> str:
@@ -142,7 +142,6 @@ def diagnose_motion(
     held = holds_samples(recording.runs, given.rate_hz)
     if held:
         progress("finding the clock of the drives")
-        learned = hold_commands(learned, given, firsts, tuning)
         simulation = replace(given, rate_hz=None)
     bare_simulation = replace(given, rate_hz=simulation.rate_hz)
 
@@ -155,15 +154,19 @@ def diagnose_motion(
         placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
         return _conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning)
 
-    fit = fit_arm(learned, simulation, firsts, progress, tuning)
+    def taken(servos: Sequence[Array | None]) -> Sequence[MotionRun]:
+        return hold_commands(learned, given, servos, tuning) if held else learned
+
+    fit = fit_arm(taken, simulation, firsts, progress, tuning)
     if not any(fit.chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("replaying held-out runs")
     concluded = conclude(fit, None)
     progress("weighing the tool")
-    loaded = weigh_tool(learned, fit, progress, tuning)
+    loaded = weigh_tool(taken, fit, progress, tuning)
     if loaded is not None:
-        concluded = min(concluded, conclude(*loaded), key=lambda each: _held_out_cost(each, tuning))
+        with_mass = conclude(*loaded)
+        concluded = with_mass if _replays_as_well(with_mass, concluded, tuning) else concluded
     if concluded.servos is None:
         return concluded
     return replace(
@@ -210,14 +213,11 @@ def _first_fits(runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: 
 def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
     """The servos without the numbers that make held-out runs clearly worse than a fit of the others does.
 
-    judged: whole runs, because a joint that sticks at another place stays there. Without an optional number the others
-    are chosen anew.
+    judged: whole runs, because a joint that sticks at another place stays there. Optional numbers leave first.
     """
     out: list[ChosenServo | None] = []
     looks = number_of_tests(len(fit.chosen))
-    given = fit.simulation.nominal.values
-    for each, nominal, learned, held in zip(fit.chosen, given, fit.windows, judged, strict=True):
-        barred: list[int] = []
+    for each, learned, held in zip(fit.chosen, fit.windows, judged, strict=True):
         while each is not None:
             sound = learned.select(np.setdiff1d(np.arange(learned.count), each.odd))
             numbers = np.flatnonzero(each.fit.free & np.isfinite(each.nominal)).tolist()
@@ -225,14 +225,11 @@ def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning)
             others = [each.without(number, few, tuning) for number in numbers]
             own, *without = (_stretch_squares(held, one.fit.values, tuning) for one in (each, *others))
             rises = [_rise(other, own, tuning) for other in without]
-            if max(rises, default=0.0) <= 1:
+            worse = [row for row, rise in enumerate(rises) if rise > tuning.clearly_worse]
+            if not worse:
                 break
-            worst = numbers[int(np.argmax(rises))]
-            if OPTIONAL[worst]:
-                barred.append(worst)
-                each = choose_servo(learned, nominal, looks, tuning, barred)
-            else:
-                each = each.without(worst, sound, tuning)
+            worst = max(worse, key=lambda row: (OPTIONAL[numbers[row]], rises[row]))
+            each = judge_again(learned, others[worst], looks, tuning)
         out.append(each)
     return out
 
@@ -263,13 +260,13 @@ def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning)
     return out
 
 
-def _held_out_cost(diagnosis: MotionDiagnosis, tuning: MotionTuning) -> float:
-    """Of a model, as `weigh_tool` counts it, by the replay of the whole arm over the held-out runs."""
-    if diagnosis.servos is None:
-        return float("inf")
-    errors = np.array([each.replay_after for each in diagnosis.errors])
-    price = -np.log(1 - tuning.min_gain) * len(diagnosis.findings)
-    return float(2 * np.sum(np.log(np.maximum(errors, 1e-300))) + price)
+def _replays_as_well(loaded: MotionDiagnosis, bare: MotionDiagnosis, tuning: MotionTuning) -> bool:
+    """Whether held-out runs replay with a mass at the tool not clearly worse, over all joints, than without it."""
+    if loaded.servos is None:
+        return False
+    without, with_it = _stretches_of_replays(bare.replayed_after, loaded.replayed_after, tuning)
+    size = np.maximum(without.mean(axis=0), 1e-300)
+    return _rise((without / size).sum(axis=1), (with_it / size).sum(axis=1), tuning) <= tuning.clearly_worse
 
 
 def _conclude(
@@ -345,7 +342,8 @@ def replay_named(
 
     A joint whose replay its names make worse, the worst first, gets back the numbers of the simulation. A whole run of
     sticking joints goes a little another way with any other number: worse is what matters and exceeds the standard
-    error over stretches, also with steps so short that the simulator's own error is small.
+    error over stretches, also with steps so short that the simulator's own error is small. Where the simulation as it
+    is given ends at the encoder's steps, its own error is small enough.
     simulations: as it is given, and with a payload that was found. before: replay of the first one.
     """
     named, sound, (given, simulation) = list(named), set[int](), simulations
@@ -361,23 +359,36 @@ def replay_named(
         if rises[worst] <= 1:
             return servos, after, named
         exact_before = exact_before or replay(given, None, held_out, EXACT_STEPS)
-        if _rises(exact_before, replay(simulation, servos, held_out, EXACT_STEPS), tuning)[worst] > 1:
+        exact_after = replay(simulation, servos, held_out, EXACT_STEPS)
+        if _is_at_floor(before, worst, tuning) or _rises(exact_before, exact_after, tuning)[worst] > 1:
             named[worst] = []
         else:
             sound.add(worst)
 
 
+def _is_at_floor(replayed: Sequence[Replayed], joint: int, tuning: MotionTuning) -> bool:
+    """Whether a replay of whole runs misses a joint's position by the steps of its encoder alone; joint: from 0."""
+    step = smallest_step(np.concatenate([each.run.position[:, joint] for each in replayed]))
+    return bool(joint_rms(replayed)[joint] < tuning.same_error * step / np.sqrt(12))
+
+
 def _rises(before: Sequence[Replayed], after: Sequence[Replayed], tuning: MotionTuning) -> Array:
     """How much the squared error of each joint rises, (joints,), as `_rise` has it, over stretches of the runs."""
-    runs = [each.run for each in before]
-    starts = [(name, first) for name, first, _ in window_stretches(runs, tuning)]
+    without, with_it = _stretches_of_replays(before, after, tuning)
+    return np.array([_rise(*pair, tuning) for pair in zip(without.T, with_it.T, strict=True)])
+
+
+def _stretches_of_replays(
+    before: Sequence[Replayed], after: Sequence[Replayed], tuning: MotionTuning
+) -> tuple[Array, Array]:
+    """Squared errors of two replays of the same runs, (stretches, joints) each."""
+    starts = [(name, first) for name, first, _ in window_stretches([each.run for each in before], tuning)]
     squares: tuple[list[Array], list[Array]] = [], []
     for pair in zip(before, after, strict=True):
         edges = np.searchsorted(pair[0].run.time, [first for name, first in starts if name == pair[0].run.name])
         for each, replayed in zip(squares, pair, strict=True):
             each.append(np.add.reduceat(replayed.error**2, edges))
-    without, with_it = (np.concatenate(each) for each in squares)
-    return np.array([_rise(*pair, tuning) for pair in zip(without.T, with_it.T, strict=True)])
+    return np.concatenate(squares[0]), np.concatenate(squares[1])
 
 
 def _rise(without: Array, with_it: Array, tuning: MotionTuning) -> float:
@@ -436,6 +447,8 @@ def name_differences(
     number.
     windows: of the runs that identify, and of those that are held out. mass_error: of a payload that was found, kg.
     """
+    if not chosen.gains:
+        return []
     learned, judged = windows
     fit, (low, high) = chosen.fit, chosen.fit.interval()
     sound = learned.select(np.setdiff1d(np.arange(learned.count), chosen.odd)).with_integral(fit.integral)
@@ -444,15 +457,14 @@ def name_differences(
     scale: tuple[str, ...] = ("inertial_parameter_error",) if unknown_gain else ()
     if has_weak_load(sound, fit.values, tuning):
         scale = ("rotor_inertia", "inertial_parameter_error")
-    if not chosen.gains:
-        return []
-    errors = [_settled_errors(judged, _with_nominal(fit.values, chosen.nominal, each)) for each in chosen.gains]
+    errors = [_settled_errors(judged, _with_nominal(chosen, each)) for each in chosen.gains]
     after, found = _rms(_settled_errors(judged, fit.values)), []
     for place_of, gain, error in zip(chosen.gains, chosen.gains.values(), errors, strict=True):
         parameter = PARAMETERS[place_of]
         fitted, ends = float(fit.values[place_of]), (float(low[place_of]), float(high[place_of]))
-        said = _named(parameter, fitted, ends, float(chosen.nominal[place_of]))
-        if parameter.key == "damping":
+        unstated = unknown_gain and parameter.key == "kd"
+        said = _named(parameter, fitted, ends, np.nan if unstated else float(chosen.nominal[place_of]))
+        if parameter.key == "damping" and not chosen.free[place("kd")]:
             said = _name_damping(chosen, simulation.nominal.values[number])
         if said.ends[0] <= said.nominal <= said.ends[1]:
             continue
@@ -472,7 +484,7 @@ def name_differences(
                 nominal=said.nominal,
                 before=_rms(error) if np.isfinite(said.nominal) else _rms(_command_error(judged)),
                 after=after,
-                p_value=min(gain.p_value * number_of_tests(len(simulation.joints)), 1.0),
+                p_value=min(gain.p_value * TESTS_OF_GAIN * number_of_tests(len(simulation.joints)), 1.0),
                 rivals=tuple(dict.fromkeys(each for each in rivals if each != said.effect)),
             )
         )
@@ -500,7 +512,7 @@ def _name_payload(payload: Payload, fit: ArmFit, judged: Sequence[Windows], tuni
         nominal=0.0,
         before=before,
         after=after,
-        p_value=min(payload.gain.p_value * number_of_tests(len(judged)), 1.0),
+        p_value=min(payload.gain.p_value * TESTS_OF_GAIN * number_of_tests(len(judged)), 1.0),
         rivals=parameter.rivals,
     )
 
@@ -556,11 +568,11 @@ def _name_damping(chosen: ChosenServo, given: Array) -> _Said:
     return _Said("viscous_friction", "coefficient", value, (max(value - half, 0.0), value + half), nominal)
 
 
-def _with_nominal(values: Array, nominal: Array, number: int) -> Array:
-    changed = values.copy()
-    changed[number] = nominal[number] if np.isfinite(nominal[number]) else values[number]
-    if number == place("damping"):
-        changed[place("kd")] = nominal[place("kd")]
+def _with_nominal(chosen: ChosenServo, number: int) -> Array:
+    """The fitted numbers with that of the simulation at a place; damping is that of joint and drive together."""
+    changed, nominal = chosen.fit.values.copy(), chosen.nominal
+    numbers = [number, place("kd")] if number == place("damping") and not chosen.free[place("kd")] else [number]
+    changed[numbers] = np.where(np.isfinite(nominal[numbers]), nominal[numbers], changed[numbers])
     return changed
 
 
@@ -601,7 +613,7 @@ def _errors(
         replay_after=float(joint_rms(after)[number]),
         command=_rms(commands),
         spread=float(np.std(np.concatenate([run.position[:, number] for run in held_out]))),
-        floor=judged.encoder_step / np.sqrt(12),
+        floor=judged.encoder_noise,
     )
 
 

@@ -10,17 +10,21 @@ What all windows have in common such blocks do not see. So no variance is less t
 over time within a window: with u_w the influence of window w's samples on a number, from J H^-1, and S the mean power
 spectrum of the errors,
 
-    var = widening^2 sum_w sum_f |U_w(f)|^2 S(f)
+    var = sum_w sum_f |U_w(f)|^2 (S(f) + (widening^2 - 1) max(S(f) - N, 0))
 
-The widening stands for what the law leaves out, which is no noise.
+The widening stands for what the law leaves out, which is no noise. N is the noise of reading an encoder in steps:
+errors that are no more than that need no widening.
 
 Where the drive integrates its error, what the integral holds at the start of each run is fitted, too.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -31,23 +35,36 @@ from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, at_rest
 
 LOGARITHMIC = np.isin(KEYS, ("kp", "limit"))  # positive and of any size: fitted as logarithms
+NATURAL_SHARE = 0.1  # of a torque, of critical damping, of an inertia: a step that matters
+LOGARITHMIC_SCALE = 0.2
 RELATIVE_STEP, SCALE_STEP = 0.01, 0.02  # of finite differences: large, because a joint that sticks is not smooth
 NEEDED_QUANTILE = 0.995  # of the torque that the motion needs: less than what few rows of noise say
+SMOOTHED = 15  # places of a spectrum: fewer would call the scatter of noise more than noise
+SETTLING = 5  # evaluations: the motion is nearly linear in an integral
 INTEGRAL_STEP = 0.005  # rad (m): position error whose torque is a step of an integral
 
 
 @dataclass(frozen=True, eq=False)
 class ServoFit:
-    """Parameters of one joint. values: (parameters,); free: which of them were fitted; covariance: of the coordinates
-    (see `to_coordinates`) that are free. rms: of the errors, rad. windows: number of blocks. integral:
-    of the drive at the start of each run, (runs,), N m."""
+    """Parameters of one joint.
+
+    values: (parameters,); free: which of them were fitted; estimate_covariance: of the coordinates (`to_coordinates`)
+    that are free, which few fits are asked for. rms: of the errors, rad; noise: of reading (`reading_noise`), rad.
+    windows: number of blocks. integral: of the drive at the start of each run, (runs,), N m.
+    """
 
     values: Array
     free: NDArray[np.bool_]
-    covariance: Array
+    estimate_covariance: Callable[[], Array]
     rms: float
+    noise: float
     windows: int
     integral: Array
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the coordinates that are free, (free, free)."""
+        return self.estimate_covariance()
 
     def standard_errors(self) -> Array:
         """Of the coordinates, (parameters,); 0 for those that were not fitted, infinite where no sample tells."""
@@ -80,10 +97,23 @@ def from_coordinates(coordinates: Array) -> Array:
     return np.where(LOGARITHMIC, np.exp(np.where(LOGARITHMIC, coordinates, 0.0)), coordinates)
 
 
+def coordinate_scales(windows: Windows, values: Array) -> Array:
+    """Step of each coordinate that matters, (parameters,): of torques by what the motion needs, of a small motor's
+    numbers by its inertia and gain."""
+    scales, inertia = SCALE.copy(), float(np.median(windows.inertia))
+    critical = np.sqrt(float(values[place("kp")]) * (inertia + max(float(values[place("armature")]), 0.0)))
+    torque = float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
+    natural = {"damping": critical, "kd": critical, "armature": inertia, "friction": torque, "static_excess": torque}
+    for key, size in natural.items():
+        scales[KEYS.index(key)] = np.clip(NATURAL_SHARE * size, 1e-3 * SCALE[KEYS.index(key)], HIGHEST[KEYS.index(key)])
+    return np.where(LOGARITHMIC, LOGARITHMIC_SCALE, scales)
+
+
 def jacobian(windows: Windows, values: Array, free: NDArray[np.bool_]) -> Array:
     """Derivative (samples, free) of the errors by the coordinates, by central differences in one batch."""
     centre, chosen = to_coordinates(values), np.flatnonzero(free)
-    steps = np.where(LOGARITHMIC, RELATIVE_STEP, RELATIVE_STEP * np.abs(values) + SCALE_STEP * SCALE)[chosen]
+    scales = coordinate_scales(windows, values)
+    steps = np.where(LOGARITHMIC, RELATIVE_STEP, RELATIVE_STEP * np.abs(values) + SCALE_STEP * scales)[chosen]
     sets = np.tile(centre, (2 * len(chosen), 1))
     for number, (column, step) in enumerate(zip(chosen, steps, strict=True)):
         sets[2 * number, column] += step
@@ -123,7 +153,8 @@ def fit_servo(
     part = np.concatenate([to_coordinates(values)[chosen], windows.integral[runs]])
     if len(part) == 0:
         errors = joint_errors(windows, values)[0]
-        return ServoFit(values, free, np.zeros((0, 0)), _root_mean_square(errors), windows.count, windows.integral)
+        rms, noise = _root_mean_square(errors), reading_noise(windows, values)
+        return ServoFit(values, free, lambda: np.zeros((0, 0)), rms, noise, windows.count, windows.integral)
     low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -wound_up)])
     high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), wound_up)])
     margin = 1e-9 * (high - low)
@@ -132,14 +163,44 @@ def fit_servo(
         np.clip(part, low + margin, high - margin),
         jac=slopes,
         bounds=(low, high),
-        x_scale=np.concatenate([np.where(LOGARITHMIC, 0.2, SCALE)[chosen], np.full(len(runs), push)]),
+        x_scale=np.concatenate([coordinate_scales(windows, values)[chosen], np.full(len(runs), push)]),
         max_nfev=evaluations,
         ftol=tolerance,
         xtol=tolerance,
     )
     moved, values = whole(solution.x)
-    covariance = _covariance(solution.jac, solution.fun, windows.window)[: len(chosen), : len(chosen)]
-    return ServoFit(values, free, covariance, _root_mean_square(solution.fun), windows.count, moved.integral)
+    rms, noise = _root_mean_square(solution.fun), reading_noise(windows, values)
+
+    def covariance() -> Array:
+        return _covariance(solution.jac, solution.fun, windows.window, noise)[: len(chosen), : len(chosen)]
+
+    return ServoFit(values, free, covariance, rms, noise, windows.count, moved.integral)
+
+
+def reading_noise(windows: Windows, values: Array) -> float:
+    """Standard deviation of the errors that the steps of the encoder make by reading alone, rad (m).
+
+    A drive that makes more torque of a step than friction holds moves the joint by it: that is no noise of reading.
+    """
+    friction = float(values[place("friction")])
+    held = 1 - shaking_torque(windows, values) / friction if friction > 0 else 0.0
+    return float(windows.encoder_noise * np.sqrt(max(held, 0.0)))
+
+
+def shaking_torque(windows: Windows, values: Array) -> float:
+    """What the drive makes of the noise of the encoder's steps, N m."""
+    return float(values[place("kp")]) * windows.encoder_noise
+
+
+def least_gain(square: float, noise: float, tuning: MotionTuning = DEFAULT) -> float:
+    """Share of a mean squared error, rad2, that a number has to take: of what is not the noise of reading, rad."""
+    beyond = 1 - noise**2 / max(square, 1e-300)
+    return float(tuning.min_gain * max(beyond, tuning.min_beyond))
+
+
+def price_of_number(square: float, noise: float, tuning: MotionTuning = DEFAULT) -> float:
+    """What a number has to take off the logarithm of a mean squared error."""
+    return float(-np.log(1 - least_gain(square, noise, tuning)))
 
 
 def _root_mean_square(errors: Array) -> float:
@@ -150,7 +211,8 @@ def settle(windows: Windows, values: Array) -> Windows:
     """The windows with the integrals that fit a servo best, (parameters,), at the start of each run."""
     if values[place("ki")] == 0:
         return windows
-    return windows.with_integral(fit_servo(windows, values, np.zeros(len(values), dtype=bool)).integral)
+    none = np.zeros(len(values), dtype=bool)
+    return windows.with_integral(fit_servo(windows, values, none, SETTLING).integral)
 
 
 def _integral_slopes(windows: Windows, values: Array, runs: NDArray[np.int64], push: float) -> Array:
@@ -161,20 +223,23 @@ def _integral_slopes(windows: Windows, values: Array, runs: NDArray[np.int64], p
     return np.where(windows.run[windows.window][:, None] == runs, ((ends[0] - ends[1]) / (2 * push))[:, None], 0.0)
 
 
-def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp]) -> Array:
+def _covariance(slopes: Array, errors: Array, window: NDArray[np.intp], noise: float) -> Array:
     """Of the coordinates, (free, free), by windows as blocks; no variance is less than that of correlated errors."""
     scores = np.stack([np.bincount(window, column * errors) for column in slopes.T], axis=1)
     inverse = np.linalg.pinv(slopes.T @ slopes, hermitian=True)
     blocks = len(scores)
     clustered = inverse @ (scores.T @ scores) @ inverse * blocks / max(blocks - 1, 1)
-    least = correlated_variances(slopes @ inverse, errors, window)
+    least = correlated_variances(slopes @ inverse, errors, window, noise)
     own = np.maximum(np.diag(clustered), 1e-300)
-    wider = np.sqrt(np.clip(DEFAULT.widening**2 * least / own, 1.0, 1e200))
+    wider = np.sqrt(np.clip(least / own, 1.0, 1e200))
     return np.asarray(clustered * np.outer(wider, wider))
 
 
-def correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp]) -> Array:
-    """Variances (free,) of numbers with these influences (samples, free), under errors correlated within windows."""
+def correlated_variances(influence: Array, errors: Array, window: NDArray[np.intp], noise: float) -> Array:
+    """Variances (free,) of numbers with these influences (samples, free), under errors correlated within windows.
+
+    What the errors have beyond the noise of reading, rad, is widened.
+    """
     starts = np.searchsorted(window, np.arange(window[-1] + 1))
     place = np.arange(len(window)) - starts[window]
     shape = len(starts), int(place.max()) + 1
@@ -184,7 +249,9 @@ def correlated_variances(influence: Array, errors: Array, window: NDArray[np.int
         laid_out[window, place] = signal
         return np.asarray(np.sum(np.abs(np.fft.rfft(laid_out, 2 * shape[1], axis=1)) ** 2, axis=0))
 
-    of_errors = powers(errors) / len(errors)
+    spectrum = powers(errors) / len(errors)
+    beyond = np.maximum(uniform_filter1d(spectrum, SMOOTHED, mode="nearest") - noise**2, 0.0)
+    of_errors = spectrum + (DEFAULT.widening**2 - 1) * beyond
     weights = np.full(len(of_errors), 2.0)
     weights[[0, -1]] = 1.0
     return np.array([float(weights @ (powers(each) * of_errors)) for each in influence.T]) / (2 * shape[1])
@@ -194,11 +261,12 @@ def correlated_variances(influence: Array, errors: Array, window: NDArray[np.int
 class Unstated:
     """What a fit tries that the simulation does not state.
 
-    limits: of torque, as shares of the torque that the motion needs; damping is within them. rates: of integral gains
-    over kp, 1/s. wound_up: limits of the integrals, as shares of the torque that the motion needs.
+    limits: of torque, as shares of the torque that the motion needs; inside: whether damping is within them. rates: of
+    integral gains over kp, 1/s. wound_up: limits of the integrals, as shares of the torque that the motion needs.
     """
 
     limits: tuple[float, ...] = ()
+    inside: bool = False
     rates: tuple[float, ...] = ()
     wound_up: tuple[float, ...] = ()
 
@@ -275,9 +343,8 @@ def _starts(windows: Windows, nominal: Array, unstated: Unstated, tuning: Motion
     if regressed[place("kp")] > 0:
         found.append(regressed)
     if unstated.limits:
-        found = [
-            _with(with_damping_inside(one, base), limit=level * needed) for one in found for level in unstated.limits
-        ]
+        found = [with_damping_inside(one, base) for one in found] if unstated.inside else found
+        found = [_with(one, limit=level * needed) for one in found for level in unstated.limits]
     if unstated.rates:
         found = [
             _with(one, ki=rate * float(one[place("kp")]), integral_limit=level * needed)

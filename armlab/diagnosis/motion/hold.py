@@ -1,8 +1,8 @@
 """Drives that take a command over at a rate of their own and hold it: which of the logged commands they take.
 
-The recording states the rate (`rate_hz`), not the phase of the drive's clock. So each phase, in samples of the log, is
-replayed over whole runs, and the one that explains a joint's motion best is taken, for each run and joint. What is left
-is less than a sample, and cannot be told from a delay.
+The recording states the rate (`rate_hz`), not the phase of the clock that all drives share. So each phase, in samples
+of the log, is replayed over whole runs, and the one that explains the motion of all joints best is taken, for each run:
+with the least sum of log(mean squared error). What is left is less than a sample, and cannot be told from a delay.
 """
 
 from collections.abc import Sequence
@@ -30,7 +30,7 @@ def hold_commands(
 ) -> list[MotionRun]:
     """The runs with the commands that the drives take, in place of those that were logged.
 
-    servos: numbers, (parameters,) of each joint, None for one that stands still: it takes the first phase.
+    servos: numbers, (parameters,) of each joint, None for one that stands still.
     """
     assert simulation.rate_hz is not None
     whole = replace(tuning, wanted_windows=1, longest_window_s=np.inf)
@@ -39,14 +39,14 @@ def hold_commands(
         count = round(run.rate_hz / simulation.rate_hz)
         phases = [_taken(run, count, phase) for phase in range(count)]
         windows = make_windows([run], replace(simulation, rate_hz=None), whole)
-        best = [
-            0
-            if values is None
-            else int(np.argmin([_error(run, joint, taken, windows[joint], values) for taken in phases]))
-            for joint, values in enumerate(servos)
+        moving = [
+            (joint, settle(windows[joint], values), values) for joint, values in enumerate(servos) if values is not None
         ]
-        commands = np.stack([phases[phase][:, joint] for joint, phase in enumerate(best)], axis=1)
-        held.append(replace(run, reference_position=commands))
+        costs = [
+            sum(np.log(_square(run, joint, taken, settled, values)) for joint, settled, values in moving)
+            for taken in phases
+        ]
+        held.append(replace(run, reference_position=phases[int(np.argmin(costs))]))
     return held
 
 
@@ -73,9 +73,9 @@ def _sample_numbers(run: MotionRun) -> NDArray[np.intp]:
     return np.maximum.accumulate(np.round((run.time - first) / slope).astype(np.intp))
 
 
-def _error(run: MotionRun, joint: int, taken: Array, windows: Windows, values: Array) -> float:
-    """Squared error of a joint's replay over the whole run with other commands."""
+def _square(run: MotionRun, joint: int, taken: Array, windows: Windows, values: Array) -> float:
+    """Mean squared error of a joint's replay over the whole run with other commands."""
     around = run.time[0] + windows.step_s * np.arange(-windows.history, windows.command.shape[1] - windows.history)
     command = mean_command(replace(run, reference_position=taken), joint, around, windows.step_s, None)
-    moved = settle(replace(windows, command=np.ascontiguousarray(command[None])), values)
-    return float(np.mean(joint_errors(moved, values) ** 2))
+    moved = replace(windows, command=np.ascontiguousarray(command[None]))
+    return max(float(np.mean(joint_errors(moved, values) ** 2)), 1e-300)

@@ -10,9 +10,10 @@ The arm is replayed anew with each mass, because it moves the joints that push e
 A mass competes with servos that differ from the simulation. Both models are judged on windows that took no part, with
 the numbers that are named free and all others as in the simulation. k numbers cost
 
-    sum_j log(mean squared error of joint j) - k log(1 - min_gain)
+    sum_j log(mean squared error of joint j) + sum_k price of number k
 
-so that each number has to take as much off the error as one of a servo. The mass alone is tried first, with the servos
+so that each number has to take as much off the error as one of a servo (`price_of_number`); the mass has the least
+price of all joints. The mass alone is tried first, with the servos
 of the simulation where it has them, then the mass beside the numbers that were named without it.
 """
 
@@ -27,14 +28,16 @@ from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
 from armlab.diagnosis.motion.choose import (
     ChosenServo,
     Gain,
+    chance_of_gain,
+    chance_of_match,
     errors_on_other_half,
-    gain_over_windows,
+    gain_of,
     is_finding,
     learned_errors,
     window_squares,
 )
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo
+from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo, price_of_number, reading_noise
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
@@ -75,24 +78,24 @@ class Payload:
 
 
 def weigh_tool(
-    runs: Sequence[MotionRun],
+    taken: Callable[[Sequence[Array | None]], Sequence[MotionRun]],
     bare: ArmFit,
     progress: Callable[[str], None],
     tuning: MotionTuning = DEFAULT,
 ) -> tuple[ArmFit, Payload] | None:
     """The arm with a mass at the tool; None where servos alone explain the motion as well at less cost.
 
-    bare: the fit of the servos alone.
+    taken: as `fit_arm` has it. bare: the fit of the servos alone.
     """
     for models, starts in _hypotheses(bare):
-        found = find_payload(runs, replace(bare, starts=starts), models, tuning)
+        found = find_payload(replace(bare, starts=starts), models, tuning)
         if found is None or not _can_pay(found, bare, tuning):
             continue
-        loaded = fit_arm(runs, found.simulation, starts, progress, tuning)
-        again = find_payload(runs, loaded, named_models(loaded), tuning)
+        loaded = fit_arm(taken, found.simulation, starts, progress, tuning)
+        again = find_payload(loaded, named_models(loaded), tuning)
         if again is not None and abs(again.simulation.payload - found.simulation.payload) > again.error:
-            loaded = fit_arm(runs, again.simulation, starts, progress, tuning)
-            again = find_payload(runs, loaded, named_models(loaded), tuning)
+            loaded = fit_arm(taken, again.simulation, starts, progress, tuning)
+            again = find_payload(loaded, named_models(loaded), tuning)
         if again is not None and _cost(loaded, bare, tuning) < _cost(bare, loaded, tuning):
             return loaded, again
     return None
@@ -124,9 +127,7 @@ def _hypotheses(bare: ArmFit) -> Iterator[tuple[list[JointModel | None], Sequenc
         yield named, bare.starts
 
 
-def find_payload(
-    runs: Sequence[MotionRun], fit: ArmFit, models: Sequence[JointModel | None], tuning: MotionTuning = DEFAULT
-) -> Payload | None:
+def find_payload(fit: ArmFit, models: Sequence[JointModel | None], tuning: MotionTuning = DEFAULT) -> Payload | None:
     """The mass that explains the motion of all joints better, None without one.
 
     fit: whose windows are looked at first, and with whose starts the arm is replayed. models: of each joint, in these
@@ -142,7 +143,7 @@ def find_payload(
         if not joints:
             return None
         without, with_it = _errors_without_and_with(list(joints.values()), simulation.payload, tuning)
-        gain = _gain_of_all(joints, without, with_it)
+        gain = _gain_of_all(list(joints.values()), without, with_it, tuning)
         if not is_finding(gain, number_of_tests(len(models)), tuning):
             return None
         more, error = estimate_mass(list(joints.values()), tuning)
@@ -151,13 +152,13 @@ def find_payload(
             return None
         if abs(more) < 0.5 * error or not remaining:
             break
-        windows = coupled_windows(runs, simulation, fit.starts, tuning)
+        windows = coupled_windows(fit.runs, simulation, fit.starts, tuning)
         models = [
             None if each is None else JointModel(joint.with_integral(each.windows.integral), each.values, each.free)
             for joint, each in zip(windows, models, strict=True)
         ]
-    squares = dict(zip(joints, with_it.mean(axis=1).tolist(), strict=True))
-    return Payload(simulation, error, without.shape[1], squares, gain)
+    squares = {number: float(np.mean(errors**2)) for number, errors in zip(joints, with_it, strict=True)}
+    return Payload(simulation, error, joints[next(iter(joints))].windows.count, squares, gain)
 
 
 def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning = DEFAULT) -> tuple[float, float]:
@@ -173,58 +174,75 @@ def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning = DEFAULT) 
     return (float(np.average(masses, weights=weights)), float(1 / np.sqrt(told))) if told > 0 else (0.0, np.inf)
 
 
-def _errors_without_and_with(joints: Sequence[JointModel], mass: float, tuning: MotionTuning) -> tuple[Array, Array]:
-    """Squared errors (joints, windows) without a payload and with one, each by numbers learned on the other half.
+def _errors_without_and_with(
+    joints: Sequence[JointModel], mass: float, tuning: MotionTuning
+) -> tuple[list[Array], list[Array]]:
+    """Errors (samples,) of each joint without a payload and with one, each by numbers learned on the other half, rad.
 
     mass: of the windows, kg.
     """
     count = joints[0].windows.count
-    without, with_it = np.zeros((len(joints), count)), np.zeros((len(joints), count))
+    without, with_it = ([np.zeros(len(joint.windows.position)) for joint in joints] for _ in range(2))
     for first in (0, 1):
         train, test = np.arange(first, count, 2), np.arange(1 - first, count, 2)
         halves = [(joint.windows.select(train), joint.windows.select(test)) for joint in joints]
         learned = [JointModel(half, joint.values, joint.free) for joint, (half, _) in zip(joints, halves, strict=True)]
         more = estimate_mass(learned, tuning)[0]
         for row, (joint, parts) in enumerate(zip(joints, halves, strict=True)):
-            for squares, load in ((without, -mass), (with_it, more)):
-                errors = learned_errors(parts, joint.loaded(load), joint.free, tuning)
-                squares[row, test] = window_squares(parts[1], errors)
+            judged = np.isin(joint.windows.window, test)
+            for errors, load in ((without, -mass), (with_it, more)):
+                errors[row][judged] = learned_errors(parts, joint.loaded(load), joint.free, tuning)
     return without, with_it
 
 
-def _gain_of_all(joints: dict[int, JointModel], without: Array, with_it: Array) -> Gain:
-    """What a mass is worth over all joints, of errors over the noise. share: at the joint that gains most."""
-    noise = np.maximum(with_it.mean(axis=1, keepdims=True), 1e-300)
-    samples = sum(len(joint.windows.position) for joint in joints.values())
-    gain = gain_over_windows(samples, (without / noise).sum(axis=0), (with_it / noise).sum(axis=0))
-    share = float(np.max(1 - with_it.sum(axis=1) / np.maximum(without.sum(axis=1), 1e-300)))
-    return replace(gain, share=share)
+def _gain_of_all(
+    joints: Sequence[JointModel], without: Sequence[Array], with_it: Sequence[Array], tuning: MotionTuning
+) -> Gain:
+    """What a mass is worth over all joints, of errors over those with it. share: at the joint that gains most."""
+    gains, noises, scaled = list[Gain](), list[float](), list[tuple[Array, Array]]()
+    for joint, one, two in zip(joints, without, with_it, strict=True):
+        noises.append(reading_noise(joint.windows, joint.values))
+        gains.append(gain_of(joint.windows, one, two, noises[-1], tuning))
+        size = max(gains[-1].rms_with, 1e-300)
+        scaled.append((one / size, two / size))
+    squares = [
+        sum(window_squares(joint.windows, pair[which]) for joint, pair in zip(joints, scaled, strict=True))
+        for which in (0, 1)
+    ]
+    ranks = chance_of_gain(np.asarray(squares[0] - squares[1]))
+    count = joints[0].windows.count
+    window = np.concatenate([number * count + joint.windows.window for number, joint in enumerate(joints)])
+    noise = [own / max(gain.rms_with, 1e-300) for own, gain in zip(noises, gains, strict=True)]
+    before, after = (np.concatenate([pair[which] for pair in scaled]) for which in (0, 1))
+    match = chance_of_match(window, before, after, float(np.sqrt(np.mean(np.square(noise)))))
+    best = max(gains, key=lambda gain: gain.share / gain.enough)
+    return replace(best, p_value=min(ranks, match))
 
 
 def _can_pay(found: Payload, bare: ArmFit, tuning: MotionTuning) -> bool:
     """Whether a mass can cost less than servos alone: a joint that it leaves worse needs one number more at least."""
-    odd = _odd_windows(bare.chosen)
-    price = -np.log(1 - tuning.min_gain)
-    least, spent = price, 0.0
+    odd, prices = _odd_windows(bare.chosen), list[float]()
+    least, spent = 0.0, 0.0
     for number, model in enumerate(named_models(bare)):
         if number in found.squares and model is not None:
             own = _mean_square(JointModel(_sound(model.windows, odd, tuning), model.values, model.free), tuning)
             left = found.squares[number]
-            least += np.log(min(left, own)) + (price if left > own / (1 - tuning.min_gain) else 0.0)
-            spent += np.log(own) + price * int(model.free.sum())
-    return bool(least < spent)
+            prices.append(price_of_number(own, reading_noise(model.windows, model.values), tuning))
+            least += np.log(min(left, own)) + (prices[-1] if np.log(left / own) > prices[-1] else 0.0)
+            spent += np.log(own) + prices[-1] * int(model.free.sum())
+    return bool(least + min(prices, default=0.0) < spent)
 
 
 def _cost(fit: ArmFit, other: ArmFit, tuning: MotionTuning) -> float:
     """Cost of a model on the windows that neither of two models calls odd."""
-    price = -float(np.log(1 - tuning.min_gain))
-    cost = price if fit.simulation.payload else 0.0
+    cost, prices = 0.0, list[float]()
     for model, one, two in zip(named_models(fit), fit.chosen, other.chosen, strict=True):
         if model is not None and two is not None:
             sound = _sound(model.windows, _odd_windows([one, two]), tuning)
             square = _mean_square(JointModel(sound, model.values, model.free), tuning)
-            cost += float(np.log(square)) + price * int(model.free.sum())
-    return cost
+            prices.append(price_of_number(square, reading_noise(sound, model.values), tuning))
+            cost += float(np.log(square)) + prices[-1] * int(model.free.sum())
+    return cost + (min(prices, default=0.0) if fit.simulation.payload else 0.0)
 
 
 def _mean_square(model: JointModel, tuning: MotionTuning) -> float:

@@ -34,7 +34,7 @@ class Replayed:
 def with_servos(model: Any, simulation: ServoSimulation, servos: Servos) -> Any:
     """The model with the numbers of servos in its fields: gain and force range of the actuators, fields of the joints.
 
-    Command delay, offset, dead band and load friction have no field; `replay` adds them. The friction loss sticks.
+    What a model of MuJoCo has no field for, `replay` adds step by step (`_needs_steps`). The friction loss sticks.
     """
     for row, joint in enumerate(simulation.joints):
         set_fields(model, joint, actuator_of(model, joint), servos.of_joint(row))

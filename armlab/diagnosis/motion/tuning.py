@@ -73,10 +73,13 @@ class MotionTuning:
         60, unit="windows", meaning="most windows of the choice; the numbers come from all", least=4
     )
     tried_parameters: int = tuned(
-        4,
+        6,
         unit="parameters",
         meaning="parameters that are fitted in each round, of those that a linear model gains most from",
         least=1,
+    )
+    judged_parameters: int = tuned(
+        3, unit="parameters", meaning="of these, that are judged on the other half: those that fit best", least=1
     )
     min_promise: float = tuned(
         0.2,
@@ -105,14 +108,18 @@ class MotionTuning:
     wound_up_levels: tuple[float, ...] = tuned(
         (0.2, 0.6), unit="of the torque that the motion needs", meaning="starts of the limit of an integral"
     )
-    damping_rounds: int = tuned(
-        6, unit="fits", meaning="most by which the damping of an unknown drive goes into its torque limit", least=0
-    )
     payload_replays: int = tuned(3, unit="replays", meaning="most replays of the arm for one payload", least=1)
     min_gain: float = tuned(
         0.02,
-        unit="of the squared error",
+        unit="of the squared error beyond the encoder's noise",
         meaning="least gain of a number on windows that took no part",
+        least=0.0,
+        most=1.0,
+    )
+    min_beyond: float = tuned(
+        0.1,
+        unit="of the squared error",
+        meaning="that counts as more than the encoder's noise, at least; of what is more a number has to take its gain",
         least=0.0,
         most=1.0,
     )
@@ -129,6 +136,13 @@ class MotionTuning:
         meaning="of no gain, for a place in the model, without correction",
         source="convention",
         most=1.0,
+    )
+    clearly_worse: float = tuned(
+        2.0,
+        unit="standard errors over stretches",
+        meaning="that whole held-out runs replay worse with a number, before it is withdrawn: sticking joints scatter",
+        source="convention",
+        least=0.0,
     )
     odd_factor: float = tuned(
         4.0, unit="times the median error", meaning="a window that something else than the servo has moved", least=1.0

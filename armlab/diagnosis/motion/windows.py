@@ -40,7 +40,8 @@ class Windows:
     None. first_velocity: (windows,), rad/s. run: (windows,), the run that a window was cut from; start: (windows,), its
     first step there. path_command: (runs, history + steps of a run), path_measured: (runs, steps of a run), rad;
     integral: (runs,), of the drive at the start of a run, N m. begin: (windows + 1,), the first sample of each window;
-    row, fraction: (samples,), where on the grid a measured sample lies; position: (samples,), rad.
+    row, fraction: (samples,), where on the grid a measured sample lies; position: (samples,), rad. encoder_step: the
+    smallest step of the measured positions, rad (m), 0 where they have none.
     """
 
     step_s: float
@@ -64,6 +65,7 @@ class Windows:
     row: NDArray[np.int64]
     fraction: Array
     position: Array
+    encoder_step: float
 
     @property
     def count(self) -> int:
@@ -76,11 +78,9 @@ class Windows:
         return np.repeat(np.arange(self.count), np.diff(self.begin))
 
     @property
-    def encoder_step(self) -> float:
-        """The smallest step of the measured positions, rad (m): 0 where they have none."""
-        steps = np.diff(np.unique(self.position))
-        steps = steps[steps > SAME_POSITION]
-        return float(steps.min()) if len(steps) else 0.0
+    def encoder_noise(self) -> float:
+        """Standard deviation of the errors that the steps of the encoder make, rad (m)."""
+        return float(self.encoder_step / np.sqrt(12))
 
     def with_integral(self, integral: Array) -> "Windows":
         """The windows with other integrals of the drive at the start of each run, (runs,), N m."""
@@ -326,6 +326,13 @@ def at_rest(windows: Windows, values: Array) -> Windows:
     return windows.with_integral(held)
 
 
+def smallest_step(position: Array) -> float:
+    """The smallest difference of positions, rad (m): 0 where they do not change."""
+    steps = np.diff(np.unique(position))
+    steps = steps[steps > SAME_POSITION]
+    return float(steps.min()) if len(steps) else 0.0
+
+
 def _stack(
     columns: list[dict[str, Array | None]],
     paths: list[tuple[Array, Array]],
@@ -344,6 +351,7 @@ def _stack(
     rows = np.concatenate([np.asarray(column["row"]) for column in columns])
     whole = np.floor(rows + 1e-9).astype(np.int64)
     sizes = [len(np.asarray(column["row"])) for column in columns]
+    position = np.concatenate([np.asarray(column["position"]) for column in columns])
     return Windows(
         step_s=step,
         history=history,
@@ -360,7 +368,8 @@ def _stack(
         begin=np.append(0, np.cumsum(sizes)).astype(np.int64),
         row=whole,
         fraction=rows - whole,
-        position=np.concatenate([np.asarray(column["position"]) for column in columns]),
+        position=position,
+        encoder_step=smallest_step(position),
     )
 
 
