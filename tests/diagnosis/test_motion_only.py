@@ -126,6 +126,9 @@ def test_without_a_controller_and_with_dropped_rows_the_gain_is_found_all_the_sa
     result = diagnose_motion(load_motion_recording(folder))
     assert found(result)["controller_gain_error", 1] == pytest.approx(8.0, rel=0.06)
     assert all(np.isnan(each.nominal) for each in result.findings if each.effect == "controller_gain_error")
+    limits = [line for line in motion_lines(result) if "torque saturation, limit" in line]
+    assert limits
+    assert all("; the simulation has none" in line for line in limits)
     assert all(each.replay_before is None for each in result.errors)
 
 

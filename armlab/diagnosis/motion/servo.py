@@ -10,7 +10,9 @@ Inertia and load also hold a mass at the tool, `payload`, which is the same at a
 velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load is the torque of
 gravity and of the other joints. s is 1, or the supply voltage over its nominal value. Where nothing saturates, kd and
 damping are one column; damping also holds back-EMF, with which the torque limit of a drive that is limited by its
-voltage falls with speed. So kd is either that of the simulation or none, and damping is fitted.
+voltage falls with speed. So damping is fitted as a rule, with the kd of the simulation or none. kd is fitted in its
+place where a torque limit may act on it: of a drive of which nothing is stated, or where it explains more than
+damping.
 """
 
 from dataclasses import dataclass
@@ -25,9 +27,10 @@ from armlab.common.arrays import Array
 class ServoParameter:
     """One parameter of the law. effect, name: in a verdict. neutral: the value without effect.
 
-    lowest, highest: bounds of a fit; scale: a step that matters. role: a `usual` one is part of every fit, an
-    `optional` one has to earn its place, an `unstated` one is part of a law that is tried where the simulation says
-    nothing of the drive, a `shared` one is that of all joints, a `given` one is never fitted.
+    lowest, highest: bounds of a fit; scale: a step that matters on a small arm. role: a `usual` one is part of every
+    fit, an `optional` one has to earn its place, an `unstated` one is part of a law that is tried where the simulation
+    says nothing of the drive, a `shared` one is that of all joints, a `given` one is part of another: kd is fitted in
+    place of damping, and the Stribeck speed is one of a few.
     equation: for the verdict, with {value} and {joint}. rivals: effects that fit these data as well, or nearly. mjcf:
     the field of MJCF that holds it.
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from armlab.common.report.numbers import format_unit
 from armlab.common.report.words import join_words
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
-from armlab.diagnosis.motion.servo import PARAMETERS
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.report.words import LESS_MASS
 from armlab.effects.library import effect_named
 from problem.arm import Arm
@@ -123,7 +123,8 @@ def finding_with_numbers(finding: ServoFinding) -> str:
     if finding.parameter.key == "payload" and finding.value < 0:
         return f"{finding_name(finding)}, {-finding.value:.4g} {unit} ({-high:.4g} to {-low:.4g})"
     value = f"{finding.value:.4g} {unit}".rstrip()
-    known = "" if math.isnan(finding.nominal) else f"; the simulation has {finding.nominal:.4g}"
+    given = "none" if finding.nominal >= INFINITE_LIMIT else f"{finding.nominal:.4g}"
+    known = "" if math.isnan(finding.nominal) else f"; the simulation has {given}"
     return f"{finding_name(finding)}, {finding.name} {value} ({low:.4g} to {high:.4g}){known}"
 
 
