@@ -22,6 +22,7 @@ from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
 from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
+from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
@@ -217,6 +218,52 @@ def test_an_unstated_drive_that_integrates_is_recognised(soft: Path) -> None:
     stated = np.where(np.isnan(nominal), NEUTRAL, nominal)
     stated[place("kp")] = np.nan
     assert choose_servo(windows, stated, 20).fit.values[place("ki")] == 0
+
+
+def test_an_unstated_drive_that_pushes_fully_has_kd_beside_its_limit(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    keys: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
+    true, nominal = NEUTRAL.copy(), NEUTRAL.copy()
+    true[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.05, 0.01, 1.2
+    nominal[[place(key) for key in ("damping", "friction", "armature")]] = 0.1, 0.05, 0.01
+    nominal[[place("kp"), place("ki"), place("integral_limit")]] = np.nan
+    replayed = replay_joint(windows, true)[0]
+    chosen = choose_servo(replace(windows, position=np.round(replayed / 1e-4) * 1e-4), nominal, 20)
+    found = [place("kp"), place("kd"), place("limit")]
+    assert chosen.fit.values[found] == pytest.approx(true[found], rel=0.01)
+    assert not chosen.fit.free[place("damping")]
+
+
+def test_another_kd_of_a_known_drive_has_its_own_name_where_its_limit_acts(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    keys: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
+    nominal = NEUTRAL.copy()
+    nominal[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.1, 0.01, 0.5
+    true = nominal.copy()
+    true[place("kd")] = 0.6
+    replayed = replay_joint(windows, true)[0]
+    chosen = choose_servo(replace(windows, position=np.round(replayed / 1e-4) * 1e-4), nominal, 20)
+    assert list(chosen.gains) == [place("kd")]
+    assert chosen.fit.values[place("kd")] == pytest.approx(0.6, rel=0.02)
+
+
+def test_drives_that_hold_commands_share_the_phase_that_explains_all_joints(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    run, simulation = recording.with_role("identify")[0], read_servo_simulation(recording)
+    samples, phase = 5, 3
+    tick = np.maximum((np.arange(run.samples) - phase) // samples * samples + phase, 0)
+    held = replace(run, reference_position=np.asarray(run.reference_position)[tick])
+    true = NEUTRAL.copy()
+    true[[place("kp"), place("damping"), place("friction"), place("armature")]] = 8.0, 0.5, 0.05, 0.01
+    whole = replace(DEFAULT, wanted_windows=1, longest_window_s=np.inf)
+    position = np.stack([replay_joint(each, true)[0] for each in make_windows([held], simulation, whole)], axis=1)
+    far = true.copy()
+    far[place("kp")] = 4.0  # alone it would take another phase
+    slow = replace(simulation, rate_hz=run.rate_hz / samples)
+    taken = hold_commands([replace(run, position=position)], slow, [true, far])[0]
+    np.testing.assert_array_equal(taken.reference_position, held.reference_position)
 
 
 @pytest.mark.parametrize(
