@@ -110,9 +110,9 @@ def compare_motion(
     changes: list[ServoChange] = []
     for joint, pair in enumerate(zip(*windows, strict=True)):
         progress(f"comparing joint {joint + 1} of {len(old.joints)}")
-        proportional = replace(tuning, needed_limits=(), integral_rates=())
+        same_law = replace(tuning, needed_limits=(), integral_rates=())  # none that one recording alone starts from
         fits = [
-            choose_servo(each, simulation.nominal.values[joint], looks, proportional)
+            choose_servo(each, simulation.nominal.values[joint], looks, same_law)
             for each, simulation in zip(pair, simulations, strict=True)
         ]
         sound = [
