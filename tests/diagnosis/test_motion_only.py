@@ -28,7 +28,7 @@ from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
-from armlab.diagnosis.motion.simulation import read_servo_simulation
+from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.windows import Windows, make_windows
@@ -220,19 +220,28 @@ def test_an_unstated_drive_that_integrates_is_recognised(soft: Path) -> None:
     assert choose_servo(windows, stated, 20).fit.values[place("ki")] == 0
 
 
-def test_an_unstated_drive_that_pushes_fully_has_kd_beside_its_limit(soft: Path) -> None:
+@pytest.mark.parametrize("limit", [0.6, 0.8, 1.2, 2.0])
+def test_an_unstated_drive_that_pushes_fully_has_kd_beside_its_limit(soft: Path, limit: float) -> None:
     recording = load_motion_recording(soft)
-    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
     keys: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
     true, nominal = NEUTRAL.copy(), NEUTRAL.copy()
-    true[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.05, 0.01, 1.2
+    true[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.05, 0.01, limit
     nominal[[place(key) for key in ("damping", "friction", "armature")]] = 0.1, 0.05, 0.01
     nominal[[place("kp"), place("ki"), place("integral_limit")]] = np.nan
-    replayed = replay_joint(windows, true)[0]
-    chosen = choose_servo(replace(windows, position=np.round(replayed / 1e-4) * 1e-4), nominal, 20)
+    moved = [replace(run, position=replayed_runs(run, simulation, true)) for run in runs]
+    windows = make_windows(moved, simulation)[0]
+    windows = replace(windows, position=np.round(replay_joint(windows, true)[0] / 1e-4) * 1e-4)
+    chosen = choose_servo(windows, nominal, 20)
     found = [place("kp"), place("kd"), place("limit")]
     assert chosen.fit.values[found] == pytest.approx(true[found], rel=0.01)
     assert not chosen.fit.free[place("damping")]
+
+
+def replayed_runs(run: MotionRun, simulation: ServoSimulation, servo: np.ndarray) -> np.ndarray:
+    """Positions (samples, joints) of a run in which each joint alone has one servo, rad."""
+    whole = replace(DEFAULT, wanted_windows=1, longest_window_s=np.inf)
+    return np.stack([replay_joint(each, servo)[0] for each in make_windows([run], simulation, whole)], axis=1)
 
 
 def test_another_kd_of_a_known_drive_has_its_own_name_where_its_limit_acts(soft: Path) -> None:
@@ -257,8 +266,7 @@ def test_drives_that_hold_commands_share_the_phase_that_explains_all_joints(soft
     held = replace(run, reference_position=np.asarray(run.reference_position)[tick])
     true = NEUTRAL.copy()
     true[[place("kp"), place("damping"), place("friction"), place("armature")]] = 8.0, 0.5, 0.05, 0.01
-    whole = replace(DEFAULT, wanted_windows=1, longest_window_s=np.inf)
-    position = np.stack([replay_joint(each, true)[0] for each in make_windows([held], simulation, whole)], axis=1)
+    position = replayed_runs(held, simulation, true)
     far = true.copy()
     far[place("kp")] = 4.0  # alone it would take another phase
     slow = replace(simulation, rate_hz=run.rate_hz / samples)

@@ -162,7 +162,9 @@ class MotionTuning:
         3.0, unit="times the encoder's noise", meaning="an error that needs no explanation", least=1.0
     )
     same_error: float = tuned(
-        1.25, meaning="ratio of errors before and after, below which the simulation counts as right", least=1.0
+        1.25,
+        meaning="ratio of the error before to that after, or to the encoder's noise, that counts as right",
+        least=1.0,
     )
     widening: float = tuned(
         2.5,
