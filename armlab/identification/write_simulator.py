@@ -32,7 +32,12 @@ from problem.urdf_document import read_urdf_root, urdf_tree
 
 FORMATS = (".urdf", ".xml")
 # What no actuator of MJCF has.
-DRIVE_WORDS = {"ki": "integral gain", "offset": "offset of the command", "dead_band": "dead band"}
+DRIVE_WORDS = {
+    "ki": "integral gain",
+    "ki_speed": "integral of the velocity",
+    "offset": "offset of the command",
+    "dead_band": "dead band",
+}
 
 
 def export_model(

@@ -25,6 +25,7 @@ PER_JOINT_KEYS = (
     "kp",
     "kd",
     "ki",
+    "ki_speed",
     "delay",
     "torque_limit",
     "integral_limit",

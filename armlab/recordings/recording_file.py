@@ -84,7 +84,9 @@ class TransmissionEntry(Settings):
 class ControllerEntry(Settings):
     """The drive as the simulation has it: tau = kp (reference - position) + kd (reference velocity - velocity).
 
-    kp: N m/rad; kd: N m s/rad; ki: N m/(rad s); torque_limit, integral_limit: N m; one a joint, null where unknown.
+    kp, ki_speed: N m/rad; kd: N m s/rad; ki: N m/(rad s); torque_limit, integral_limit: N m; one a joint, null where
+    unknown. ki_speed: of a cascade whose integral acts on the velocity, too: the integral grows by ki (reference -
+    position) - ki_speed velocity, and kp holds ki_speed.
     reference_velocity: zero, or the derivative of the reference. feedforward: what the drive adds, from the simulation.
     delay: s, of the command, of all joints or one a joint. read_delay: s, one a joint, where joints are read one after
     another. offset: rad (m), added to the command; dead_band: rad (m), whole width of the errors that the drive
@@ -96,6 +98,7 @@ class ControllerEntry(Settings):
     kp: PerJoint
     kd: PerJoint
     ki: PerJoint | None = None
+    ki_speed: PerJoint | None = None
     reference_velocity: Literal["zero", "derivative"] = "zero"
     feedforward: Literal["none", "gravity", "model"] = "none"
     torque_limit: PerJoint | None = None

@@ -11,11 +11,11 @@ from armlab.diagnosis.motion.choose import (
     chance_of_gain,
     chance_of_match,
     first_guesses,
-    is_hidden_by_encoder_steps,
 )
 from armlab.diagnosis.motion.estimate import ServoFit
+from armlab.diagnosis.motion.joint_replay import replay_joint
 from armlab.diagnosis.motion.servo import HIGHEST, KEYS, LOWEST, NEUTRAL, USUAL, Key, place
-from armlab.diagnosis.motion.windows import Windows, smallest_step
+from armlab.diagnosis.motion.windows import Windows, phase_of_steps, smallest_step
 
 GAIN = Gain(share=0.5, enough=0.02, p_value=1e-6, rms_without=2e-3, rms_with=1e-3)
 
@@ -92,26 +92,29 @@ def test_the_matched_filter_sees_what_few_windows_tell_and_not_what_one_tells() 
     assert np.mean(np.array(chances) < 0.05) < 0.1
 
 
-def test_a_dead_band_or_friction_below_a_step_of_the_encoder_is_none_and_an_offset_may_be(still: Windows) -> None:
-    step = smallest_step(0.0015 * np.array([0.0, 1.0, 2.0, 7.0]) + 1e-9 * np.arange(4))
+def test_the_step_of_an_encoder_is_the_smallest_one_and_its_phase_that_of_the_positions() -> None:
+    position = 0.0004 + 0.0015 * np.array([0.0, 1.0, 2.0, 7.0]) + 1e-9 * np.arange(4)
+    step = smallest_step(position)
     assert step == pytest.approx(0.0015, rel=1e-5)
-    counted = replace(still, encoder_step=step)
-    base = numbers(kp=8.0, friction=0.02, dead_band=0.002)
+    assert phase_of_steps(position, step) == pytest.approx(0.0004, abs=1e-7)
+    assert phase_of_steps(position, 0.0) == 0.0
 
-    def hidden(windows: Windows, key: Key, change: float) -> bool:
-        values = base.copy()
-        values[place(key)] += change
-        return is_hidden_by_encoder_steps(place(key), values, base, windows)
 
-    assert hidden(counted, "dead_band", 0.001)
-    assert hidden(counted, "dead_band", -0.001)
-    assert not hidden(counted, "dead_band", 0.002)
-    assert not hidden(counted, "offset", 0.001)
-    assert not hidden(still, "dead_band", 1e-4)
-    assert hidden(counted, "friction", -0.003)  # a step is 8 * 0.0015 = 0.012 N m, its noise 0.0035
-    assert not hidden(counted, "friction", -0.004)
-    assert not hidden(counted, "friction", 0.003)  # steps make no friction
-    assert not hidden(still, "friction", -0.003)
+def test_a_drive_that_reads_steps_acts_on_the_nearest_one(still: Windows) -> None:
+    step, kp = 0.01, 2.0
+    time = 1e-3 * np.arange(60)
+    samples = {"begin": np.array([0, 60]), "row": np.arange(60), "fraction": np.zeros(60), "position": np.zeros(60)}
+    windows = replace(still, measured=np.zeros((1, 60)), encoder_step=step, **samples)
+    values = numbers(kp=kp, offset=0.3 * step)
+    moved = replay_joint(windows, values, reads_steps=True)[0]
+    expected = 0.5 * kp * 0.3 * step / 0.1 * time**2  # the torque of the first step, until the next one is nearer
+    first = expected < 0.5 * step
+    assert first.sum() > 10
+    np.testing.assert_allclose(moved[first], expected[first], atol=1e-9)
+    shifted = replay_joint(replace(windows, encoder_phase=0.3 * step), values, reads_steps=True)[0]
+    np.testing.assert_allclose(shifted, 0.0, atol=1e-12)  # where it reads its command, it rests
+    smooth = replay_joint(windows, values)[0]
+    assert moved[first][-1] - smooth[first][-1] > 5e-7  # whose torque falls on the way
 
 
 def test_a_number_that_no_sample_tells_has_no_interval() -> None:
@@ -151,4 +154,5 @@ def still() -> Windows:
         fraction=np.zeros(1),
         position=np.zeros(1),
         encoder_step=0.0,
+        encoder_phase=0.0,
     )

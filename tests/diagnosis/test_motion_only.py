@@ -20,6 +20,7 @@ from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
+from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
 from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.hold import hold_commands
@@ -210,7 +211,7 @@ def test_an_unstated_drive_that_integrates_is_recognised(soft: Path) -> None:
     replayed = replay_joint(windows, true)[0]
     windows = replace(windows, position=np.round(replayed / 1e-4) * 1e-4)
     nominal = NEUTRAL.copy()
-    nominal[[place("kp"), place("ki"), place("integral_limit")]] = np.nan
+    nominal[[place("kp"), place("ki"), place("ki_speed"), place("integral_limit")]] = np.nan
     nominal[place("armature")] = 0.01
     chosen = choose_servo(windows, nominal, 20)
     assert chosen.fit.values[place("kp")] == pytest.approx(8.0, rel=0.02)
@@ -218,6 +219,45 @@ def test_an_unstated_drive_that_integrates_is_recognised(soft: Path) -> None:
     stated = np.where(np.isnan(nominal), NEUTRAL, nominal)
     stated[place("kp")] = np.nan
     assert choose_servo(windows, stated, 20).fit.values[place("ki")] == 0
+
+
+def test_an_unstated_cascade_with_an_integral_has_the_part_that_acts_on_the_velocity(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    keys: tuple[Key, ...] = ("kp", "kd", "friction", "armature", "limit", "ki", "ki_speed", "integral_limit")
+    position_gain, speed_gain, speed_integral = 12.0, 0.6, 0.8
+    kp = position_gain * speed_gain + speed_integral
+    true, nominal = NEUTRAL.copy(), NEUTRAL.copy()
+    nominal[[place("friction"), place("armature")]] = 0.05, 0.01
+    nominal[[place("kp"), place("ki"), place("ki_speed"), place("integral_limit")]] = np.nan
+    true[[place(key) for key in keys]] = (
+        *(kp, speed_gain, 0.05, 0.01, 1.2),
+        *(position_gain * speed_integral, speed_integral, 0.4),
+    )
+    windows = replace(windows, position=np.round(replay_joint(windows, true)[0] / 1e-4) * 1e-4)
+    fitted = choose_servo(windows, nominal, 20).fit.values
+    assert fitted[place("kp")] == pytest.approx(kp, rel=0.02)
+    assert fitted[place("kd")] == pytest.approx(speed_gain, rel=0.05)
+    assert fitted[place("ki_speed")] / fitted[place("ki")] == pytest.approx(1 / position_gain, rel=0.1)
+
+
+@pytest.mark.parametrize(("friction", "made"), [(0.08, True), (0.06, True), (0.2, False)])
+def test_less_friction_is_no_finding_where_steps_of_the_encoder_make_it(
+    soft: Path, friction: float, made: bool
+) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    keys: tuple[Key, ...] = ("kp", "damping", "friction", "armature")
+    base, step = NEUTRAL.copy(), 2 * np.pi / 256
+    base[[place(key) for key in keys]] = 30.0, 1.0, 0.08, 0.01
+    true = base.copy()
+    true[place("friction")] = friction
+    read = replay_joint(replace(windows, encoder_step=step), true, reads_steps=True)[0]
+    windows = replace(windows, encoder_step=step, position=np.rint(read / step) * step)
+    fit = fit_servo(windows, true, np.array(USUAL))
+    print(f"friction {friction}, fitted {fit.values[place('friction')]:.3g} N m")
+    assert is_made_by_encoder_steps(windows, fit, place("friction"), base) == made
+    assert not is_made_by_encoder_steps(replace(windows, encoder_step=0.0), fit, place("friction"), base)
 
 
 @pytest.mark.parametrize("limit", [0.6, 0.8, 1.2, 2.0])
@@ -228,7 +268,7 @@ def test_an_unstated_drive_that_pushes_fully_has_kd_beside_its_limit(soft: Path,
     true, nominal = NEUTRAL.copy(), NEUTRAL.copy()
     true[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.05, 0.01, limit
     nominal[[place(key) for key in ("damping", "friction", "armature")]] = 0.1, 0.05, 0.01
-    nominal[[place("kp"), place("ki"), place("integral_limit")]] = np.nan
+    nominal[[place("kp"), place("ki"), place("ki_speed"), place("integral_limit")]] = np.nan
     moved = [replace(run, position=replayed_runs(run, simulation, true)) for run in runs]
     windows = make_windows(moved, simulation)[0]
     windows = replace(windows, position=np.round(replay_joint(windows, true)[0] / 1e-4) * 1e-4)

@@ -206,7 +206,7 @@ def test_the_integral_gain_stands_where_there_is_a_field_and_is_said_elsewhere(s
 def test_the_plug_in_integrates_as_the_replay_of_armlab_does(
     recording: MotionRecording, simulation: ServoSimulation, tmp_path: Path
 ) -> None:
-    servos = make_servos(**{**NUMBERS, "kd": 0.0}, ki=6.0, integral_limit=0.3)
+    servos = make_servos(**{**NUMBERS, "kd": 0.0}, ki=6.0, ki_speed=1.5, integral_limit=0.3)
     (tmp_path / "servos.json").write_text(servos_json(simulation, servos))
     model = mujoco.MjModel.from_xml_string(arm_text(kp=60))
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
@@ -216,7 +216,7 @@ def test_the_plug_in_integrates_as_the_replay_of_armlab_does(
     data.qpos[:] = run.position[0]
     data.qvel[:] = smooth_motion(run, np.zeros(run.position.shape[1])).velocity[0]
     mujoco.mj_forward(model, data)
-    weight = data.qfrc_bias - NUMBERS["kp"] * (run.reference_position[0] - run.position[0])
+    weight = data.qfrc_bias - (NUMBERS["kp"] - 1.5) * (run.reference_position[0] - run.position[0])
     with installed(model, read_servos(tmp_path / "servos.json")) as plugin:
         plugin.integral = np.clip(weight, -0.3, 0.3)
         moved = follow(model, run)

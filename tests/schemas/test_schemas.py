@@ -165,6 +165,7 @@ MOTION_ONLY = {
         "kp": [7.8],
         "kd": [None],
         "ki": [0.1],
+        "ki_speed": [0.01],
         "reference_velocity": "zero",
         "feedforward": "gravity",
         "torque_limit": [2.9],

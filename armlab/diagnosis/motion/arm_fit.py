@@ -1,8 +1,8 @@
 """Fits the servos of all joints: their replays make the loads, then each joint chooses its numbers alone.
 
 Numbers and loads depend on each other. So the usual numbers and the loads take turns first. Where a joint has chosen a
-number beyond the usual ones, the loads are made again, and each joint whose fit they change chooses anew, until all are
-settled.
+number beyond the usual ones, or the replay needs a shorter step, the loads are made again, and each joint whose fit
+they change chooses anew, until all are settled.
 """
 
 import os
@@ -15,12 +15,12 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, free_at_first
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.estimate import fit_servo, thin_windows, to_coordinates
+from armlab.diagnosis.motion.estimate import begin_integrals, fit_servo, settle, thin_windows, to_coordinates
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import LOWEST, OPTIONAL, USUAL, place
 from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
-from armlab.diagnosis.motion.windows import Windows, at_rest
+from armlab.diagnosis.motion.windows import Windows
 from armlab.recordings.recording import MotionRun
 
 
@@ -29,7 +29,8 @@ class ArmFit:
     """The servos of an arm with the inertias of a simulation.
 
     runs: with the commands that the drives take; starts: numbers, (parameters,) of each joint, with which the arm was
-    replayed; windows: of each joint; chosen: its servo, None for one that stands still or follows no servo.
+    replayed; windows: of each joint; chosen: its servo, None for one that stands still or follows no servo. tuning:
+    with the step that these servos need.
     """
 
     runs: Sequence[MotionRun]
@@ -37,6 +38,7 @@ class ArmFit:
     starts: Sequence[Array | None]
     windows: list[Windows]
     chosen: list[ChosenServo | None]
+    tuning: MotionTuning
 
     @property
     def values(self) -> list[Array | None]:
@@ -65,14 +67,16 @@ def fit_arm(
         ]
     runs = taken(starts)
     windows = coupled_windows(runs, simulation, starts, tuning)
-    fit = ArmFit(runs, simulation, starts, windows, [None] * len(windows))
+    fit = ArmFit(runs, simulation, starts, windows, [None] * len(windows), tuning)
     unsettled = [number for number, start in enumerate(starts) if start is not None]
     for _ in range(tuning.coupling_choices):
-        fit = _choose(fit, unsettled, progress, tuning)
-        if not any(each is not None and (each.free & np.array(OPTIONAL)).any() for each in fit.chosen):
+        fit = _choose(fit, unsettled, progress)
+        finer = _fine_enough(fit)
+        grown = any(each is not None and (each.free & np.array(OPTIONAL)).any() for each in fit.chosen)
+        if finer == fit.tuning and not grown:
             break
         starts = [given if own is None else own for own, given in zip(fit.values, starts, strict=True)]
-        fit, unsettled = _renew_loads(replace(fit, runs=taken(starts), starts=starts), tuning)
+        fit, unsettled = _renew_loads(replace(fit, runs=taken(starts), starts=starts, tuning=finer))
         if not unsettled:
             break
     return fit
@@ -81,15 +85,35 @@ def fit_arm(
 def _refit(windows: Windows, values: Array, nominal: Array, tuning: MotionTuning) -> Array:
     few = thin_windows(windows, tuning.max_start_windows)
     free = free_at_first(values, nominal)
-    return fit_servo(at_rest(few, values), values, free, tuning.refit_evaluations).values
+    return fit_servo(begin_integrals(few, values), values, free, tuning.refit_evaluations).values
 
 
-def _renew_loads(fit: ArmFit, tuning: MotionTuning) -> tuple[ArmFit, list[int]]:
+def _fine_enough(fit: ArmFit) -> MotionTuning:
+    """The tuning of a fit, with a shorter step where the integration errs by more than a share of what the fit leaves.
+
+    The error is of first order where a drive saturates or a joint comes to rest within a step.
+    """
+    tuning, values, step = fit.tuning, fit.values, fit.windows[0].step_s
+    half = replace(tuning, longest_step_s=step / 2)
+    replayed = [coupled_windows(fit.runs, fit.simulation, values, each) for each in (tuning, half)]
+    shares = [0.0]
+    for own, finer, servo in zip(*replayed, values, strict=True):
+        if servo is not None:
+            errors = [joint_errors(settle(windows, servo), servo)[0] for windows in (own, finer)]
+            left = float(np.mean(errors[1] ** 2))
+            shares.append(2 * float(np.sqrt(np.mean((errors[0] - errors[1]) ** 2) / max(left, 1e-300))))
+    if max(shares) <= tuning.max_step_error or step <= tuning.shortest_step_s:
+        return tuning
+    return replace(tuning, longest_step_s=max(step * tuning.max_step_error / max(shares), tuning.shortest_step_s))
+
+
+def _renew_loads(fit: ArmFit) -> tuple[ArmFit, list[int]]:
     """The fit with loads that its servos make, and the joints whose fit is another one with them.
 
     It is the same where no number moves by more than a standard error, and the squared error by less than what a number
     is worth.
     """
+    tuning = fit.tuning
     windows = coupled_windows(fit.runs, fit.simulation, fit.starts, tuning)
     chosen, unsettled = list(fit.chosen), list[int]()
     for number, each in enumerate(chosen):
@@ -104,9 +128,9 @@ def _renew_loads(fit: ArmFit, tuning: MotionTuning) -> tuple[ArmFit, list[int]]:
     return replace(fit, windows=windows, chosen=chosen), unsettled
 
 
-def _choose(fit: ArmFit, joints: Sequence[int], progress: Callable[[str], None], tuning: MotionTuning) -> ArmFit:
+def _choose(fit: ArmFit, joints: Sequence[int], progress: Callable[[str], None]) -> ArmFit:
     """The fit with servos of some joints that are chosen anew, in its windows."""
-    windows, nominal = fit.windows, fit.simulation.nominal.values
+    windows, nominal, tuning = fit.windows, fit.simulation.nominal.values, fit.tuning
     looks = number_of_tests(len(windows))
 
     def choose(number: int) -> ChosenServo | None:

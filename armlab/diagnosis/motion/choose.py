@@ -23,9 +23,11 @@ from scipy.stats import t as student
 from scipy.stats import wilcoxon
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
 from armlab.diagnosis.motion.estimate import (
     ServoFit,
     Unstated,
+    begin_integrals,
     coordinate_scales,
     correlated_variances,
     fill_unknown,
@@ -33,25 +35,24 @@ from armlab.diagnosis.motion.estimate import (
     fit_servo,
     jacobian,
     least_gain,
-    needed_torque,
     price_of_number,
     settle,
-    shaking_torque,
     thin_windows,
     to_coordinates,
     unsaturated_limit,
     with_damping_inside,
+    with_nominal,
 )
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import (
     INFINITE_LIMIT,
     OPTIONAL,
+    UNSTATED,
     USUAL,
-    Key,
     place,
 )
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
-from armlab.diagnosis.motion.windows import Windows, at_rest
+from armlab.diagnosis.motion.windows import Windows
 
 TESTS_OF_GAIN = 2  # ranks and the matched filter, of which the better one counts
 JUDGED_TOLERANCE = 1e-4  # of fits that are judged on the other half, where a gain of percents matters
@@ -109,7 +110,7 @@ class ChosenServo:
 
     def without(self, number: int, windows: Windows, tuning: MotionTuning = DEFAULT) -> "ChosenServo":
         """The same with the number of the simulation at a place, and the others fitted anew in these windows."""
-        values, free = _with_nominal(self.fit, self.nominal, number)
+        values, free = with_nominal(self.fit, self.nominal, number)
         judged = self.free.copy()
         judged[number] = False
         fit = fit_servo(windows.with_integral(self.fit.integral), values, free, tuning.max_evaluations)
@@ -182,10 +183,10 @@ def _judge(
     worth = {
         number: gain
         for number, gain in gains.items()
-        if is_finding(gain, looks, tuning) and not is_hidden_by_encoder_steps(number, fit.values, base, sound)
+        if is_finding(gain, looks, tuning) and not is_made_by_encoder_steps(few, fit, number, base, tuning)
     }
     if best.free[static] and static not in worth:
-        best = fit_servo(few, *_with_nominal(best, base, static), tuning.max_evaluations)
+        best = fit_servo(few, *with_nominal(best, base, static), tuning.max_evaluations)
         judged = errors_on_other_half(few.with_integral(best.integral), best.values, best.free, tuning)
         return _judge(windows, (best, judged), given, looks, tuning)
     free = np.isnan(nominal) & fit.free
@@ -201,15 +202,6 @@ def _judge(
 
 def _without_odd(windows: Windows, odd: NDArray[np.intp]) -> Windows:
     return windows.select(np.setdiff1d(np.arange(windows.count), odd))
-
-
-def _with_nominal(fit: ServoFit, base: Array, number: int) -> tuple[Array, NDArray[np.bool_]]:
-    """Numbers of a fit with that of the simulation at a place, and which of them are free then."""
-    values, free = fit.values.copy(), fit.free.copy()
-    values[number], free[number] = base[number], False
-    if number == place("damping") and not free[place("kd")]:  # of joint and drive together
-        values[place("kd")] = base[place("kd")]
-    return values, free
 
 
 def _differing(fit: ServoFit, base: Array) -> list[int]:
@@ -240,7 +232,7 @@ def _find_unstated(windows: Windows, nominal: Array, tuning: MotionTuning) -> Se
         free[place("limit")] |= bool(unstated.limits)
         if unstated.inside:
             free[place("kd")], free[place("damping")] = True, False
-        free[[place("ki"), place("integral_limit")]] |= bool(unstated.rates)
+        free |= np.array(UNSTATED) & bool(unstated.rates)
         fit = find_start(few, nominal, free, tuning, unstated)
         if unstated.rates and not _integrates(fit, tuning):
             continue
@@ -317,7 +309,7 @@ def _grow(windows: Windows, start: ServoFit, nominal: Array, tuning: MotionTunin
         if gains[best].share < gains[best].enough or gains[best].p_value > tuning.max_joining_p_value:
             break
         waiting.remove(best)
-        if is_hidden_by_encoder_steps(best, tried[best][0].values, base, windows):
+        if is_made_by_encoder_steps(windows, tried[best][0], best, base, tuning):
             continue
         fit, judged = tried[best]
     return fit, judged
@@ -376,7 +368,7 @@ def _fit_from(windows: Windows, start: Array, nominal: Array, tuning: MotionTuni
     values = np.where(free, start, fill_unknown(nominal))
     if free[damping]:
         values[damping] = max(float(start[kd] + start[damping] - values[kd]), 0.0)
-    return fit_servo(at_rest(windows, values), values, free, tuning.max_evaluations)
+    return fit_servo(begin_integrals(windows, values), values, free, tuning.max_evaluations)
 
 
 def free_at_first(start: Array, nominal: Array) -> NDArray[np.bool_]:
@@ -388,7 +380,7 @@ def free_at_first(start: Array, nominal: Array) -> NDArray[np.bool_]:
         free[kd] = differs[kd] and not nominal[kd]
         free[place("damping")] = not free[kd]
     if np.isnan(nominal[place("ki")]):
-        free[[place("ki"), place("integral_limit")]] = differs[[place("ki"), place("integral_limit")]]
+        free |= np.array(UNSTATED) & differs[place("ki")]
     return free
 
 
@@ -422,7 +414,8 @@ def _most_promising(
 ) -> list[tuple[int, Array]]:
     """The parameters that may be worth a place, each with a start from which it has a slope, (parameters,).
 
-    They are those that a linear model of the errors gains most from: one replay of each start, and no fit.
+    They are those that a linear model of the errors gains most from, and start where it ends: one replay of each, and
+    no fit.
     """
     starts = [(number, start) for number in waiting for start in first_guesses(windows, fit.values, number, tuning)]
     errors = joint_errors(windows, np.stack([fit.values, *(start for _, start in starts)]))
@@ -431,12 +424,15 @@ def _most_promising(
     columns = (errors[1:] - errors[0]).T
     columns = columns - slopes @ (slopes.T @ columns)
     sizes = np.linalg.norm(columns, axis=0)
-    gains = np.abs(left @ columns) / np.where(sizes > 0, sizes, np.inf)
+    sizes = np.where(sizes > 0, sizes, np.inf)
+    gains, shares = np.abs(left @ columns) / sizes, np.clip(-(left @ columns) / sizes**2, -1, 1)
     enough = tuning.min_promise * least_gain(fit.rms**2, fit.noise, tuning) * _total(errors[0])
     best: dict[int, Array] = {}
     for place_of in np.argsort(-gains).tolist():
+        number, start = starts[place_of]
         if gains[place_of] ** 2 > enough:
-            best.setdefault(*starts[place_of])
+            share = 1.0 if number == place("limit") else shares[place_of]
+            best.setdefault(number, fit.values + share * (start - fit.values))
     return list(best.items())[: tuning.tried_parameters]
 
 
@@ -454,22 +450,6 @@ def _with_parameter(
         free[place("kd")], free[place("damping")] = True, False
         fits.append(fit_servo(windows, with_damping_inside(start, nominal), free, tuning.refit_evaluations))
     return min(fits, key=lambda each: each.rms)
-
-
-def is_hidden_by_encoder_steps(number: int, values: Array, base: Array, windows: Windows) -> bool:
-    """Whether a difference from the simulation is one that the steps of the encoder make as well.
-
-    A drive that reads its position in counts does not act on an error within a count either. And at each count its
-    torque jumps, which shakes the joint loose: friction looks less than it is, by a part of what the drive makes of the
-    noise of a step; more friction is not made so. values, base: (parameters,), fitted and of the simulation.
-    """
-    differences = values - base
-    if number == place("dead_band"):
-        return bool(abs(differences[number]) < windows.encoder_step)
-    carried = float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
-    levels: dict[Key, float] = {"friction": 1.0, "static_excess": 1.0, "load_friction": carried}
-    level = sum(size * float(differences[place(key)]) for key, size in levels.items())
-    return bool(number in map(place, levels) and -shaking_torque(windows, values) < level < 0)
 
 
 def is_finding(gain: Gain, looks: int, tuning: MotionTuning = DEFAULT) -> bool:
@@ -534,7 +514,7 @@ def _gain_of(windows: Windows, fit: ServoFit, number: int, known: tuple[Array, A
     base, judged = known
     if not np.isfinite(base[number]):
         return Gain(1.0, tuning.min_gain, 0.0, np.inf, float(np.sqrt(np.mean(judged**2))))
-    held, fixed = _with_nominal(fit, base, number)
+    held, fixed = with_nominal(fit, base, number)
     return gain_of(windows, errors_on_other_half(windows, held, fixed, tuning), judged, fit.noise, tuning)
 
 

@@ -147,8 +147,8 @@ def diagnose_motion(
 
     def conclude(fit: ArmFit, payload: Payload | None) -> MotionDiagnosis:
         taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
-        judged = coupled_windows(taken, fit.simulation, fit.values, tuning)
-        whole = replace(tuning, wanted_windows=1, longest_window_s=np.inf)
+        judged = coupled_windows(taken, fit.simulation, fit.values, fit.tuning)
+        whole = replace(fit.tuning, wanted_windows=1, longest_window_s=np.inf)
         runs = coupled_windows(taken, fit.simulation, fit.values, whole)
         kept = replace(fit, chosen=_without_worse(fit, runs, tuning))
         placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
@@ -163,7 +163,7 @@ def diagnose_motion(
     progress("replaying held-out runs")
     concluded = conclude(fit, None)
     progress("weighing the tool")
-    loaded = weigh_tool(taken, fit, progress, tuning)
+    loaded = weigh_tool(taken, fit, progress)
     if loaded is not None:
         with_mass = conclude(*loaded)
         concluded = with_mass if _replays_as_well(with_mass, concluded, tuning) else concluded
@@ -466,6 +466,8 @@ def name_differences(
         said = _named(parameter, fitted, ends, np.nan if unstated else float(chosen.nominal[place_of]))
         if parameter.key == "damping" and not chosen.free[place("kd")]:
             said = _name_damping(chosen, simulation.nominal.values[number])
+        if parameter.key == "kp":
+            said = _with_unknown_clock(said, float(fit.values[place("ki")]), tuning)
         if said.ends[0] <= said.nominal <= said.ends[1]:
             continue
         others = [other for other in confused[place_of] if not (chosen.free[other] and np.isfinite(said.nominal))]
@@ -548,6 +550,12 @@ def _named(parameter: ServoParameter, value: float, ends: tuple[float, float], n
     if parameter.key == "delay" and value < 0:  # what is early is read late
         return _Said("channel_skew", "seconds", -value, (-ends[1], -ends[0]), nominal)
     return _Said(parameter.effect, parameter.name, value, ends, nominal)
+
+
+def _with_unknown_clock(said: _Said, ki: float, tuning: MotionTuning) -> _Said:
+    """kp of a drive that may use its integral before or after it adds to it: half a period of its clock times ki."""
+    more = ki * tuning.drive_period_s / 2
+    return replace(said, ends=(said.ends[0] - more, said.ends[1] + more))
 
 
 def _name_damping(chosen: ChosenServo, given: Array) -> _Said:

@@ -42,6 +42,8 @@ NEEDED_QUANTILE = 0.995  # of the torque that the motion needs: less than what f
 SMOOTHED = 15  # places of a spectrum: fewer would call the scatter of noise more than noise
 SETTLING = 5  # evaluations: the motion is nearly linear in an integral
 INTEGRAL_STEP = 0.005  # rad (m): position error whose torque is a step of an integral
+INTEGRAL_ROOM = 2.0  # times its limit, where it is at the limit: a fit that ends on a bound cannot turn
+INTEGRAL_SHARES = np.linspace(-1, 1, 9)  # of the most that an integral may hold at the start of a run
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,8 +157,8 @@ def fit_servo(
         errors = joint_errors(windows, values)[0]
         rms, noise = _root_mean_square(errors), reading_noise(windows, values)
         return ServoFit(values, free, lambda: np.zeros((0, 0)), rms, noise, windows.count, windows.integral)
-    low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -wound_up)])
-    high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), wound_up)])
+    low = np.concatenate([to_coordinates(LOWEST)[chosen], np.full(len(runs), -INTEGRAL_ROOM * wound_up)])
+    high = np.concatenate([to_coordinates(HIGHEST)[chosen], np.full(len(runs), INTEGRAL_ROOM * wound_up)])
     margin = 1e-9 * (high - low)
     solution = least_squares(
         lambda part: joint_errors(*whole(part))[0],
@@ -182,14 +184,9 @@ def reading_noise(windows: Windows, values: Array) -> float:
 
     A drive that makes more torque of a step than friction holds moves the joint by it: that is no noise of reading.
     """
-    friction = float(values[place("friction")])
-    held = 1 - shaking_torque(windows, values) / friction if friction > 0 else 0.0
+    friction, kp = float(values[place("friction")]), float(values[place("kp")])
+    held = 1 - kp * windows.encoder_noise / friction if friction > 0 else 0.0
     return float(windows.encoder_noise * np.sqrt(max(held, 0.0)))
-
-
-def shaking_torque(windows: Windows, values: Array) -> float:
-    """What the drive makes of the noise of the encoder's steps, N m."""
-    return float(values[place("kp")]) * windows.encoder_noise
 
 
 def least_gain(square: float, noise: float, tuning: MotionTuning = DEFAULT) -> float:
@@ -205,6 +202,26 @@ def price_of_number(square: float, noise: float, tuning: MotionTuning = DEFAULT)
 
 def _root_mean_square(errors: Array) -> float:
     return float(np.sqrt(np.mean(errors**2)))
+
+
+def begin_integrals(windows: Windows, values: Array) -> Windows:
+    """The windows with integrals at the start of each run from which a fit finds the best ones.
+
+    The drive is at rest there, or it is not: of some values up to the torque that the motion needs, or to the limit of
+    the integral, each run takes the best one. values: (parameters,).
+    """
+    rested = at_rest(windows, values)
+    if values[place("ki")] == 0:
+        return rested
+    needed = float(np.quantile(np.abs(needed_torque(windows, float(values[place("armature")]))[-1]), NEEDED_QUANTILE))
+    most = min(float(values[place("integral_limit")]), needed)
+    tried = [rested.integral, *(np.full(len(rested.integral), most * share) for share in INTEGRAL_SHARES)]
+    run = windows.run[windows.window]
+    squares = [
+        np.bincount(run, joint_errors(windows.with_integral(each), values)[0] ** 2, len(rested.integral))
+        for each in tried
+    ]
+    return windows.with_integral(np.choose(np.argmin(squares, axis=0), tried))
 
 
 def settle(windows: Windows, values: Array) -> Windows:
@@ -271,6 +288,18 @@ class Unstated:
     wound_up: tuple[float, ...] = ()
 
 
+def with_nominal(fit: ServoFit, base: Array, number: int) -> tuple[Array, NDArray[np.bool_]]:
+    """Numbers of a fit with that of the simulation at a place, and which of them are free then.
+
+    base: numbers of the simulation, (parameters,).
+    """
+    values, free = fit.values.copy(), fit.free.copy()
+    values[number], free[number] = base[number], False
+    if number == place("damping") and not free[place("kd")]:  # of joint and drive together
+        values[place("kd")] = base[place("kd")]
+    return values, free
+
+
 def find_start(
     windows: Windows,
     nominal: Array,
@@ -289,7 +318,9 @@ def find_start(
     else:
         errors = joint_errors(few, starts)
     best = _best_starts(starts, np.mean(errors**2, axis=1), tuning.starts)
-    fits = [fit_servo(at_rest(few, starts[each]), starts[each], free, tuning.start_evaluations) for each in best]
+    fits = [
+        fit_servo(begin_integrals(few, starts[each]), starts[each], free, tuning.start_evaluations) for each in best
+    ]
     first = min(fits, key=lambda fit: fit.rms)
     return fit_servo(windows.with_integral(first.integral), first.values, free, tuning.max_evaluations)
 

@@ -81,6 +81,12 @@ def lines_without_field(simulation: ServoSimulation, servos: Servos, with_field:
             most = float(servos.get("integral_limit")[row])
             wound_up = f", at most {most:.4g} N m" if most < INFINITE_LIMIT else ""
             yield f"{name}: add {gain:.4g} N m/(rad s) times the integral of the error{wound_up} (integral gain)"
+        of_speed = float(servos.get("ki_speed")[row])
+        if of_speed:
+            yield (
+                f"{name}: subtract {of_speed:.4g} N m/rad times the error, and as much times the integral of the "
+                "velocity from the integral above (a cascade: its integral acts on the velocity, too)"
+            )
         if delay < 0:
             yield f"{name}: the position was read {-1e3 * delay:.3g} ms after its stamp (no field is needed)"
     if simulation.payload:

@@ -21,17 +21,17 @@
 /* In the order of PARAMETERS in servo.py. */
 typedef struct {
     double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, static_excess,
-        stribeck_speed, ki, integral_limit, payload;
+        stribeck_speed, ki, ki_speed, integral_limit, payload;
 } Servo;
 
 /* One joint in all windows. command: (windows, columns); measured, supply: (windows, steps), supply may be null; inertia,
  * load, slope: the same in the middle of each step; unit_inertia, unit_load, unit_slope: the same of 1 kg at the tool. begin: (windows + 1), first sample of
  * each window; row, fraction: (samples), where each lies. path_command: (runs, path_columns), path_measured: (runs,
- * path_columns - history): a run from its first sample on; integral: (runs), of the drive there, N m; run, start:
+ * path_columns - history): a run from its first sample on; encoder_step: in which the drive reads its position, 0 for none; integral: (runs), of the drive there, N m; run, start:
  * (windows), the run of a window and its first step there. */
 typedef struct {
     int64_t windows, steps, columns, history, path_columns;
-    double step;
+    double step, encoder_step, encoder_phase;
     const double *command, *inertia, *load, *slope, *measured, *supply, *first_velocity;
     const double *unit_inertia, *unit_load, *unit_slope, *path_command, *path_measured, *integral;
     const int64_t *begin, *row, *run, *start;
@@ -80,7 +80,8 @@ static void integrate_runs(const Stretch *at, const Servo *servo, double *integr
         for (; step < at->start[window]; step++) {
             double asked = command_at(command, at->path_columns, (double)(at->history + step) - late);
             double error = acting_error(servo, asked, 0.5 * (measured[step] + measured[step + 1]));
-            integral = clip(integral + h * servo->ki * error, servo->integral_limit);
+            double moved = measured[step + 1] - measured[step];
+            integral = clip(integral + h * servo->ki * error - servo->ki_speed * moved, servo->integral_limit);
         }
         integrals[window] = integral;
     }
@@ -103,6 +104,15 @@ INLINE Vector clip_each(Vector value, Vector bound) {
 
 INLINE Vector size_of(Vector value) { return choose(value < 0, -value, value); }
 
+#define ROUNDS 6755399441055744.0 /* 1.5 2^52: a sum with it has no digits after the point */
+
+/* A position as an encoder reads it: the nearest of its steps. */
+INLINE Vector read_position(const Stretch *at, Vector position) {
+    if (at->encoder_step <= 0)
+        return position;
+    return ((position - at->encoder_phase) / at->encoder_step + ROUNDS - ROUNDS) * at->encoder_step + at->encoder_phase;
+}
+
 /* The level of friction at a velocity, without that of the load. */
 INLINE Vector level_at(const Servo *servo, Vector velocity) {
     Vector level = {0};
@@ -115,9 +125,9 @@ INLINE Vector level_at(const Servo *servo, Vector velocity) {
     return level;
 }
 
-/* What the drive asks of an error, its integral not counted: the dead band takes half its width, `band`. */
-INLINE Vector pull_of(const Servo *servo, Vector error, Vector band) {
-    return servo->kp * (servo->dead_band > 0 ? error - clip_each(error, band) : error);
+/* What the drive acts on of an error: the dead band takes half its width, `band`. */
+INLINE Vector left_of(const Servo *servo, Vector error, Vector band) {
+    return servo->dead_band > 0 ? error - clip_each(error, band) : error;
 }
 
 INLINE int64_t column_at(int64_t column, int64_t last) { return column < 0 ? 0 : column < last ? column : last; }
@@ -170,12 +180,12 @@ INLINE State first_state(const Stretch *at, const Lanes *lanes, const Servo *ser
  * steps around it: a limit on the torque of the mean command would cut too little, and a fit would find it too low. */
 INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const Servo *servo,
     const Vector pushed[PARTS], State *state) {
-    const double h = at->step, half = 0.5 * h;
+    const double h = at->step, half = 0.5 * h, gain = servo->kp - servo->ki_speed;
     const Vector none = {0}, full = none + 1.0, widest = none + servo->limit, band = none + 0.5 * servo->dead_band;
     const Vector wound_up = none + servo->integral_limit;
     const int64_t last = at->columns - 1;
     Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
-    Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS];
+    Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS], error[PARTS];
     const double place = (double)(at->history + step) - servo->delay / h, whole = floor(place), share = place - whole;
     const int64_t row = (int64_t)whole;
     take(at->command, lanes->commands, column_at(row, last), before);
@@ -212,31 +222,30 @@ INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const S
         const Vector velocity = state->velocity[part], middle = state->position[part] + half * velocity;
         load[part] += slope[part] * (middle - 0.5 * (state->passed[part] + next[part]));
         state->passed[part] = next[part];
-        away[part] = servo->offset - middle;
+        away[part] = servo->offset - read_position(at, middle);
         asked[part] = before[part] + share * (after[part] - before[part]);
-        const Vector proportional = pull_of(servo, asked[part] + away[part], band);
-        Vector pull = proportional;
+        error[part] = left_of(servo, asked[part] + away[part], band);
+        Vector pull = gain * error[part];
         if (servo->ki > 0) {
-            const Vector more = h * servo->ki / servo->kp * proportional;
-            state->integral[part] = clip_each(state->integral[part] + more, wound_up);
-            pull += state->integral[part];
+            const Vector more = half * (servo->ki * error[part] - servo->ki_speed * velocity);
+            pull += clip_each(state->integral[part] + more, wound_up);
         }
         slow[part] = half * (servo->damping + supply[part] * servo->kd);
         free[part] = (mass[part] - slow[part]) * velocity + h * (supply[part] * pull - load[part]);
         free[part] /= mass[part] + slow[part];
         torque[part] = pull - 0.5 * servo->kd * (velocity + free[part]);
-        beyond |= size_of(torque[part]) + servo->kp * size_of(later[part] - state->earlier[part]) > widest;
+        beyond |= size_of(torque[part]) + gain * size_of(later[part] - state->earlier[part]) > widest;
     }
     if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
         EACH_PART {
             const Vector earlier = state->earlier[part];
             const Vector done = (asked[part] - earlier) / (later[part] - earlier);
-            const Vector rest = torque[part] - pull_of(servo, asked[part] + away[part], band);
+            const Vector rest = torque[part] - gain * error[part];
             const Mask changes = (done > 0) & (done < 1);
             const Vector old = choose(changes, earlier, asked[part]);
             const Vector new = choose(changes, later[part], asked[part]);
-            const Vector first = rest + pull_of(servo, old + away[part], band);
-            const Vector second = rest + pull_of(servo, new + away[part], band);
+            const Vector first = rest + gain * left_of(servo, old + away[part], band);
+            const Vector second = rest + gain * left_of(servo, new + away[part], band);
             const Mask over = (size_of(first) > widest) | (size_of(second) > widest);
             const Vector begun = clip_each(first, widest), ended = clip_each(second, widest);
             const Vector held = supply[part] * (begun + choose(changes, done, none) * (ended - begun));
@@ -250,6 +259,11 @@ INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const S
         const Vector friction = level_at(servo, before_step) + servo->load_friction * carried;
         const Vector moved = state->position[part] + half * before_step;
         state->velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
+        if (servo->ki > 0) {
+            const Vector speed = 0.5 * (before_step + state->velocity[part]);
+            const Vector more = h * (servo->ki * error[part] - servo->ki_speed * speed);
+            state->integral[part] = clip_each(state->integral[part] + more, wound_up);
+        }
         state->position[part] = moved + half * state->velocity[part];
         state->thrust[part] = (mass[part] - servo->armature) * (state->velocity[part] - before_step) / h;
         state->earlier[part] = before[part];

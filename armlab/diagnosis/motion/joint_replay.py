@@ -4,17 +4,20 @@ One step of Moreau's midpoint rule (Moreau 1988), in which friction is an impuls
 friction loss but without its slip at rest; it is of second order between events. q_m is the position at half the step:
 
     q_m = q + h v / 2
-    i   = clip(i + h ki d(c - q_m), -integral_limit, integral_limit)
-    u   = s clip(kp d(c - q_m) - kd (v + v*) / 2 + i, -limit, limit) - load - slope (q_m - q_m measured)
+    i_m = clip(i + h (ki d(c - q_m) - ki_speed v) / 2, -integral_limit, integral_limit)
+    u   = s clip((kp - ki_speed) d(c - q_m) - kd (v + v*) / 2 + i_m, -limit, limit) - load - slope (q_m - q_m measured)
     v*  = v + h (u - damping (v + v*) / 2) / m,  m = inertia + armature
     F   = friction + static_excess exp(-(v / stribeck_speed)^2) + load_friction |load + a|
     v'  = sgn(v*) max(|v*| - h F / (m + h (damping + s kd) / 2), 0)
     q'  = q_m + h v' / 2
+    i'  = clip(i + h (ki d(c - q_m) - ki_speed (v + v') / 2), -integral_limit, integral_limit)
 
 a is the torque that accelerated the link in the step before, inertia (v' - v) / h.
 
 Where the command changes within a step, the torque is the mean of the clipped torques before and after the change. The
 commands there are the means of the steps around it, and the share of each follows from the mean of the step.
+
+Where the drive reads its encoder in steps, q_m in its error is the nearest one.
 
 The integral at the first step of a window is that of its run there, along the measured motion.
 
@@ -53,16 +56,18 @@ SIGNALS = (
 )
 
 
-def replay_joint(windows: Windows, values: Array) -> Array:
+def replay_joint(windows: Windows, values: Array, reads_steps: bool = False) -> Array:
     """Simulated position at the measured samples, (sets, samples), rad.
 
     values: (sets, parameters) in the order of PARAMETERS, or (parameters,) for one set. A drive too stiff for the step
-    counts as the stiffest that is not.
+    counts as the stiffest that is not. reads_steps: whether the drive acts on the steps of its encoder.
     """
     servos = _stable_servos(windows, np.array(values, dtype=np.float64, ndmin=2))
     out = np.empty((len(servos), len(windows.position)))
     stretch = ffi.new("Stretch *")
     _point_to(stretch, windows)
+    if reads_steps:
+        stretch.encoder_step, stretch.encoder_phase = windows.encoder_step, windows.encoder_phase
     integrals = ffi.new("double[]", len(servos) * windows.count)
     path = ffi.from_buffer("double[]", np.empty((windows.measured.shape[1] + 1, lib.LANES)))
     places = (ffi.from_buffer("Servo[]", servos), integrals, path, ffi.from_buffer("double[]", out))

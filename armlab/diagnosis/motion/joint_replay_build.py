@@ -10,11 +10,11 @@ MOST_JOINTS = 16  # of an arm whose joints are replayed together
 DECLARED = """
 typedef struct {
     double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, static_excess,
-        stribeck_speed, ki, integral_limit, payload;
+        stribeck_speed, ki, ki_speed, integral_limit, payload;
 } Servo;
 typedef struct {
     int64_t windows, steps, columns, history, path_columns;
-    double step;
+    double step, encoder_step, encoder_phase;
     const double *command, *inertia, *load, *slope, *measured, *supply, *first_velocity;
     const double *unit_inertia, *unit_load, *unit_slope, *path_command, *path_measured, *integral;
     const int64_t *begin, *row, *run, *start;

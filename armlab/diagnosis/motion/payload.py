@@ -37,10 +37,11 @@ from armlab.diagnosis.motion.choose import (
     window_squares,
 )
 from armlab.diagnosis.motion.couple import coupled_windows
+from armlab.diagnosis.motion.encoder_steps import as_counted
 from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo, price_of_number, reading_noise
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.simulation import ServoSimulation
-from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
+from armlab.diagnosis.motion.tuning import MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 from armlab.recordings.recording import MotionRun
 
@@ -81,21 +82,21 @@ def weigh_tool(
     taken: Callable[[Sequence[Array | None]], Sequence[MotionRun]],
     bare: ArmFit,
     progress: Callable[[str], None],
-    tuning: MotionTuning = DEFAULT,
 ) -> tuple[ArmFit, Payload] | None:
     """The arm with a mass at the tool; None where servos alone explain the motion as well at less cost.
 
     taken: as `fit_arm` has it. bare: the fit of the servos alone.
     """
+    tuning = bare.tuning
     for models, starts in _hypotheses(bare):
-        found = find_payload(replace(bare, starts=starts), models, tuning)
+        found = find_payload(replace(bare, starts=starts), models)
         if found is None or not _can_pay(found, bare, tuning):
             continue
         loaded = fit_arm(taken, found.simulation, starts, progress, tuning)
-        again = find_payload(loaded, named_models(loaded), tuning)
+        again = find_payload(loaded, named_models(loaded))
         if again is not None and abs(again.simulation.payload - found.simulation.payload) > again.error:
             loaded = fit_arm(taken, again.simulation, starts, progress, tuning)
-            again = find_payload(loaded, named_models(loaded), tuning)
+            again = find_payload(loaded, named_models(loaded))
         if again is not None and _cost(loaded, bare, tuning) < _cost(bare, loaded, tuning):
             return loaded, again
     return None
@@ -127,13 +128,13 @@ def _hypotheses(bare: ArmFit) -> Iterator[tuple[list[JointModel | None], Sequenc
         yield named, bare.starts
 
 
-def find_payload(fit: ArmFit, models: Sequence[JointModel | None], tuning: MotionTuning = DEFAULT) -> Payload | None:
+def find_payload(fit: ArmFit, models: Sequence[JointModel | None]) -> Payload | None:
     """The mass that explains the motion of all joints better, None without one.
 
     fit: whose windows are looked at first, and with whose starts the arm is replayed. models: of each joint, in these
     windows.
     """
-    simulation, odd = fit.simulation, _odd_windows(fit.chosen)
+    simulation, odd, tuning = fit.simulation, _odd_windows(fit.chosen), fit.tuning
     for remaining in reversed(range(tuning.payload_replays)):
         joints = {
             number: JointModel(_sound(each.windows, odd, tuning), each.values, each.free)
@@ -146,6 +147,7 @@ def find_payload(fit: ArmFit, models: Sequence[JointModel | None], tuning: Motio
         gain = _gain_of_all(list(joints.values()), without, with_it, tuning)
         if not is_finding(gain, number_of_tests(len(models)), tuning):
             return None
+        before = simulation.payload
         more, error = estimate_mass(list(joints.values()), tuning)
         simulation = simulation.with_payload(more)
         if not simulation.is_physical():
@@ -157,11 +159,13 @@ def find_payload(fit: ArmFit, models: Sequence[JointModel | None], tuning: Motio
             None if each is None else JointModel(joint.with_integral(each.windows.integral), each.values, each.free)
             for joint, each in zip(windows, models, strict=True)
         ]
+    if _is_made_by_encoder_steps(list(joints.values()), before, simulation.payload, tuning):
+        return None
     squares = {number: float(np.mean(errors**2)) for number, errors in zip(joints, with_it, strict=True)}
     return Payload(simulation, error, joints[next(iter(joints))].windows.count, squares, gain)
 
 
-def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning = DEFAULT) -> tuple[float, float]:
+def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning) -> tuple[float, float]:
     """A mass at the tool beside that of the windows, and its standard error, kg; infinite where no joint tells."""
     weights, masses = [], []
     for joint in joints:
@@ -193,6 +197,19 @@ def _errors_without_and_with(
             for errors, load in ((without, -mass), (with_it, more)):
                 errors[row][judged] = learned_errors(parts, joint.loaded(load), joint.free, tuning)
     return without, with_it
+
+
+def _is_made_by_encoder_steps(joints: Sequence[JointModel], mass: float, found: float, tuning: MotionTuning) -> bool:
+    """Whether an arm without a mass seems to have a part of the one that was found, kg, if its drives read in steps.
+
+    mass: of the windows, kg.
+    """
+    counted = []
+    for joint in joints:
+        fit = fit_servo(joint.windows, joint.loaded(-mass), joint.free, tuning.refit_evaluations)
+        counted.append(JointModel(as_counted(joint.windows, fit.values), fit.values, joint.free))
+    made = mass + estimate_mass(counted, tuning)[0]
+    return made * found > 0 and made**2 > tuning.max_made * found**2
 
 
 def _gain_of_all(

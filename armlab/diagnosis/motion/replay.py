@@ -139,6 +139,7 @@ def _step_through(
     excess, speed, velocity = servos.get("static_excess"), servos.get("stribeck_speed"), data.qvel.copy()
     limit, kp, kd = servos.get("limit"), servos.get("kp"), servos.get("kd")
     wound_up, gain = servos.get("integral_limit"), servos.get("ki") * model.opt.timestep
+    of_speed = servos.get("ki_speed")
     integral = _resting_integral(data, simulation, servos, control[0][actuators])
     time = run.time[0] + model.opt.timestep * np.arange(len(control))
     factors = [supply_factor(run, row, time, simulation.supply) for row in range(len(joints))]
@@ -153,8 +154,9 @@ def _step_through(
         error = command - now
         if has_dead_band:
             error -= np.minimum(np.maximum(error, -half), half)
-        integral = np.minimum(np.maximum(integral + gain * error, -wound_up), wound_up)
-        asked[actuators] = now + error + integral / kp
+        more = gain * error - of_speed * model.opt.timestep * data.qvel[joints]
+        integral = np.minimum(np.maximum(integral + more, -wound_up), wound_up)
+        asked[actuators] = now + ((kp - of_speed) * error + integral) / kp
         if varies:
             mujoco.mj_mulM(model, data, pushed, earlier)
             carried = bias + pushed - model.dof_armature * earlier
@@ -173,7 +175,8 @@ def _step_through(
 def _resting_integral(data: Any, simulation: ServoSimulation, servos: Servos, command: Array) -> Array:
     """What the integrals hold at the first sample, (joints,), N m: the drives carry the weight of the arm."""
     joints, wound_up = list(simulation.joints), servos.get("integral_limit")
-    held = data.qfrc_bias[joints] - servos.get("kp") * (command - data.qpos[joints])
+    gain = servos.get("kp") - servos.get("ki_speed")
+    held = data.qfrc_bias[joints] - gain * (command - data.qpos[joints])
     return np.asarray(np.where(servos.get("ki") > 0, np.clip(held, -wound_up, wound_up), 0.0))
 
 

@@ -1,18 +1,20 @@
 """The law of a position servo at one joint, its parameters, and the effects that name them.
 
-    torque  = s clip(kp e - kd qd + i, -limit, limit)
+    torque  = s clip((kp - ki_speed) e - kd qd + i, -limit, limit)
     e       = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
-    i'      = ki e,  |i| <= integral_limit
+    i'      = ki e - ki_speed qd,  |i| <= integral_limit
     torque  = (inertia + armature) qdd + load + damping qd + level f
     level   = friction + static_excess exp(-(qd / stribeck_speed)^2) + load_friction |inertia qdd + load|
+
+A PID has no ki_speed. A cascade of position and velocity, kd (p e - qd) + j integral of (p e - qd), has ki = p j and
+ki_speed = j, and kp = p kd + j.
 
 Inertia and load also hold a mass at the tool, `payload`, which is the same at all joints. f is the sign of the
 velocity, and anything between -1 and 1 at rest. c is the command, held between its samples. load is the torque of
 gravity and of the other joints. s is 1, or the supply voltage over its nominal value. Where nothing saturates, kd and
 damping are one column; damping also holds back-EMF, with which the torque limit of a drive that is limited by its
 voltage falls with speed. So damping is fitted as a rule, with the kd of the simulation or none. kd is fitted in its
-place where a torque limit may act on it: of a drive of which nothing is stated, or where it explains more than
-damping.
+place where a torque limit may act on it: of a drive of which nothing is stated, or where it explains more than damping.
 """
 
 from dataclasses import dataclass
@@ -240,6 +242,18 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         "tau_{joint} += {value} integral of (command_{joint} - q_{joint})",
     ),
     ServoParameter(
+        "ki_speed",
+        "controller_gain_error",
+        "ki_speed",
+        "N.m/rad",
+        0.0,
+        0.0,
+        1e5,
+        1.0,
+        "unstated",
+        "tau_{joint} -= {value} (command_{joint} - q_{joint} + integral of qd_{joint})",
+    ),
+    ServoParameter(
         "integral_limit",
         "torque_saturation",
         "integral_limit",
@@ -286,6 +300,7 @@ Key = Literal[
     "static_excess",
     "stribeck_speed",
     "ki",
+    "ki_speed",
     "integral_limit",
     "payload",
 ]

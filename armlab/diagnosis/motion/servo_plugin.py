@@ -9,9 +9,9 @@ A copy of this file stands beside each verdict, with the numbers in `servos.json
 
 The law of a joint, with q and qd as MuJoCo has them and c the command that held at a time:
 
-    torque = s clip(kp e - kd qd + i, -limit, limit)
+    torque = s clip((kp - ki_speed) e - kd qd + i, -limit, limit)
     e      = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
-    i'     = ki e,  |i| <= integral_limit
+    i'     = ki e - ki_speed qd,  |i| <= integral_limit
     friction loss = friction + static_excess exp(-(qd / stribeck_speed)^2) + load_friction |gear|
 
 gear is the torque that moves and holds the links, mj_rne with the accelerations of the step before.
@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
-DRIVE = ("kp", "kd", "ki", "integral_limit", "limit", "delay", "offset", "dead_band")
+DRIVE = ("kp", "kd", "ki", "ki_speed", "integral_limit", "limit", "delay", "offset", "dead_band")
 LAW = (*DRIVE, "friction", "load_friction", "static_excess", "stribeck_speed")
 NUMBERS = (*LAW, "damping", "armature")
 SAME_TIME_S = 1e-9  # below it two instants are one
@@ -106,8 +106,8 @@ class ServoPlugin:
         self._remember(data.time, data.ctrl[self._actuators])
         error = self._held_commands(data.time) + law["offset"] - position
         error -= np.clip(error, -law["dead_band"] / 2, law["dead_band"] / 2)
-        self._integrate(data.time, model.opt.timestep, error)
-        drive = law["kp"] * error - law["kd"] * velocity + self.integral
+        self._integrate(data.time, model.opt.timestep, law["ki"] * error - law["ki_speed"] * velocity)
+        drive = (law["kp"] - law["ki_speed"]) * error - law["kd"] * velocity + self.integral
         drive = np.clip(drive, -law["limit"], law["limit"])
         actuator = law["kp"] * (command - position) - law["kd"] * velocity
         actuator = np.clip(actuator, -law["limit"], law["limit"])
@@ -119,12 +119,15 @@ class ServoPlugin:
             loaded = law["load_friction"] * np.abs(self._load[self._dofs])
             model.dof_frictionloss[self._dofs] = law["friction"] + static + loaded
 
-    def _integrate(self, time: float, step: float, error: Any) -> None:
-        """The integrals at the end of a step; an evaluation at the time of the last one replaces its result."""
+    def _integrate(self, time: float, step: float, rate: Any) -> None:
+        """The integrals at the end of a step; an evaluation at the time of the last one replaces its result.
+
+        rate: their growth, (servos,), N m/s.
+        """
         if time > self._begun[0] + SAME_TIME_S:
             self._begun = time, self.integral
         limit = self._law["integral_limit"]
-        self.integral = np.clip(self._begun[1] + step * self._law["ki"] * error, -limit, limit)
+        self.integral = np.clip(self._begun[1] + step * rate, -limit, limit)
 
     def _remember(self, time: float, command: Any) -> None:
         self._started = min(self._started, time)

@@ -146,6 +146,9 @@ def _check_supported(controller: ControllerEntry, where: str) -> None:
             raise InputError(f"controller.{key} in {where}: the replay has no law with {words}")
     if controller.reference_velocity != "zero" or controller.feedforward != "none":
         raise InputError(f"controller in {where}: the replay has no reference velocity and no feedforward")
+    gains = zip(controller.ki_speed or (), controller.kp, strict=False)
+    if any(part is not None and whole is not None and part >= whole for part, whole in gains):
+        raise InputError(f"controller.ki_speed in {where} should be less than kp, of which it is a part")
 
 
 def _rotors(recording: MotionRecording) -> Array:
@@ -190,7 +193,8 @@ def _with_controller(nominal: Array, controller: ControllerEntry) -> Array:
     """The numbers of `recording.yaml` in place of those of the robot's file, where it gives any."""
     values, joints = nominal.copy(), len(nominal)
     given = {"kp": controller.kp, "kd": controller.kd, "limit": controller.torque_limit, "offset": controller.offset}
-    given |= {"ki": controller.ki, "integral_limit": controller.integral_limit, "dead_band": controller.dead_band}
+    given |= {"ki": controller.ki, "ki_speed": controller.ki_speed, "integral_limit": controller.integral_limit}
+    given |= {"dead_band": controller.dead_band}
     for key, numbers in given.items():
         for row, value in enumerate(numbers or ()):
             if value is not None:

@@ -19,6 +19,21 @@ class MotionTuning:
         24, unit="windows", meaning="blocks for the statistics, where the recording is long enough", least=2
     )
     longest_step_s: float = tuned(0.00125, unit="s", meaning="longest step of the integration", least=1e-5)
+    shortest_step_s: float = tuned(
+        0.0003, unit="s", meaning="shortest step of the integration: as of a fast drive", least=1e-5
+    )
+    max_step_error: float = tuned(
+        0.2,
+        unit="of the error of a fit",
+        meaning="that the step of the integration makes of it: above, it becomes shorter",
+        least=0.0,
+    )
+    drive_period_s: float = tuned(
+        0.001,
+        unit="s",
+        meaning="of the clock of a drive, which may use its integral before or after it adds to it",
+        least=0.0,
+    )
     warm_up_s: float = tuned(
         0.5, unit="s", meaning="replay before a window, in which a servo forgets an error of the first state", least=0.0
     )
@@ -120,6 +135,14 @@ class MotionTuning:
         0.1,
         unit="of the squared error",
         meaning="that counts as more than the encoder's noise, at least; of what is more a number has to take its gain",
+        least=0.0,
+        most=1.0,
+    )
+    max_made: float = tuned(
+        0.1,
+        unit="of the squared error that a number takes",
+        meaning="that a drive without the difference gives as well, by reading its encoder in steps",
+        source="recordings of arms with nothing hidden: above it false numbers, below it true ones",
         least=0.0,
         most=1.0,
     )

@@ -232,5 +232,6 @@ def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:
     if servos.get("ki").any():
         bounds = servos.get("integral_limit").tolist()
         entry |= {"integral_limit": [each if each < INFINITE_LIMIT else None for each in bounds]}
+        others["ki_speed"] = servos.get("ki_speed")
     others["read_delay"] = diagnosis.simulation.read_delay + np.maximum(-delays, 0.0)
     return entry | {name: values.tolist() for name, values in others.items() if values.any()}

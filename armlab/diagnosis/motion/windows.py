@@ -41,7 +41,7 @@ class Windows:
     first step there. path_command: (runs, history + steps of a run), path_measured: (runs, steps of a run), rad;
     integral: (runs,), of the drive at the start of a run, N m. begin: (windows + 1,), the first sample of each window;
     row, fraction: (samples,), where on the grid a measured sample lies; position: (samples,), rad. encoder_step: the
-    smallest step of the measured positions, rad (m), 0 where they have none.
+    smallest step of the measured positions, rad (m), 0 where they have none; encoder_phase: one of these positions.
     """
 
     step_s: float
@@ -66,6 +66,7 @@ class Windows:
     fraction: Array
     position: Array
     encoder_step: float
+    encoder_phase: float
 
     @property
     def count(self) -> int:
@@ -317,12 +318,12 @@ def at_rest(windows: Windows, values: Array) -> Windows:
 
     values: (parameters,), which may be unknown.
     """
-    kp, ki, limit = (float(values[place(key)]) for key in ("kp", "ki", "integral_limit"))
+    kp, ki, of_speed, limit = (float(values[place(key)]) for key in ("kp", "ki", "ki_speed", "integral_limit"))
     held = np.zeros(len(windows.path_command))
     if ki > 0 and np.isfinite(kp):
         for window in np.flatnonzero(windows.start == 0):
             error = windows.command[window, windows.history] - windows.measured[window, 0]
-            held[windows.run[window]] = np.clip(windows.load[window, 0] - kp * error, -limit, limit)
+            held[windows.run[window]] = np.clip(windows.load[window, 0] - (kp - of_speed) * error, -limit, limit)
     return windows.with_integral(held)
 
 
@@ -331,6 +332,17 @@ def smallest_step(position: Array) -> float:
     steps = np.diff(np.unique(position))
     steps = steps[steps > SAME_POSITION]
     return float(steps.min()) if len(steps) else 0.0
+
+
+def phase_of_steps(position: Array, step: float) -> float:
+    """The position nearest to zero that an encoder with a step reads, rad (m)."""
+    return float(np.angle(np.mean(np.exp(2j * np.pi * position / step))) / (2 * np.pi) * step) if step else 0.0
+
+
+def read_in_steps(position: Array, windows: Windows) -> Array:
+    """Positions as the encoder of these windows reads them, rad (m)."""
+    step, phase = windows.encoder_step, windows.encoder_phase
+    return np.asarray(np.rint((position - phase) / step) * step + phase) if step else position
 
 
 def _stack(
@@ -352,6 +364,7 @@ def _stack(
     whole = np.floor(rows + 1e-9).astype(np.int64)
     sizes = [len(np.asarray(column["row"])) for column in columns]
     position = np.concatenate([np.asarray(column["position"]) for column in columns])
+    encoder_step = smallest_step(position)
     return Windows(
         step_s=step,
         history=history,
@@ -369,7 +382,8 @@ def _stack(
         row=whole,
         fraction=rows - whole,
         position=position,
-        encoder_step=smallest_step(position),
+        encoder_step=encoder_step,
+        encoder_phase=phase_of_steps(position, encoder_step),
     )
 
 
