@@ -15,6 +15,7 @@ from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
 from armlab.cli.main import main
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
+from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough
 from armlab.diagnosis.motion.choose import choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
@@ -487,6 +488,32 @@ def test_bad_input_is_inconclusive_with_a_reason_in_one_line(tmp_path: Path, dam
     assert result.status == "inconclusive"
     assert reason in make_motion_verdict(result).summary
     assert "\n" not in result.reason
+
+
+def test_an_integral_that_acts_on_more_velocity_than_kp_holds_is_refused(tmp_path: Path) -> None:
+    controller = {"type": "pd", "kp": [8.0, 8.0], "kd": [0.0, 0.0], "ki": [1.0, 1.0], "ki_speed": [0.5, 8.0]}
+    folder = write_recording(tmp_path / "cascade", {}, seconds=SECONDS, controller=controller)
+    result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
+    assert result.exit_code != 0
+    assert "controller.ki_speed" in result.output
+    assert "less than kp" in result.output
+
+
+def test_the_step_follows_the_error_that_it_makes(soft: Path, diagnosis: MotionDiagnosis) -> None:
+    simulation = read_servo_simulation(load_motion_recording(soft))
+    runs = load_motion_recording(soft).with_role("identify")
+    starts = [None if each is None else each.fit.values for each in diagnosis.chosen]
+    windows = coupled_windows(runs, simulation, starts)
+
+    def longest(share: float) -> float:
+        tuning = replace(DEFAULT, max_step_error=share)
+        fit = ArmFit(runs, simulation, starts, windows, list(diagnosis.chosen), tuning)
+        return fine_enough(fit).longest_step_s
+
+    steps = [longest(share) for share in (1e3, 0.05, 0.02, 0.01, 1e-9)]
+    print(f"steps, ms: {[round(1e3 * each, 3) for each in steps]}")
+    assert steps == sorted(steps, reverse=True)
+    assert (steps[0], steps[-1]) == (DEFAULT.longest_step_s, DEFAULT.shortest_step_s)
 
 
 def test_a_controller_that_the_replay_lacks_is_refused(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def fit_arm(
     unsettled = [number for number, start in enumerate(starts) if start is not None]
     for _ in range(tuning.coupling_choices):
         fit = _choose(fit, unsettled, progress)
-        finer = _fine_enough(fit)
+        finer = fine_enough(fit)
         grown = any(each is not None and (each.free & np.array(OPTIONAL)).any() for each in fit.chosen)
         if finer == fit.tuning and not grown:
             break
@@ -88,12 +88,12 @@ def _refit(windows: Windows, values: Array, nominal: Array, tuning: MotionTuning
     return fit_servo(begin_integrals(few, values), values, free, tuning.refit_evaluations).values
 
 
-def _fine_enough(fit: ArmFit) -> MotionTuning:
+def fine_enough(fit: ArmFit) -> MotionTuning:
     """The tuning of a fit, with a shorter step where the integration errs by more than a share of what the fit leaves.
 
     The error is of first order where a drive saturates or a joint comes to rest within a step.
     """
-    tuning, values, step = fit.tuning, fit.values, fit.windows[0].step_s
+    tuning, values, step = fit.tuning, fit.values, float(fit.windows[0].step_s)
     half = replace(tuning, longest_step_s=step / 2)
     replayed = [coupled_windows(fit.runs, fit.simulation, values, each) for each in (tuning, half)]
     shares = [0.0]
