@@ -201,6 +201,9 @@ def test_the_integral_gain_stands_where_there_is_a_field_and_is_said_elsewhere(s
     assert "integral" not in ros_urdf_text(simulation, servos)
     for text in (isaac_lab_text(simulation, servos, STEP_S), mjlab_text(simulation, servos, STEP_S)):
         assert "elbow: add 3 N m/(rad s) times the integral of the error, at most 0.4 N m" in text
+        assert "cascade" not in text
+    cascade = make_servos(**NUMBERS, ki=3.0, ki_speed=0.5, integral_limit=0.4)
+    assert "elbow: subtract 0.5 N m/rad times the error" in isaac_lab_text(simulation, cascade, STEP_S)
 
 
 def test_the_plug_in_integrates_as_the_replay_of_armlab_does(

@@ -84,8 +84,8 @@ def lines_without_field(simulation: ServoSimulation, servos: Servos, with_field:
         of_speed = float(servos.get("ki_speed")[row])
         if of_speed:
             yield (
-                f"{name}: subtract {of_speed:.4g} N m/rad times the error, and as much times the integral of the "
-                "velocity from the integral above (a cascade: its integral acts on the velocity, too)"
+                f"{name}: subtract {of_speed:.4g} N m/rad times the error, and let the integral grow by as much times "
+                "the velocity less (a cascade, whose integral acts on the velocity, too)"
             )
         if delay < 0:
             yield f"{name}: the position was read {-1e3 * delay:.3g} ms after its stamp (no field is needed)"
