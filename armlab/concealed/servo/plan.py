@@ -60,7 +60,7 @@ class ServoCase:
 
     @property
     def law(self) -> Law:
-        """Of the drives. No recording can state a cascade with an integral gain: only unknown drives are such."""
+        """Of the drives. Only drives of which the recording says nothing are cascades with an integral gain."""
         law = LAW_CYCLE[self.index % len(LAW_CYCLE)]
         if law != "cascade":
             return law
