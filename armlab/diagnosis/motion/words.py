@@ -12,6 +12,15 @@ from armlab.effects.library import effect_named
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words
 
+# of an effect that has several numbers, by the name of each
+NUMBER_WORDS = {
+    "kp": " kp",
+    "kd": " kd",
+    "ki": " ki",
+    "ki_speed": " of the velocity's integral",
+    "integral_limit": " of the integral",
+    "static_excess": " (more at rest)",
+}
 MAX_LISTED_WORDS = 24  # of the findings with their places in the first sentence; more are named without
 
 
@@ -119,13 +128,14 @@ def finding_phrase(arm: Arm, finding: ServoFinding) -> str:
 def finding_with_numbers(finding: ServoFinding) -> str:
     """The name of a finding, its number with the interval, and that of the simulation."""
     low, high = finding.interval
-    unit = format_unit(finding.parameter.unit)
+    factor, unit = (1e3, "ms") if finding.parameter.unit == "s" else (1.0, format_unit(finding.parameter.unit))
     if finding.parameter.key == "payload" and finding.value < 0:
         return f"{finding_name(finding)}, {-finding.value:.4g} {unit} ({-high:.4g} to {-low:.4g})"
-    value = f"{finding.value:.4g} {unit}".rstrip()
-    given = "none" if finding.nominal >= INFINITE_LIMIT else f"{finding.nominal:.4g}"
+    value = f"{factor * finding.value:.4g} {unit}".rstrip()
+    given = "none" if finding.nominal >= INFINITE_LIMIT else f"{factor * finding.nominal:.4g}"
     known = "" if math.isnan(finding.nominal) else f"; the simulation has {given}"
-    return f"{finding_name(finding)}, {finding.name} {value} ({low:.4g} to {high:.4g}){known}"
+    name = f"{finding_name(finding)}{NUMBER_WORDS.get(finding.name, '')}"
+    return f"{name}, {value} ({factor * low:.4g} to {factor * high:.4g}){known}"
 
 
 def error_phrase(arm: Arm, error: JointError) -> str:
