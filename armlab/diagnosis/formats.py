@@ -142,13 +142,27 @@ class RecordedEntry(Entry):
     heldout_rms_identify: float
 
 
+class CurrentEntry(Entry):
+    """How a recorded current of unknown scale and sign follows the torque of a drive: correlations on held-out runs.
+
+    form: with the torque itself, its size or its square. correlation: of the drive found; before: of the simulation's,
+    null where it has none; with_damping: of the drive found if it had all damping that was found, null where it has.
+    """
+
+    form: Literal["signed", "size", "squared"]
+    correlation: float
+    before: float | None
+    with_damping: float | None
+
+
 class FitEntry(Entry):
     """Held-out error of a joint against the filtered torque, N m (N).
 
     before: of the refitted rigid body. after: with the model found, surrogates of unknowns left out. named: with the
     named effects alone. identify: of a plain identification of the same recording (friction, offset and rotor inertia
     of each joint). noise_floor: of the noise alone. gap_closed: 1 where the model reaches the noise; null where there
-    was no gap. replay: error of the position, rad (m), when the commands are sent through the simulation.
+    was no gap. replay: error of the position, rad (m), when the commands are sent through the simulation. current: that
+    of a recording of motion only.
     """
 
     joint: JointNumber
@@ -161,6 +175,7 @@ class FitEntry(Entry):
     recorded: RecordedEntry | None = None
     replay_rms_before: float | None = None
     replay_rms_after: float | None = None
+    current: CurrentEntry | None = None
 
 
 class StoryEntry(Entry):

@@ -109,8 +109,9 @@ def _so101() -> Draft:
     joints = range(1, len(SO101_JOINTS) + 1)
     columns: Keys = {"time": "t", "reference_position": tuple(f"cmd{j}" for j in joints)}
     columns["position"] = tuple(f"q{j}" for j in joints)
-    units: Keys = {"time": "s", "reference_position": "rad", "position": "rad"}
-    names = ("t", *columns["reference_position"], *columns["position"])
+    columns["current"] = tuple(f"tau{j}" for j in joints)  # of the supply, without sign and of unknown scale
+    units: Keys = {"time": "s", "reference_position": "rad", "position": "rad", "current": "A"}
+    names = ("t", *columns["reference_position"], *columns["position"], *columns["current"])
     runs = []
     for key in CHECKSUMS:
         folder, _, file = key.partition("/")

@@ -29,6 +29,7 @@ from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, ServoParameter, 
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, smallest_step, window_stretches
+from armlab.diagnosis.motion.witness import CurrentWitness, hear_currents
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
@@ -103,7 +104,7 @@ class MotionDiagnosis:
 
     chosen: of each joint, None for one that stands still or follows no servo. servos: all numbers for the simulation
     after. odd: stretches that the servos do not explain: joint, run, from, to. replayed_before, replayed_after: the
-    held-out runs. tool: error of the tool before and after, m.
+    held-out runs. tool: error of the tool before and after, m. currents: what those of the held-out runs say.
     """
 
     recording: MotionRecording
@@ -119,6 +120,7 @@ class MotionDiagnosis:
     replayed_after: tuple[Replayed, ...] = ()
     tool: tuple[float | None, float] = (None, 0.0)
     silent: tuple[int, ...] = ()
+    currents: tuple[CurrentWitness, ...] = ()
     seconds: float = 0.0
 
 
@@ -327,6 +329,7 @@ def _conclude(
         replayed_after=after,
         tool=(tools[0] if before else None, tools[-1]),
         silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not follows[each.joint]),
+        currents=hear_currents(held_out, simulation, servos.values),
     )
 
 

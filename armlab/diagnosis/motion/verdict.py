@@ -11,6 +11,7 @@ import yaml
 from armlab.common.errors import InputError
 from armlab.diagnosis.formats import (
     VERDICT_SCHEMA,
+    CurrentEntry,
     FindingEntry,
     FitEntry,
     LocatedEntry,
@@ -71,7 +72,7 @@ def make_motion_verdict(diagnosis: MotionDiagnosis) -> VerdictFile:
             for each, share in zip(diagnosis.findings, _shares(diagnosis), strict=True)
         ),
         unexplained=_unexplained(diagnosis),
-        fit=tuple(_fit(each) for each in diagnosis.errors),
+        fit=tuple(_fit(each, _current(diagnosis, each.joint)) for each in diagnosis.errors),
     )
 
 
@@ -143,7 +144,14 @@ def _unexplained(diagnosis: MotionDiagnosis) -> tuple[UnexplainedEntry, ...]:
     return tuple(entries)
 
 
-def _fit(each: JointError) -> FitEntry:
+def _current(diagnosis: MotionDiagnosis, joint: int) -> CurrentEntry | None:
+    for each in diagnosis.currents:
+        if each.joint == joint:
+            return CurrentEntry(form=each.form, correlation=each.found, before=each.given, with_damping=each.inside)
+    return None
+
+
+def _fit(each: JointError, current: CurrentEntry | None) -> FitEntry:
     before = each.before if each.before is not None else each.command
     gap = before - each.floor
     return FitEntry(
@@ -154,6 +162,7 @@ def _fit(each: JointError) -> FitEntry:
         gap_closed=float((before - each.after) / gap) if gap > 0 else None,
         replay_rms_before=each.replay_before,
         replay_rms_after=each.replay_after,
+        current=current,
     )
 
 

@@ -7,6 +7,7 @@ from armlab.common.report.numbers import format_unit
 from armlab.common.report.words import join_words
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
+from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.diagnosis.report.words import LESS_MASS
 from armlab.effects.library import effect_named
 from problem.arm import Arm
@@ -116,6 +117,8 @@ def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
         yield f"  {finding_phrase(arm, each)}"
     for error in diagnosis.errors:
         yield f"  {error_phrase(arm, error)}"
+    for current in diagnosis.currents:
+        yield f"  {current_phrase(arm, current)}"
 
 
 def finding_phrase(arm: Arm, finding: ServoFinding) -> str:
@@ -136,6 +139,15 @@ def finding_with_numbers(finding: ServoFinding) -> str:
     known = "" if math.isnan(finding.nominal) else f"; the simulation has {given}"
     name = f"{finding_name(finding)}{NUMBER_WORDS.get(finding.name, '')}"
     return f"{name}, {value} ({factor * low:.4g} to {factor * high:.4g}){known}"
+
+
+def current_phrase(arm: Arm, current: CurrentWitness) -> str:
+    """What the current of a joint says in one line. arm: with the joints of the recording."""
+    torque = {"signed": "the torque", "size": "the size of the torque", "squared": "the square of the torque"}
+    start = f"{joint_in_words(arm, current.joint)}: correlation of the current with {torque[current.form]}"
+    given = "" if current.given is None else f"{current.given:.2f} with the simulation's drive, "
+    inside = "" if current.inside is None else f", {current.inside:.2f} if all its damping is in the drive"
+    return f"{start}, held-out runs: {given}{current.found:.2f} with the one found{inside}"
 
 
 def error_phrase(arm: Arm, error: JointError) -> str:
