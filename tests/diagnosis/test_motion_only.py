@@ -269,6 +269,24 @@ def test_less_friction_is_no_finding_where_steps_of_the_encoder_make_it(
     assert not is_made_by_encoder_steps(replace(windows, encoder_step=0.0), fit, place("friction"), base)
 
 
+@pytest.mark.parametrize(("steps", "made"), [(0.0, True), (1.0, False), (3.0, False)])
+def test_steps_of_the_encoder_make_no_dead_band_that_is_there(soft: Path, steps: float, made: bool) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    keys: tuple[Key, ...] = ("kp", "damping", "friction", "armature")
+    base, step = NEUTRAL.copy(), 2 * np.pi / 256
+    base[[place(key) for key in keys]] = 30.0, 1.0, 0.08, 0.01
+    true = base.copy()
+    true[place("dead_band")] = steps * step
+    read = replay_joint(replace(windows, encoder_step=step), true, reads_steps=True)[0]
+    windows = replace(windows, encoder_step=step, position=np.rint(read / step) * step)
+    start, free = true.copy(), np.array(USUAL)
+    start[place("dead_band")], free[place("dead_band")] = max(steps, 0.5) * step, True
+    fit = fit_servo(windows, start, free)
+    assert fit.values[place("dead_band")] == pytest.approx(steps * step, abs=0.2 * step)
+    assert is_made_by_encoder_steps(windows, fit, place("dead_band"), base) == made
+
+
 @pytest.mark.parametrize("limit", [0.6, 0.8, 1.2, 2.0])
 def test_an_unstated_drive_that_pushes_fully_has_kd_beside_its_limit(soft: Path, limit: float) -> None:
     recording = load_motion_recording(soft)

@@ -415,7 +415,7 @@ def _most_promising(
     """The parameters that may be worth a place, each with a start from which it has a slope, (parameters,).
 
     They are those that a linear model of the errors gains most from, and start where it ends: one replay of each, and
-    no fit.
+    no fit. A torque limit starts at its guess, because errors are not linear in it.
     """
     starts = [(number, start) for number in waiting for start in first_guesses(windows, fit.values, number, tuning)]
     errors = joint_errors(windows, np.stack([fit.values, *(start for _, start in starts)]))

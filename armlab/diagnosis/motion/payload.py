@@ -202,7 +202,7 @@ def _errors_without_and_with(
 def _is_made_by_encoder_steps(joints: Sequence[JointModel], mass: float, found: float, tuning: MotionTuning) -> bool:
     """Whether an arm without a mass seems to have a part of the one that was found, kg, if its drives read in steps.
 
-    mass: of the windows, kg.
+    mass: of the windows, kg. The squared error that a mass takes goes with its square.
     """
     counted = []
     for joint in joints:
