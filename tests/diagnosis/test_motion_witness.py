@@ -10,7 +10,7 @@ from servo_arms import RATE_HZ, arm_text, write_recording
 
 from armlab.diagnosis.motion.servo import NEUTRAL, Key, place
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
-from armlab.diagnosis.motion.witness import hear_currents
+from armlab.diagnosis.motion.witness import correlate_currents
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
 
@@ -52,7 +52,7 @@ def servos(kd: float, damping: float) -> np.ndarray:
 
 def test_a_current_with_any_sign_follows_the_right_drive(heard: tuple[ServoSimulation, MotionRun, np.ndarray]) -> None:
     simulation, run, torques = heard
-    for each in hear_currents([replace(run, current=SCALE * torques)], simulation, servos(0.4, 0.1)):
+    for each in correlate_currents([replace(run, current=SCALE * torques)], simulation, servos(0.4, 0.1)):
         assert each.form == "signed"
         assert each.found > 0.97
         assert each.given is not None
@@ -64,7 +64,7 @@ def test_a_current_tells_damping_of_the_drive_from_that_of_the_joint(
     heard: tuple[ServoSimulation, MotionRun, np.ndarray],
 ) -> None:
     simulation, run, torques = heard
-    for each in hear_currents([replace(run, current=SCALE * torques)], simulation, servos(0.0, 0.5)):
+    for each in correlate_currents([replace(run, current=SCALE * torques)], simulation, servos(0.0, 0.5)):
         assert each.inside is not None
         assert each.inside > each.found + 0.02
 
@@ -75,14 +75,14 @@ def test_a_current_without_sign_goes_with_the_size_or_the_square_of_the_torque(
 ) -> None:
     simulation, run, torques = heard
     current = 3 * np.abs(torques) ** power
-    for each in hear_currents([replace(run, current=current)], simulation, servos(0.4, 0.1)):
+    for each in correlate_currents([replace(run, current=current)], simulation, servos(0.4, 0.1)):
         assert each.form == form
         assert each.found > 0.95
 
 
 def test_without_a_current_that_varies_nothing_is_said(heard: tuple[ServoSimulation, MotionRun, np.ndarray]) -> None:
     simulation, run, torques = heard
-    assert hear_currents([run], simulation, servos(0.4, 0.1)) == ()
+    assert correlate_currents([run], simulation, servos(0.4, 0.1)) == ()
     missing = replace(run, current=np.stack([np.full(run.samples, np.nan), torques[:, 1]], axis=1))
-    assert [each.joint for each in hear_currents([missing], simulation, servos(0.4, 0.1))] == [2]
-    assert hear_currents([replace(run, current=np.ones_like(torques))], simulation, servos(0.4, 0.1)) == ()
+    assert [each.joint for each in correlate_currents([missing], simulation, servos(0.4, 0.1))] == [2]
+    assert correlate_currents([replace(run, current=np.ones_like(torques))], simulation, servos(0.4, 0.1)) == ()

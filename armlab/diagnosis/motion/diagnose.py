@@ -29,7 +29,7 @@ from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, ServoParameter, 
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, smallest_step, window_stretches
-from armlab.diagnosis.motion.witness import CurrentWitness, hear_currents
+from armlab.diagnosis.motion.witness import CurrentWitness, correlate_currents
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.motion_check import MIN_MOVED, check_answers
 from armlab.recordings.recording import MotionRun
@@ -329,7 +329,7 @@ def _conclude(
         replayed_after=after,
         tool=(tools[0] if before else None, tools[-1]),
         silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not follows[each.joint]),
-        currents=hear_currents(held_out, simulation, servos.values),
+        currents=correlate_currents(held_out, simulation, servos.values),
     )
 
 

@@ -21,7 +21,7 @@ from armlab.diagnosis.motion.windows import Windows, read_in_steps
 def is_made_by_encoder_steps(
     windows: Windows, fit: ServoFit, number: int, base: Array, tuning: MotionTuning = DEFAULT
 ) -> bool:
-    """Whether a drive with the simulation's number, reading its encoder in steps, seems to have another, too.
+    """Whether a drive that has the simulation's number, and reads its encoder in steps, looks as if it had another one.
 
     fit: in these windows. number: place of one of its free parameters. base: numbers of the simulation, (parameters,),
     NaN where it has none.
@@ -32,7 +32,7 @@ def is_made_by_encoder_steps(
     values, fixed = with_nominal(fit, base, number)
     without = fit_servo(windows, values, fixed, tuning.refit_evaluations)
     taken = without.rms**2 - float(np.mean(joint_errors(windows, fit.values)[0] ** 2))
-    counted = as_counted(windows.with_integral(without.integral), without.values)
+    counted = replay_in_steps(windows.with_integral(without.integral), without.values)
     held = fit_servo(counted, without.values, fixed, tuning.max_evaluations)
     starts = (without.values, fit.values)
     fits = [fit_servo(counted, start, fit.free, tuning.max_evaluations) for start in starts]
@@ -41,7 +41,7 @@ def is_made_by_encoder_steps(
     return bool(found * made > 0 and held.rms**2 - best.rms**2 > tuning.max_made * taken)
 
 
-def as_counted(windows: Windows, values: Array) -> Windows:
+def replay_in_steps(windows: Windows, values: Array) -> Windows:
     """The windows as a servo with these numbers, (parameters,), makes them where its drive reads its encoder in steps.
 
     A window begins anywhere within the step of the encoder that was read there.

@@ -37,7 +37,7 @@ from armlab.diagnosis.motion.choose import (
     window_squares,
 )
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.encoder_steps import as_counted
+from armlab.diagnosis.motion.encoder_steps import replay_in_steps
 from armlab.diagnosis.motion.estimate import evenly_spread, fit_servo, price_of_number, reading_noise
 from armlab.diagnosis.motion.servo import place
 from armlab.diagnosis.motion.simulation import ServoSimulation
@@ -200,14 +200,14 @@ def _errors_without_and_with(
 
 
 def _is_made_by_encoder_steps(joints: Sequence[JointModel], mass: float, found: float, tuning: MotionTuning) -> bool:
-    """Whether an arm without a mass seems to have a part of the one that was found, kg, if its drives read in steps.
+    """Whether an arm without a mass looks as if it had one because its drives read their encoders in steps.
 
-    mass: of the windows, kg. The squared error that a mass takes goes with its square.
+    mass: of the windows, found: the one in question, kg. The squared error that a mass takes goes with its square.
     """
     counted = []
     for joint in joints:
         fit = fit_servo(joint.windows, joint.loaded(-mass), joint.free, tuning.refit_evaluations)
-        counted.append(JointModel(as_counted(joint.windows, fit.values), fit.values, joint.free))
+        counted.append(JointModel(replay_in_steps(joint.windows, fit.values), fit.values, joint.free))
     made = mass + estimate_mass(counted, tuning)[0]
     return made * found > 0 and made**2 > tuning.max_made * found**2
 

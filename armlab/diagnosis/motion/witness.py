@@ -43,7 +43,9 @@ class CurrentWitness:
     inside: float | None
 
 
-def hear_currents(runs: Sequence[MotionRun], simulation: ServoSimulation, found: Array) -> tuple[CurrentWitness, ...]:
+def correlate_currents(
+    runs: Sequence[MotionRun], simulation: ServoSimulation, found: Array
+) -> tuple[CurrentWitness, ...]:
     """What the currents of some runs say of each joint; empty without currents that vary.
 
     found: numbers of the servos, (joints, parameters).
