@@ -86,7 +86,7 @@ prove-changes: .venv/dev ## the comparison judged on pairs with nothing or one t
 prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
 	$(BIN)/armlab prove
 
-prove-quick: .venv/dev ## the same with 24 cases of a development seed, not logged
+prove-quick: .venv/dev ## the same with a few cases of each tier, of a development seed, not logged
 	$(BIN)/armlab prove --quick --results .armlab/proof-quick
 
 speed: .venv/dev ## how fast, beside Pinocchio, CasADi, mealpy, pygmo and scipy: results/speed.json and .md

@@ -71,6 +71,8 @@ _GROUPS = {
         "prove-changes": "armlab.cli.proof:prove_changes",
         "conceal": "armlab.cli.proof:conceal",
         "score": "armlab.cli.proof:score",
+        "calibrate": "armlab.cli.proof:calibrate_names",
+        "oracle": "armlab.cli.proof:oracle",
         "next-loop": "armlab.cli.proof:next_loop",
         "ablate": "armlab.cli.proof:ablate",
         "real": "armlab.cli.diagnosis:real",

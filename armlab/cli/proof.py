@@ -124,6 +124,40 @@ def conceal(
 
 
 @click.command()
+@click.option("--cases", type=click.IntRange(min=1), required=True, help="How many cases of the set.")
+@click.option("--seed", type=int, required=True, help="Of the set.")
+@click.option("--tier", type=click.Choice(["clean", "realistic", "both"]), default="both", show_default=True)
+@click.option("--development", is_flag=True, help="A set for development.")
+@click.option("--score", "scored", type=_FOLDER, help="Folder with the score of a diagnosis of the same set.")
+@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@click.option("--out", type=OutputPath(), required=True, help="Folder for oracle.csv and oracle.md.")
+@prints_lines
+def oracle(
+    cases: int,
+    seed: int,
+    tier: Literal["clean", "realistic", "both"],
+    development: bool,
+    scored: Path | None,
+    jobs: int,
+    out: Path,
+) -> Iterator[str]:
+    """Ask what anyone could name of a concealed set.
+
+    Simulates the set again and compares every hidden effect with all laws, of the library and outside it (extra
+    `engines`).
+    """
+    from tqdm import tqdm
+
+    from armlab.concealed.naming_oracle_page import ask_about_set, write_oracle
+    from armlab.concealed.sets import make_set_settings
+
+    settings = make_set_settings(cases, seed, tier, "mixed", development)
+    answers = [each for own in tqdm(ask_about_set(settings, jobs), total=cases, unit="case") for each in own]
+    for path in write_oracle(answers, scored, out):
+        yield f"wrote {path}"
+
+
+@click.command()
 @click.argument("folder", type=_FOLDER)
 @click.option("--verdicts", type=_FOLDER, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
@@ -148,36 +182,96 @@ def score(folder: Path, verdicts: Path | None, manifest: str | None, out: Path |
     return document
 
 
+@click.command("calibrate")
+@click.option(
+    "--set",
+    "sets",
+    type=(_FOLDER, _FOLDER),
+    multiple=True,
+    metavar="SET VERDICTS",
+    help="A concealed development set and its verdicts; may be given more than once.",
+)
+@click.option(
+    "--motion",
+    "motion_sets",
+    type=_FOLDER,
+    multiple=True,
+    metavar="WORK",
+    help="Folder of `armlab prove-motion --seed SEED`; may be given more than once.",
+)
+@click.option("--out", type=OutputPath(), required=True, help="Folder for calibration.json and calibration.md.")
+@prints_lines
+def calibrate_names(sets: tuple[tuple[Path, Path], ...], motion_sets: tuple[Path, ...], out: Path) -> Iterator[str]:
+    """Learn the probabilities of names from concealed sets.
+
+    Uses development sets alone, and checks the probabilities on cases that are left out in turn (extra `dev`).
+    """
+    from armlab.concealed.score.weighed import read_weighed
+    from armlab.concealed.servo.score import read_weighed_motion
+    from armlab.diagnosis.naming.calibrate import Finding, calibrate
+    from armlab.diagnosis.naming.calibration_page import calibration_lines, write_calibration
+    from armlab.diagnosis.naming.choice import Example
+
+    if not sets and not motion_sets:
+        raise click.UsageError("nothing to learn from: give --set SET VERDICTS or --motion WORK")
+    read = [*(read_weighed(*each) for each in sets), *(read_weighed_motion(each) for each in motion_sets)]
+    sources = [about for about, _ in read]
+    findings = [
+        Finding(each.case, each.tier, Example(each.names, each.right), each.background)
+        for _, weighed in read
+        for each in weighed
+    ]
+    found = calibrate(findings)
+    yield from calibration_lines(found)
+    for path in write_calibration(found, sources, out):
+        yield f"wrote {path}"
+
+
 @click.command()
-@click.option("--quick", is_flag=True, help="24 cases of a fixed development seed, not logged.")
+@click.option("--quick", is_flag=True, help="A few cases of each tier, of a fixed development seed, not logged.")
 @click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, not logged.")
-@click.option("--cases", type=click.IntRange(min=0), default=400, show_default=True, help="Mixed cases, both tiers.")
-@click.option("--nulls", type=click.IntRange(min=0), default=600, show_default=True, help="Cases with nothing hidden.")
+@click.option("--cases", type=click.IntRange(min=0), default=400, show_default=True, help="Mixed torque cases.")
+@click.option("--nulls", type=click.IntRange(min=0), default=600, show_default=True, help="Torque nulls.")
 @click.option("--work", type=_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
 @click.option("--results", type=OutputPath(), help="Folder for scores [default: results/proof].")
+@click.option(
+    "--tier",
+    "tiers",
+    type=click.Choice(["torque", "setup", "motion"]),
+    multiple=True,
+    help="Only this tier; may be given more than once [default: all].",
+)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 @prints_lines
 def prove(
-    quick: bool, development: int | None, cases: int, nulls: int, work: Path | None, results: Path | None, jobs: int
+    quick: bool,
+    development: int | None,
+    cases: int,
+    nulls: int,
+    work: Path | None,
+    results: Path | None,
+    tiers: tuple[Literal["torque", "setup", "motion"], ...],
+    jobs: int,
 ) -> Iterator[str]:
     """Prove the diagnosis: conceal, diagnose blindly, score.
 
-    Logs the score. After an interruption the same command continues (extra `engines`).
+    Tier by tier: torque, how recordings are read, motion only. Logs the scores. After an interruption the same command
+    continues (extra `engines`).
     """
     from armlab.concealed.prove import choose_proof
-    from armlab.concealed.prove import prove as run_proof
+    from armlab.concealed.tiers import TIERS, prove_tiers
 
     proof = choose_proof(quick, development, cases, nulls)
     folder = work or Path(".armlab/proof") / proof.name
     scores = results or (Path("results/proof") if proof.commit else folder / "score")
-    return run_proof(proof, folder, scores, jobs)
+    return prove_tiers(proof, tiers or TIERS, folder, scores, jobs)
 
 
 def _seed_and_folder(seed: int | None, work: Path | None, kind: str) -> tuple[int, Path]:
     """The seed of a sealed set, which follows from the commit, and its folder, where they are not given."""
-    from armlab.concealed.prove import head_commit, judged_seed
+    from armlab.concealed.prove import code_commit, judged_seed
 
-    chosen = judged_seed(head_commit()) if seed is None else seed
+    chosen = judged_seed(code_commit()) if seed is None else seed
     return chosen, work or Path(f".armlab/{kind}/{chosen}")
 
 

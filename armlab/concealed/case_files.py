@@ -125,6 +125,7 @@ def make_truth(case: SimulatedCase, runs: list[LoggedRun]) -> Truth:
         case=plan.name,
         tier=plan.tier,
         kind=plan.kind,
+        engine=plan.engine,
         arm=plan.machine.name,
         joints=plan.machine.joints,
         rate_hz=plan.rate_hz,

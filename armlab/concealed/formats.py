@@ -13,6 +13,7 @@ from armlab.common.settings import Settings, read_json, validate
 
 TRUTH_SCHEMA_FILE = Path(__file__).parent / "schemas" / "truth.schema.json"
 Tier = Literal["clean", "realistic"]
+EngineName = Literal["mujoco", "sticking"]
 CaseKind = Literal["single", "pair", "triple", "outside", "decoy", "null"]
 SetKind = Literal["mixed", "nulls"]
 SetTier = Literal["clean", "realistic", "both"]
@@ -74,16 +75,17 @@ class TrueNoise(Settings):
 class Truth(Settings):
     """The answer to one case.
 
-    joints: number of joints. motions: family of motions of each run. injected: hidden effects. passed_over: effects
-    that were drawn first and could not be seen. background: friction and offsets that stand beside the hidden effects.
-    cad_errors: links that differ from the nominal arm. absorbed_rotors: joints whose rotor no motion separates from
-    the links. noise_floor: RMS of the recorded noise at each joint, N m.
+    engine: which simulated it. joints: number of joints. motions: family of motions of each run. injected: hidden
+    effects. passed_over: effects that were drawn first and could not be seen. background: friction and offsets that
+    stand beside the hidden effects. cad_errors: links that differ from the nominal arm. absorbed_rotors: joints whose
+    rotor no motion separates from the links. noise_floor: RMS of the recorded noise at each joint, N m.
     """
 
     schema_: Literal["truth/1"] = Field(alias="schema")
     case: str
     tier: Tier
     kind: CaseKind
+    engine: EngineName = "mujoco"
     arm: str
     joints: int
     rate_hz: int

@@ -11,7 +11,7 @@ from armlab.concealed.effects.channels import Offset
 from armlab.concealed.effects.friction import Coulomb, Viscous
 from armlab.concealed.effects.hidden import HiddenEffect, torque_share
 from armlab.concealed.effects.library import LIBRARY
-from armlab.concealed.formats import CaseKind, Tier
+from armlab.concealed.formats import CaseKind, EngineName, Tier
 from armlab.concealed.motions import FAMILIES
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS, Noise, draw_noise
 from armlab.concealed.outside import OUTSIDE
@@ -44,6 +44,7 @@ class PlanSettings:
     multiples: sizes of hidden effects, detection limits. link_error, decoy_link_error: relative errors of links. rates:
     share of each sample rate, Hz. coulomb, viscous, offset: of the background, share of the rating (viscous: at 1
     rad/s). offset_share: joints with an offset. identify_s, validate_s: length of a run.
+    sticking_share: cases of a set that the second engine simulates.
     """
 
     multiples: tuple[float, float] = (0.5, 20.0)
@@ -56,6 +57,7 @@ class PlanSettings:
     offset_share: float = 0.5
     identify_s: tuple[float, float] = (10, 15)
     validate_s: tuple[float, float] = (10, 12)
+    sticking_share: float = 1 / 3
 
 
 PLAN = PlanSettings()
@@ -72,7 +74,10 @@ class RunPlan:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """One case. true_arm: without the hidden effects, but with links that are off. background: friction."""
+    """One case. true_arm: without the hidden effects, but with links that are off. background: friction.
+
+    engine: MuJoCo, or the one whose joints stick (`armlab/concealed/sticking.py`).
+    """
 
     seed: int
     index: int
@@ -85,6 +90,7 @@ class Plan:
     true_arm: Arm
     cad_errors: tuple[float, ...]
     background: tuple[HiddenEffect, ...]
+    engine: EngineName = "mujoco"
 
     @property
     def realistic(self) -> bool:
@@ -101,8 +107,13 @@ class Plan:
         return random_stream(what, self.seed, self.tier, self.index)
 
 
-def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: bool) -> Plan:
-    """The plan of a case. development: leaves out the kinds of noise that are kept for judged sets."""
+def draw_plan(
+    seed: int, index: int, tier: Tier, only_nulls: bool, development: bool, sticking_share: float = 0.0
+) -> Plan:
+    """The plan of a case. development: leaves out the kinds of noise that are kept for judged sets.
+
+    sticking_share: probability that the second engine simulates it.
+    """
     rng = random_stream("plan", seed, tier, index, only_nulls)
     kind: CaseKind = "null" if only_nulls else _choose_kind(index, seed, tier)
     made = make_machine(str(rng.choice(list(ARM_SHARES), p=list(ARM_SHARES.values()))))
@@ -111,7 +122,9 @@ def draw_plan(seed: int, index: int, tier: Tier, only_nulls: bool, development: 
     arm, errors = _draw_arm(rng, made, realistic or kind == "decoy", kind)
     background = draw_background(rng, made) if realistic else ()
     rate = int(rng.choice([rate for rate, _ in PLAN.rates], p=[share for _, share in PLAN.rates]))
-    return Plan(seed, index, tier, kind, made, draw_runs(rng), rate, noise, arm, errors, background)
+    sticks = random_stream("engine", seed, tier, index, only_nulls).random() < sticking_share
+    engine: EngineName = "sticking" if sticks else "mujoco"
+    return Plan(seed, index, tier, kind, made, draw_runs(rng), rate, noise, arm, errors, background, engine)
 
 
 def draw_effects(plan: Plan, attempt: int) -> tuple[HiddenEffect, ...]:
@@ -132,7 +145,7 @@ def draw_effects(plan: Plan, attempt: int) -> tuple[HiddenEffect, ...]:
         if not places:
             continue
         drawn = library[number].draw(rng, plan.machine, int(rng.choice(places)))
-        if _fits_beside(drawn, chosen):
+        if _fits_beside(drawn, chosen) and not (drawn.has_parts and plan.engine == "sticking"):
             chosen.append(drawn)
     return tuple(chosen)
 

@@ -65,7 +65,7 @@ def make_development_proof(seed: int, cases: int, nulls: int) -> Proof:
 
 def make_judged_proof(cases: int, nulls: int) -> Proof:
     """Sets whose seed follows from the commit, so that nobody could tune on them before the commit existed."""
-    commit = head_commit()
+    commit = code_commit()
     seed = judged_seed(commit)
     sets = {kind: SetSettings(count, seed, kind=kind) for count, kind in _set_sizes(cases, nulls)}
     return Proof({name: each for name, each in sets.items() if each.cases}, commit, commit)
@@ -75,9 +75,15 @@ def _set_sizes(cases: int, nulls: int) -> tuple[tuple[int, SetKind], ...]:
     return (cases, "mixed"), (nulls, "nulls")
 
 
-def head_commit() -> str:
-    """The commit of the source tree; InputError where this is no git checkout."""
-    return _run_git("rev-parse", "HEAD")
+CODE = ("armlab", "problem", "algorithms", "bench", "requirements", "pyproject.toml", "setup.py")
+
+
+def code_commit() -> str:
+    """The last commit that changed the code; InputError where this is no git checkout.
+
+    Results and pages that are committed later do not change it, so that a proof may go on tier by tier.
+    """
+    return _run_git("log", "-1", "--format=%H", "--", *CODE)
 
 
 def judged_seed(commit: str) -> int:

@@ -22,7 +22,7 @@ from armlab.concealed.prove import (
     LOG_FILE,
     answer,
     append_to_log,
-    head_commit,
+    code_commit,
     is_answered,
     judged_seed,
     report_progress,
@@ -136,7 +136,7 @@ def log_judged_set(name: str, seed: int, cases: int, work: Path, shares: Sequenc
     if seed in DEVELOPMENT_SEEDS or (work / FINISHED_MARK).is_file():
         return
     try:
-        commit = head_commit()
+        commit = code_commit()
     except InputError:  # no git checkout
         return
     if seed != judged_seed(commit):

@@ -16,7 +16,7 @@ from armlab.common.errors import InputError
 from armlab.concealed.case_files import write_case
 from armlab.concealed.folders import claim_folder
 from armlab.concealed.formats import LoopManifest, SetKind, SetManifest, SetTier, Tier, read_model, write_model
-from armlab.concealed.plan import DEVELOPMENT_SEEDS, Plan, draw_plan
+from armlab.concealed.plan import DEVELOPMENT_SEEDS, PLAN, Plan, draw_plan
 from armlab.concealed.sizing import simulate_case
 
 MANIFEST_FILE = "manifest.json"
@@ -74,7 +74,8 @@ class SetSettings:
         """The plan of one case; `both` takes the tiers in turn."""
         tiers = TIERS if self.tier == "both" else (self.tier,)
         index, tier = divmod(number, len(tiers))
-        return draw_plan(self.seed, index, tiers[tier], self.kind == "nulls", self.development)
+        nulls = self.kind == "nulls"
+        return draw_plan(self.seed, index, tiers[tier], nulls, self.development, PLAN.sticking_share)
 
 
 def make_set_settings(cases: int, seed: int, tier: SetTier, kind: SetKind, development: bool) -> SetSettings:

@@ -23,6 +23,7 @@ from armlab.concealed.effects.hidden import HiddenEffect, smooth_sign
 from armlab.concealed.engine import Parts, Plant, Track, build_plant
 from armlab.concealed.motions import make_reference, moving_average
 from armlab.concealed.plan import Plan, RunPlan
+from armlab.concealed.sticking import is_carried, play_sticking
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
 from problem.motion import Motion
@@ -123,13 +124,22 @@ def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Referenc
     """
     step = float(reference.time[1] - reference.time[0])
     made = build_plant(arm, parts, step, (controller.position_gain, controller.velocity_gain))
+    control, wanted = servo_torques(controller, reference, taken)
+    states = _roll_out(made, wanted, control, _initial_twists(arm, parts, wanted))
+    return _make_track(made, controller, reference.time, states, control)
+
+
+def servo_torques(controller: Controller, reference: Reference, taken: Array) -> tuple[Array, Motion]:
+    """What servos add to the torque of their gains, (steps, joints), N m, and the motion that they want.
+
+    taken: (steps, joints), N m, torque of effects without a place in the engine; the inner loops take up its fast part.
+    """
+    step = float(reference.time[1] - reference.time[0])
     wanted = _differentiate_reference(reference.position, step)
     forward = rigid_torque(controller.model, wanted)
     gains = controller.position_gain * wanted.position + controller.velocity_gain * wanted.velocity
     width = round(SERVOS.inner_loop_s / step)
-    control = gains + forward - moving_average(moving_average(taken, width), width)
-    states = _roll_out(made, wanted, control, _initial_twists(arm, parts, wanted))
-    return _make_track(made, controller, reference.time, states, control)
+    return gains + forward - moving_average(moving_average(taken, width), width), wanted
 
 
 def _differentiate_reference(position: Array, step: float) -> Motion:
@@ -278,9 +288,31 @@ def simulate_runs(
     out = []
     for run, (goal, track) in enumerate(zip(wanted, before, strict=True)):
         known = track.at(goal.time)
+        if plan.engine == "sticking":
+            out.append(_play_sticking(plan, hidden, controller, arm, run, goal, known))
+            continue
         disturbing = usual * law_torque(plan.background, known, run) + law_torque(hidden, known, run)
         out.append(simulate(arm, parts, controller, Reference(goal.time, goal.position), disturbing))
     return tuple(out)
+
+
+def _play_sticking(
+    plan: Plan,
+    hidden: Sequence[HiddenEffect],
+    controller: Controller,
+    arm: Arm,
+    run: int,
+    goal: Track,
+    known: Track,
+) -> Track:
+    """A run in the second engine. known: the same run as simulated before, at the instants of the wanted track."""
+    usual, carried = plan.background, [each for each in (*plan.background, *hidden) if is_carried(each)]
+    taken = (1 - controller.compensated) * law_torque([each for each in usual if not is_carried(each)], known, run)
+    taken += law_torque([each for each in hidden if not is_carried(each)], known, run)
+    ready = controller.compensated * law_torque([each for each in usual if is_carried(each)], goal, run)
+    given, wanted = servo_torques(controller, Reference(goal.time, goal.position), taken)
+    gains = controller.position_gain, controller.velocity_gain
+    return play_sticking(arm, gains, goal.time, given + ready, wanted, carried)
 
 
 def coarse_track(track: Track) -> Track:

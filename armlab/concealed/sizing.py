@@ -114,12 +114,16 @@ class Oracle:
 
         beside: columns that are free for this effect alone, (samples, joints, columns) each run.
         """
-        joints = torque[0].shape[1]
+        left = self.rows_without_free(torque, beside)
+        return float(np.sqrt(left @ left / limit_noncentrality(torque[0].shape[1])))
+
+    def rows_without_free(self, torque: Sequence[Array], beside: Sequence[Array] | None = None) -> Array:
+        """Whitened rows (rows,) of a torque, (samples, joints) each run, without what free columns explain."""
         rows = np.vstack([self._rows(run[..., None]) for run in torque])
         parts = [] if self.basis is None else [self.basis]
         if beside is not None:
             parts.append(_orthonormal_basis(_project_out(np.vstack([self._rows(run) for run in beside]), parts)))
-        return float(np.sqrt(np.sum(_project_out(rows, parts) ** 2) / limit_noncentrality(joints)))
+        return np.asarray(_project_out(rows, parts)[:, 0])
 
     def _rows(self, columns: Array) -> Array:
         """Whitened rows (samples * joints, columns)."""
@@ -169,7 +173,7 @@ def draw_sized_effects(plan: Plan, tracks: Sequence[Track]) -> SizedEffects:
     The last draw is always kept.
     """
     oracle, passed_over = make_oracle(plan, tracks), list[str]()
-    motors = [track.load + law_torque(plan.background, track, 0) for track in _identification_tracks(plan, tracks)]
+    motors = [track.load + law_torque(plan.background, track, 0) for track in identification_tracks(plan, tracks)]
     peak = np.max([np.abs(torque).max(axis=0) for torque in motors], axis=0)
     for attempt in range(SIZING.max_draws):
         hidden = tuple(effect.with_peak_torque(peak) for effect in draw_effects(plan, attempt))
@@ -214,7 +218,7 @@ def make_oracle(plan: Plan, tracks: Sequence[Track]) -> Oracle:
     if not plan.realistic:
         return oracle
     return oracle.with_free_columns(
-        [free_columns(plan.true_arm, track, _grid(track)) for track in _identification_tracks(plan, tracks)]
+        [free_columns(plan.true_arm, track, oracle_grid(track)) for track in identification_tracks(plan, tracks)]
     )
 
 
@@ -223,14 +227,19 @@ def effect_multiple(
 ) -> float:
     """Detection limits of one effect among others; in the clean tier its own plain friction is free beside it."""
     effect, rest = hidden[number], (*hidden[:number], *hidden[number + 1 :])
-    arms, runs = (arm_with_effects(plan, hidden), arm_with_effects(plan, rest)), _identification_tracks(plan, tracks)
+    arms, runs = (arm_with_effects(plan, hidden), arm_with_effects(plan, rest)), identification_tracks(plan, tracks)
     others = (*plan.background, *rest)
-    shares = [effect_torque(effect, others, arms, track, run, _grid(track)) for run, track in enumerate(runs)]
+    shares = [effect_torque(effect, others, arms, track, run, oracle_grid(track)) for run, track in enumerate(runs)]
+    return oracle.multiple(shares, companion_columns(plan, effect, runs))
+
+
+def companion_columns(plan: Plan, effect: HiddenEffect, runs: Sequence[Track]) -> list[Array] | None:
+    """Columns of plain friction that is free beside an effect of the clean tier, (samples, joints, columns) a run."""
     if plan.realistic or not effect.companions:
-        return oracle.multiple(shares)
-    columns = [free_columns(plan.true_arm, track, _grid(track), friction_only=True) for track in runs]
+        return None
+    columns = [free_columns(plan.true_arm, track, oracle_grid(track), friction_only=True) for track in runs]
     chosen = [effect.joint + len(plan.true_arm) * ("coulomb", "viscous").index(name) for name in effect.companions]
-    return oracle.multiple(shares, [each[..., chosen] for each in columns])
+    return [each[..., chosen] for each in columns]
 
 
 def _scale_to_multiple(
@@ -249,12 +258,13 @@ def _scale_to_multiple(
     return sized, found
 
 
-def _identification_tracks(plan: Plan, tracks: Sequence[Track]) -> list[Track]:
+def identification_tracks(plan: Plan, tracks: Sequence[Track]) -> list[Track]:
     """The tracks from which a diagnosis may learn."""
     return [track for track, run in zip(tracks, plan.runs, strict=True) if run.role == "identify"]
 
 
-def _grid(track: Track) -> Array:
+def oracle_grid(track: Track) -> Array:
+    """Instants of the rows of the oracle, s."""
     return np.asarray(np.arange(0.0, track.time[-1] - ORACLE.end_s, 1 / ORACLE.rate_hz))
 
 

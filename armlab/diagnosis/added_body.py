@@ -15,7 +15,6 @@ from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel, inertial_parameters
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.prediction import Prediction
-from armlab.diagnosis.result import Rival
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.solver import Solver, State
 from armlab.effects.links import (
@@ -413,47 +412,3 @@ def _names(model: FittedModel, groups: Sequence[int]) -> str:
 
 def _link(model: FittedModel, group: int) -> int:
     return model.solver.groups[group].candidate.joints[0]
-
-
-def neighbours_that_fit(model: FittedModel, group: int) -> tuple[Rival, ...]:
-    """Payloads at other links that these data do not exclude beside a payload that was found.
-
-    Those that fit nearly as well and predict held-out rows as well, and any that fits better: a place is told where
-    both agree on it.
-    """
-    if model.design.prior is None or group not in payload_groups(model):
-        return ()
-    tuning = model.design.settings.tuning.claims
-    placed = {each.link: each for each in place_body(model, model.state.minus(group))}
-    own = placed.get(_link(model, group))
-    if own is None:
-        return ()
-    return tuple(
-        Rival(PAYLOAD_FACTS.id, link, (), False, max(own.gain - each.gain, 0.0))
-        for link, each in placed.items()
-        if link != own.link
-        and (
-            each.gain > own.gain
-            or (
-                own.gain - each.gain <= tuning.max_body_deficit * own.gain
-                and predicts_as_well(each.error, own.error, tuning.body_tolerance)
-            )
-        )
-    )
-
-
-def bodies_that_fit(model: FittedModel, link: int) -> tuple[Rival, ...]:
-    """Payloads that fit these data as well as a link (from 1) that is off: by score and held-out rows."""
-    widths = model.state.widths
-    if widths is None or model.design.prior is None:
-        return ()
-    tuning = model.design.settings.tuning.claims
-    less = tuple(0.0 if other == link else width for other, width in enumerate(widths, 1))
-    without, error = State(model.state.groups, less), model.moments.heldout_error(model.fit.coefficients)
-    gain = model.fit.score - model.solver.fit(without).score
-    return tuple(
-        Rival(PAYLOAD_FACTS.id, each.link, (), False, max(gain - each.gain, 0.0))
-        for each in place_body(model, without)
-        if gain - each.gain <= tuning.max_body_deficit * gain
-        and predicts_as_well(each.error, error, tuning.body_tolerance)
-    )

@@ -1,37 +1,45 @@
 """From a pruned model to claims: names, numbers, equations and rivals."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.added_body import bodies_that_fit, neighbours_that_fit
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.prediction import Prediction
-from armlab.diagnosis.result import Claim, Rival
-from armlab.diagnosis.search import Search
-from armlab.diagnosis.solver import State
-from armlab.effects.contract import Candidate, Effect
+from armlab.diagnosis.result import Claim, Rival, Weighed
+from armlab.effects.contract import Effect
 from armlab.effects.links import LinkLaw, felt_values, link_law
 from armlab.effects.parameters import parameter_values
 
 
+@dataclass(frozen=True)
+class Names:
+    """What was weighed for the findings of a model: by group of an effect, and by link (from 0)."""
+
+    effects: Mapping[int, Weighed]
+    links: Mapping[int, Weighed]
+
+
 def make_claims(
-    model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence], prediction: Prediction
+    model: FittedModel, effects: dict[int, Evidence], links: dict[int, Evidence], prediction: Prediction, names: Names
 ) -> tuple[Claim, ...]:
-    """All claims of a model, the strongest first.
+    """All claims of a model, the strongest first, without probabilities.
 
     Numbers are of the model on which the names were tested: beside parts that are only present they are less sure.
     """
     if not effects and not links:
         return ()
     wide = extend_with_shapes(model)
-    claims = [_effect_claim(model, wide, group, prediction.places[group], each) for group, each in effects.items()]
-    claims += _link_claims(model, wide, links)
+    claims = [
+        replace(_effect_claim(model, wide, group, prediction.places[group], each), weighed=names.effects[group])
+        for group, each in effects.items()
+    ]
+    claims += _link_claims(model, wide, links, names.links)
     known = list(dict.fromkeys(group.candidate.facts for group in model.solver.groups))
     most = model.design.settings.tuning.claims.max_rivals
     claims = [_with_equal_sums(claim, claims, known, most) for claim in claims]
@@ -66,8 +74,7 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     candidate = solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
     own = np.zeros(model.moments.size)
     own[columns] = coefficients
-    rivals = (*neighbours_that_fit(model, group), *find_rivals(model, group, candidate))
-    rivals = rivals[: model.design.settings.tuning.claims.max_rivals]
+    rivals = tuple(Rival(name, candidate.joint, candidate.joints, True) for name in candidate.identical)
     return Claim(
         effect=candidate.effect,
         joint=candidate.joint,
@@ -85,36 +92,9 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     )
 
 
-def find_rivals(model: FittedModel, group: int, own: Candidate) -> tuple[Rival, ...]:
-    """What these data cannot tell from a group of a model; the best first. own: its candidate, first name."""
-    solver, state, tuning = model.solver, model.state, model.design.settings.tuning.claims
-    out = [Rival(name, own.joint, own.joints, True) for name in own.identical]
-    search = Search(solver, model.design.settings, True, 0)
-    without = state.minus(group)
-    scores = search.gains(without)
-    full = model.moments.heldout_error(model.fit.coefficients)
-    for number in np.argsort(-scores):
-        rival = int(number)
-        deficit = float(scores[group] - scores[rival])
-        if deficit > tuning.max_deficit or len(out) >= tuning.max_rivals:
-            break
-        candidate = solver.groups[rival].candidate
-        same = candidate.effect == own.effect and candidate.joint == own.joint
-        known = any((each.effect, each.joint) == (candidate.effect, candidate.joint) for each in out)
-        if same or known or search.excluded(without, rival):
-            continue
-        other = search.with_group(without, rival)
-        if search.objection(other, rival) is None and _predicts_as_well(model, other, full):
-            out.append(Rival(candidate.effect, candidate.joint, candidate.joints, False, max(deficit, 0.0)))
-    return tuple(out)
-
-
-def _predicts_as_well(model: FittedModel, other: State, full: Array) -> bool:
-    error = model.moments.heldout_error(model.solver.fit(other).coefficients)
-    return bool(np.all(error <= (1 + model.design.settings.tuning.claims.held_out_tolerance) * full))
-
-
-def _link_claims(model: FittedModel, wide: ShapedFit, links: dict[int, Evidence]) -> list[Claim]:
+def _link_claims(
+    model: FittedModel, wide: ShapedFit, links: dict[int, Evidence], names: Mapping[int, Weighed]
+) -> list[Claim]:
     """One claim for each link that is off: its ten parameters, given what the joints feel of all links."""
     bench, widths = model.design, model.fit.state.widths
     if not links or bench.prior is None or widths is None:
@@ -126,7 +106,8 @@ def _link_claims(model: FittedModel, wide: ShapedFit, links: dict[int, Evidence]
         place = slice(10 * link, 10 * link + 10)
         added = is_outlying(widths, link, bench.settings.tuning.claims.outlying_factor)
         law = link_law(bench.simulation.arm, link + 1, mean[place], spread[place, place], added=added)
-        claims.append(_link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence))
+        claim = _link_claim(model, wide.factor, law, mean[place], spread[place, place], evidence)
+        claims.append(replace(claim, weighed=names[link]))
     return claims
 
 
@@ -142,9 +123,6 @@ def _link_claim(
     change[10 * link - 10 : 10 * link] = mean
     torque[: len(bench.base)] = bench.base.grouping @ change
     rivals = tuple(Rival(each, link, (), True) for each in law.rivals)
-    known = {(candidate.effect, link), *((each.effect, each.joint) for each in rivals)}
-    rivals += tuple(each for each in bodies_that_fit(model, link) if (each.effect, each.joint) not in known)
-    rivals = rivals[: bench.settings.tuning.claims.max_rivals]
     return Claim(
         effect=candidate.effect,
         joint=link,

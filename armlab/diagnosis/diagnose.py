@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 
 from armlab.diagnosis.added_body import possible_links, with_possible_bodies
-from armlab.diagnosis.claims import make_claims
+from armlab.diagnosis.claims import Names, make_claims
 from armlab.diagnosis.data import in_fixed_order, observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.evidence import Evidence, count_looks
@@ -31,6 +31,9 @@ from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
+from armlab.diagnosis.naming.additions import Additions, add_probable
+from armlab.diagnosis.naming.decide import named_claims
+from armlab.diagnosis.naming.weighing import weigh_effect, weigh_link, weigh_structure
 from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
 from armlab.diagnosis.prediction import (
     Prediction,
@@ -149,7 +152,9 @@ def conclude(recording: Recording, searched: FittedModel, progress: Progress) ->
 
 
 def state_numbers(recording: Recording, named: "NamedEffects", progress: Progress) -> Diagnosis:
-    """Fits the model that predicts beside names that hold, and states numbers."""
+    """Adds what is probable, fits the model that predicts beside names that hold, and states numbers."""
+    progress("weighing names")
+    named, added = _with_probable(named)
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
     tuning = named.model.design.settings.tuning
@@ -157,9 +162,28 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
     model, effects = unclaim_implausible(*claim_expected_parts(named.model, named.effects, prediction), remains)
     unknowns = [each for each in remains if not is_form_error(each, named.effects, tuning.unknown)]
     residual = model.residual(model.fit)
-    model, claims = links_that_data_tell(model, make_claims(model, effects, named.links, prediction), remains)
-    claims += tuple(make_unknown_claim(model, each, residual) for each in unknowns)
-    return with_story(_assemble(recording, model, prediction, claims, unknowns, remains))
+    names = Names(
+        {group: added.names.get(group) or weigh_effect(model, group, effects, named.left) for group in effects},
+        {link: weigh_link(model, link, each, effects, named.left) for link, each in named.links.items()},
+    )
+    model, claims = links_that_data_tell(model, make_claims(model, effects, named.links, prediction, names), remains)
+    claims += tuple(
+        make_unknown_claim(model, each, residual, weigh_structure(model, each, effects)) for each in unknowns
+    )
+    claims += added.unnamed
+    weighed = (*(claim.weighed for claim in claims), *added.nothing)
+    claims = named_claims(claims, tuning.naming)
+    return replace(with_story(_assemble(recording, model, prediction, claims, unknowns, remains)), weighed=weighed)
+
+
+def _with_probable(named: "NamedEffects") -> tuple["NamedEffects", Additions]:
+    """Names that hold with what is probable beside them, and what was weighed for that."""
+    added = add_probable(named.model, named.left)
+    if added.model is named.model or not named.model.design.settings.guards.unknown:
+        return replace(named, model=added.model, effects=named.effects | added.effects), added
+    left = predict_residual_structure(added.model, fit_coloured_noise(added.model))
+    effects = {each: evidence for each, evidence in named.effects.items() if each in added.model.state.groups}
+    return NamedEffects(added.model, effects | added.effects, named.links, left), added
 
 
 def find_names(design: DesignMatrix, seed: int, progress: Progress) -> "NamedEffects":

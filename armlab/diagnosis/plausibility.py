@@ -18,6 +18,7 @@ from armlab.diagnosis.intervals import extend_with_shapes
 from armlab.diagnosis.pruning import Pruned, look_again, withdraw
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.search import Step
+from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
@@ -77,6 +78,7 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: b
         covariance = wide.covariance(group)
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
         known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
+        known = known or (_is_early(candidate, values) and not sticks_where_it_acts(model, model.state, candidate))
         reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
@@ -85,14 +87,28 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: b
     return out
 
 
+def _is_early(candidate: Candidate, values: Sequence[ParameterValue]) -> bool:
+    """Whether a law shifts the torque of one joint to before its motion."""
+    shifts = {each.name for each in candidate.facts.parameters if each.sampled}
+    return len(candidate.rows) == 1 and any(
+        each.name in shifts and isinstance(each.value, float) and each.value < 0 for each in values
+    )
+
+
+def sticks_where_it_acts(model: FittedModel, state: State, candidate: Candidate) -> bool:
+    """Whether friction of a state that sticks acts where a law does: while a joint sticks, its friction seems early."""
+    facts = [model.solver.groups[each].candidate for each in state.groups]
+    return any(each.facts.sticks and each.rows[0] in candidate.rows for each in facts)
+
+
 def links_that_data_tell(
     model: FittedModel, claims: Sequence[Claim], left: Sequence[Structure]
 ) -> tuple[FittedModel, tuple[Claim, ...]]:
     """The claims without those on a link or a load of which these data do not tell; the log says why not.
 
-    No parameter of a link that is off differs from zero; or a joint that feels the link has structure left without a
-    name that is comparable with what the claim explains there; or a load has another mass where it is found anew beside
-    all that is named. left: what is structured beyond chance.
+    No parameter of a link that is off differs from zero, and it is not certain that the link is off; or a joint that
+    feels the link has structure left without a name that is comparable with what the claim explains there; or a load
+    has another mass where it is found anew beside all that is named. left: what is structured beyond chance.
     """
     kept, steps = [], list(model.steps)
     for each in claims:
@@ -109,7 +125,7 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: Plausib
     """Why these data do not tell of a claim about a link or its load; None where they do, and for other claims."""
     if claim.candidate is None or claim.candidate.facts.where != "link":
         return None
-    if claim.in_links and not _differs_from_zero(claim):
+    if claim.in_links and claim.evidence.score < tuning.certain_link_evidence and not _differs_from_zero(claim):
         return "no parameter differs from zero"
     for each in left:
         own, unknown = (float(np.std(of)) for of in (claim.prediction[:, each.joint], each.prediction))

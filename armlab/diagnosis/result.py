@@ -1,5 +1,6 @@
 """What a diagnosis says: plain data for the verdict, the model file and the report."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from armlab.common.arrays import Array
@@ -9,7 +10,7 @@ from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.search import Step
 from armlab.diagnosis.simulation import Simulation
-from armlab.effects.contract import Candidate
+from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.reading.answer import Answer
@@ -30,13 +31,52 @@ class Rival:
     deficit: float = 0.0
 
 
+@dataclass(frozen=True)
+class WeighedName:
+    """A name that a finding could have, or none of them (`unknown`). numbers: what speaks for it or against it, by what
+    they say."""
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    numbers: Mapping[str, float]
+
+    @property
+    def is_none(self) -> bool:
+        """Whether it stands for none of the names."""
+        return self.effect == UNKNOWN.id
+
+
+Weighed = tuple[WeighedName, ...]
+
+
+@dataclass(frozen=True)
+class Member:
+    """A name that a finding may have, or that it is none of them (`unknown`)."""
+
+    effect: str
+    joint: int | None
+    joints: tuple[int, ...]
+    probability: float
+
+    def is_of(self, effect: str, joint: int | None) -> bool:
+        """Whether it is the name of this effect at this place."""
+        return (self.effect, self.joint) == (effect, joint)
+
+    @property
+    def as_rival(self) -> Rival:
+        """The name as one that these data leave open."""
+        return Rival(self.effect, self.joint, self.joints)
+
+
 @dataclass(frozen=True, eq=False)
 class Claim:
     """One finding. joint: from 1, the link for parameters of a link, None for the whole robot.
 
     candidate, coefficients, covariance: the terms that add to the model, None for `unknown`. prediction: (rows,
     joints), N m, its torque at the kept rows. depends_on: variables of an unknown. in_links: whether the links of the
-    model found hold it already. group: its number in the model that predicts.
+    model found hold it already. group: its number in the model that predicts. weighed: names that it could have.
+    probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
     """
 
     effect: str
@@ -54,6 +94,9 @@ class Claim:
     depends_on: tuple[str, ...] = ()
     in_links: bool = False
     group: int | None = None
+    weighed: Weighed = ()
+    probability: float | None = None
+    members: tuple[Member, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -122,7 +165,8 @@ class Diagnosis:
     same to predict with; named_model: fitted with the named effects alone.
     steps: the log of the search. looks: how many candidates and shapes were compared. signs: warnings about
     limits, names, clock and standstill of the recording as it is. setup: how it is to be read, None where that was not
-    asked; `recording` is then as it should be read.
+    asked; `recording` is then as it should be read. weighed: the names of each finding, and of what was not probable
+    enough for one.
     """
 
     recording: Recording
@@ -148,6 +192,7 @@ class Diagnosis:
     signs: tuple[Finding, ...] = ()
     setup: Answer | None = None
     setup_seconds: float = 0.0
+    weighed: tuple[Weighed, ...] = ()
     settings: dict[str, float | str | bool] = field(default_factory=dict)
 
     def __repr__(self) -> str:

@@ -125,25 +125,25 @@ class Search:
         ]
 
     def excluded(self, state: State, group: int) -> bool:
-        """Whether the state holds the group's place already, or something that contains it.
+        """Whether a group is not looked for: see `has_no_room`.
 
         A law of the last resort is nowhere looked for beside the others: see `find_friction_curves`.
         """
+        return self.solver.groups[group].candidate.facts.last_resort or self.has_no_room(state, group)
+
+    def has_no_room(self, state: State, group: int) -> bool:
+        """Whether the state holds the group's place already, or something that contains it."""
         candidate = self.solver.groups[group].candidate
         inside = [self.solver.groups[other] for other in state.groups]
-        return (
-            candidate.facts.last_resort
-            or self._too_many_beside(state, group)
-            or any(
-                other.place == self.solver.groups[group].place
-                or (
-                    bool(candidate.facts.one_of)
-                    and candidate.facts.one_of == other.candidate.facts.one_of
-                    and candidate.joint == other.candidate.joint
-                )
-                or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
-                for other in inside
+        return self._too_many_beside(state, group) or any(
+            other.place == self.solver.groups[group].place
+            or (
+                bool(candidate.facts.one_of)
+                and candidate.facts.one_of == other.candidate.facts.one_of
+                and candidate.joint == other.candidate.joint
             )
+            or (candidate.effect in other.candidate.replaces and candidate.joint == other.candidate.joint)
+            for other in inside
         )
 
     def _too_many_beside(self, state: State, group: int) -> bool:

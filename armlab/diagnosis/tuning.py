@@ -510,17 +510,9 @@ class ClaimTuning:
     max_deficit: float = tuned(
         2.0, unit="log likelihood", meaning="a rival whose score is lower by less may be as good by chance"
     )
-    held_out_tolerance: float = tuned(
-        0.01, unit="of the held-out error", meaning="a rival that predicts worse by less predicts as well"
-    )
     max_rivals: int = tuned(3, unit="rivals", meaning="rivals of a claim that are listed")
     outlying_factor: float = tuned(
         4.0, unit="of the other links' median width", meaning="a link that is so much wider carries something"
-    )
-    max_body_deficit: float = tuned(
-        0.02,
-        unit="of the log likelihood that a body adds",
-        meaning="a body at another link that adds so much less fits as well: laws are not exact",
     )
     body_tolerance: float = tuned(
         0.05,
@@ -540,8 +532,45 @@ class ClaimTuning:
 
 
 @dataclass(frozen=True)
+class NamingTuning:
+    """When a finding has a name, a class of names, or none; and what is weighed for that."""
+
+    level: float = tuned(
+        0.9,
+        unit="probability",
+        meaning="of a name, or of the names of a class together, that is claimed",
+        source="wanted: a name that is claimed is wrong once in ten times at most",
+        least=0.5,
+        most=1.0,
+    )
+    max_class: int = tuned(4, unit="names", meaning="of a class; where more are needed, a finding is unknown", least=1)
+    shown: float = tuned(0.05, unit="probability", meaning="a less probable name is not listed", most=1.0)
+    names: int = tuned(8, unit="names", meaning="the likeliest effects that are weighed for a finding", least=1)
+    max_independent: float = tuned(
+        0.5,
+        unit="of the log evidence",
+        meaning="what a law keeps beside a finding in whose place it would stand; with more it is another effect",
+        most=1.0,
+    )
+    least_addition: float = tuned(
+        8.0, unit="log evidence", meaning="what an effect adds that is weighed beside names that passed all tests"
+    )
+    max_additions: int = tuned(4, unit="effects", meaning="that are weighed beside names that passed all tests")
+    max_asked: int = tuned(
+        40, unit="laws", meaning="that are fitted to find one that breaks no law of physics", least=1
+    )
+
+
+@dataclass(frozen=True)
 class PlausibilityTuning:
     """When numbers that no engineer expects, or that are hardly known, withdraw a finding."""
+
+    certain_link_evidence: float = tuned(
+        60.0,
+        unit="log evidence",
+        meaning="with more a link is off for certain, though none of its ten numbers alone differs from zero",
+        source="as pruning.least_evidence: joints feel sums of the numbers of links",
+    )
 
     overwhelming_evidence: float = tuned(
         600.0,
@@ -676,6 +705,7 @@ class Tuning:
     location: LocationTuning = LocationTuning()
     unknown: UnknownTuning = UnknownTuning()
     claims: ClaimTuning = ClaimTuning()
+    naming: NamingTuning = NamingTuning()
     plausibility: PlausibilityTuning = PlausibilityTuning()
     intervals: IntervalTuning = IntervalTuning()
     comparison: ComparisonTuning = ComparisonTuning()

@@ -10,7 +10,7 @@ from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel, initial_link_widths
 from armlab.diagnosis.noise import Noise
-from armlab.diagnosis.result import Claim
+from armlab.diagnosis.result import Claim, Weighed
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure, feature_banks, find_structure
 from armlab.diagnosis.tuning import Tuning, UnknownTuning
@@ -44,6 +44,15 @@ def _surest_structure(model: FittedModel, residual: Array, joint: int, noise: No
     return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
 
 
+def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
+    """What the best surrogate explains of what a state leaves at a joint (from 0): see `Structure.gain`."""
+    observed, tuning = model.design.observed, model.design.settings.tuning.surrogate
+    residual = model.residual_at(joint, model.solver.fit(state))
+    few = feature_banks(observed, joint, observed.torque[:, joint] - residual, tuning)
+    features = (model.design.features[joint], *few)
+    return max(find_structure(residual, joint, each, model.noise, observed, tuning).gain for each in features)
+
+
 def is_structured(each: Structure, tuning: Tuning) -> bool:
     """Whether it is more than chance, and large enough to matter."""
     return each.gain > tuning.surrogate.min_structure_gain and each.p_value < tuning.unknown.level
@@ -66,23 +75,30 @@ def unknown_evidence(model: FittedModel, each: Structure, before: Array, after: 
     )
 
 
-def make_unknown_claim(model: FittedModel, each: Structure, residual: Array) -> Claim:
-    """The finding `unknown` at a joint, with its surrogate's prediction."""
+def make_unknown_claim(model: FittedModel, each: Structure, residual: Array, weighed: Weighed) -> Claim:
+    """The finding `unknown` at a joint, with its surrogate's prediction. weighed: names that it could have."""
     own = residual[:, each.joint]
     evidence = unknown_evidence(model, each, own, own - each.prediction)
     prediction = np.zeros(residual.shape)
     prediction[:, each.joint] = each.prediction
-    joint = each.joint + 1
+    return unknown_claim(each.joint + 1, evidence, prediction, each.depends_on, weighed)
+
+
+def unknown_claim(
+    joint: int, evidence: Evidence, prediction: Array, depends_on: tuple[str, ...], weighed: Weighed
+) -> Claim:
+    """The finding `unknown` at a joint (from 1). prediction: (rows, joints), N m; weighed: names that it could have."""
     return Claim(
         UNKNOWN.id,
         joint,
         (joint,),
         (),
-        f"tau_{joint} += f({', '.join(each.depends_on)})",
+        f"tau_{joint} += f({', '.join(depends_on) or 'the motion'})",
         evidence,
         prediction,
         next_experiment=UNKNOWN.experiment,
-        depends_on=each.depends_on,
+        depends_on=depends_on,
+        weighed=weighed,
     )
 
 
@@ -90,7 +106,7 @@ def names_contradicted_by_residual(
     claimed: Mapping[int, Evidence], left: Sequence[Structure], tuning: Tuning
 ) -> frozenset[int]:
     """The groups or links whose names do not hold; friction and offsets, which every arm has, keep theirs."""
-    over = {each.joint: _predicted_share(each) for each in left if is_structured(each, tuning)}
+    over = {each.joint: predicted_share(each) for each in left if is_structured(each, tuning)}
     return frozenset(
         number
         for number, each in claimed.items()
@@ -101,9 +117,9 @@ def names_contradicted_by_residual(
 def is_form_error(each: Structure, effects: Mapping[int, Evidence], tuning: UnknownTuning) -> bool:
     """Whether structure is what the form of a law that is named at this joint leaves."""
     explained = [own.gain for own in effects.values() if own.joint == each.joint and not own.usual]
-    return _predicted_share(each) <= tuning.form_error_share * max(explained, default=0.0)
+    return predicted_share(each) <= tuning.form_error_share * max(explained, default=0.0)
 
 
-def _predicted_share(each: Structure) -> float:
+def predicted_share(each: Structure) -> float:
     """Of what the surrogate predicts, as a share of the error that the model leaves."""
     return each.gain / (1 + each.gain)

@@ -125,7 +125,7 @@ def _setup_entry(each: SetupFinding) -> FindingEntry:
 
 def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
     effect = effect_named(claim.effect) if claim.candidate is None else claim.candidate.facts
-    return FindingEntry(
+    entry = FindingEntry(
         effect=claim.effect,
         kind=kind_of_effect(effect),
         joint=claim.joint,
@@ -137,9 +137,14 @@ def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
         heldout_rms_after=claim.evidence.rms_after,
         p_value=claim.evidence.corrected,
         share_of_gap=share,
+        probability=claim.probability,
         rivals=tuple(RivalEntry(effect=each.effect, joint=each.joint) for each in claim.rivals),
         next_experiment=claim.next_experiment,
     )
+    members = tuple(
+        ClassMember(effect=each.effect, joint=each.joint, probability=each.probability) for each in claim.members
+    )
+    return entry.model_copy(update={"class_": members}) if members else entry
 
 
 def _finding_parameter(each: ParameterValue) -> ParameterEntry:

@@ -1,7 +1,7 @@
 """Torque from the motion of another joint, as motors that turn with two wrist joints have it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any, ClassVar, Self
 
@@ -26,7 +26,7 @@ from problem.arm import Arm
 JOINT_COUPLING_FACTS = Effect(
     "joint_coupling",
     "torque from the motion of another joint",
-    (VISCOUS_COEFFICIENT, COULOMB_LEVEL, Parameter("inertia", INERTIA)),
+    (replace(VISCOUS_COEFFICIENT, detail=True), replace(COULOMB_LEVEL, detail=True), Parameter("inertia", INERTIA)),
     law=(
         r"\Delta\tau_j = \text{coefficient} \; \dot{q}_k + \text{level} \; \operatorname{sgn}(\dot{q}_k + \dot "
         r"q_j) + \text{inertia} \; \ddot{q}_k"

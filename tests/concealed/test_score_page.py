@@ -44,7 +44,7 @@ UNEXPLAINED = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depen
         (
             COULOMB,
             verdict("mismatch", (finding("stribeck_friction", 2, rivals=("coulomb_friction",)),)),
-            ["class", "wrong claim"],
+            ["class"],
         ),
         (COULOMB, verdict(), ["missed"]),
         (COULOMB, MISSING_VERDICT, ["missed"]),

@@ -18,6 +18,7 @@ from armlab.concealed.score.measures import (
     confusion_table,
     detection_table,
     effect_table,
+    engine_table,
 )
 from armlab.concealed.score.rows import ScoreRows, make_rows
 
@@ -122,8 +123,48 @@ def test_unknown_is_right_for_an_effect_outside_and_false_where_nothing_is() -> 
     assert categorize_finding(judged(OUTSIDE, said), said["findings"][0]) == "injected"
     assert categorize_finding(judged(NULL, said), said["findings"][0]) == "unknown"
     assert measured(scored((NULL, said)), "false_claims_on_nulls").value == 1
-    listed = verdict("mismatch", unexplained=[{"joint": 1, "share": 0.5, "depends_on": ["position_1"]}])
-    assert measured(scored((OUTSIDE, listed)), "unknown_outside").value == 1
+
+
+@pytest.mark.parametrize(("unknown", "counts"), [(0.6, 1), (0.4, 0)])
+def test_unknown_counts_where_it_has_half_of_the_probability(unknown: float, counts: int) -> None:
+    members = [
+        {"effect": "coulomb_friction", "joint": 1, "probability": 1 - unknown},
+        {"effect": "unknown", "joint": 1, "probability": unknown},
+    ]
+    said = finding("coulomb_friction", 1) | {"probability": 1 - unknown, "class": members}
+    assert measured(scored((OUTSIDE, verdict("mismatch", (said,)))), "unknown_outside").value == counts
+
+
+def test_engines_are_compared_without_effects_that_one_of_them_lacks() -> None:
+    def told(engine: str, said: dict[str, Any], name: str = "coulomb_friction") -> tuple[Truth, dict[str, Any]]:
+        return truth(effect(name, 2)).model_copy(update={"engine": engine}), said
+
+    right = verdict("mismatch", (finding("coulomb_friction", 2),))
+    lost = told("mujoco", verdict(), "backlash")
+    table = engine_table(scored(told("sticking", right), told("mujoco", right), told("mujoco", verdict()), lost))
+    row = table[table["measure"].str.startswith("right name or class")].iloc[0]
+    assert (row["second engine"], row["MuJoCo"]) == ("1 of 1", "1 of 2")
+    assert not len(engine_table(scored(told("mujoco", right))))
+
+
+def test_a_class_is_no_wrong_claim_where_one_of_its_names_is_there() -> None:
+    said = finding("stribeck_friction", 2, rivals=("coulomb_friction",))
+    table = scored((COULOMB, verdict("mismatch", (said,))))
+    assert measured(table, "wrong_names_beyond_background").value == 0
+    alone = scored((COULOMB, verdict("mismatch", (finding("stribeck_friction", 2),))))
+    assert measured(alone, "wrong_names_beyond_background").value == 1
+
+
+def test_probabilities_are_held_against_how_often_they_are_right() -> None:
+    right = finding("coulomb_friction", 2) | {"probability": 0.8}
+    wrong = finding("stribeck_friction", 2) | {"probability": 0.6}
+    table = scored(*[(COULOMB, verdict("mismatch", (right,)))] * 4, (COULOMB, verdict("mismatch", (wrong,))))
+    assert measured(table, "right_when_likely").value == 1
+    assert measured(table, "right_when_doubtful").value == 0
+    assert measured(table, "right_when_sure").number == 0
+    base = 0.8 * 0.2
+    brier = (4 * 0.2**2 + 0.6**2) / 5
+    assert measured(table, "brier_skill").value == pytest.approx(1 - brier / base)
 
 
 def test_intervals_that_miss_the_truth_are_counted() -> None:

@@ -91,7 +91,7 @@ def test_the_shipped_schema_of_answers_is_that_of_the_model():
 @pytest.mark.parametrize(("seed", "lines"), [(1990, 0), (judged_seed("a" * 40), 1)])
 def test_a_judged_set_is_logged_once_and_one_for_development_is_not(tmp_path, monkeypatch, seed, lines):
     monkeypatch.setattr(sealed_set, "JUDGED_LOG", tmp_path / "log.jsonl")
-    monkeypatch.setattr(sealed_set, "head_commit", lambda: "a" * 40)
+    monkeypatch.setattr(sealed_set, "code_commit", lambda: "a" * 40)
     for _ in range(2):
         list(prove.prove_motion(prove.MotionSet(0, 0, seed), tmp_path / "work", tmp_path / "results", 1))
     logged = (tmp_path / "log.jsonl").read_text().splitlines() if lines else []

@@ -36,7 +36,7 @@ from armlab.diagnosis.report.torque_pictures import evidence_variable
 from armlab.diagnosis.report.verdict import first_screen, gain_sentence, verdict_lines
 from armlab.diagnosis.report.words import effect_in_words, format_gap, format_measured, format_share, shorten_name
 from armlab.diagnosis.report.write import report_texts, write_report
-from armlab.diagnosis.result import Diagnosis, Rival, Unexplained
+from armlab.diagnosis.result import Diagnosis, Member, Rival, Unexplained
 from armlab.diagnosis.verdict_files import verdict_texts
 from armlab.effects.contract import Effect
 from armlab.effects.friction import CoulombFriction
@@ -341,11 +341,14 @@ def test_on_paper_the_page_is_short_until_its_details(browser: Any, address: str
 
 
 def test_rivals_say_why_they_cannot_be_told_and_what_would_tell_them(found: Diagnosis) -> None:
-    rivals = (Rival("rotor_inertia", 1, (1,), identical=True), Rival("cable_stiffness", 2, (2,), deficit=0.7))
-    claim = replace(found.claims[0], rivals=rivals, next_experiment="weigh the link")
+    rivals = (Rival("rotor_inertia", 1, (1,), identical=True), Rival("cable_stiffness", 2, (2,)))
+    members = (Member("cable_stiffness", 2, (2,), 0.31), Member("unknown", 1, (1,), 0.07))
+    first = found.claims[0]
+    claim = replace(first, rivals=rivals, members=members, probability=0.62, next_experiment="weigh the link")
     page = re.sub(r"</?a\b[^>]*>", "", report_texts(replace(found, claims=(claim,)))["report.html"])
     assert f"rotor inertia at {escape(f'j0{HOSTILE}')}: no motion of that joint alone can tell the two apart" in page
-    assert f"cable stiffness at {escape(f'j1{HOSTILE}')}: on this very motion it fits as well (0.7 units" in page
+    assert f"cable stiffness at {escape(f'j1{HOSTILE}')}: probability 0.31" in page
+    assert "Probability of the name: 0.62" in page
     assert "To tell: weigh the link." in page
 
 

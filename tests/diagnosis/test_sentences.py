@@ -135,7 +135,7 @@ def test_other_findings_are_counted_and_what_is_unknown_is_told() -> None:
     assert findings_in_sentences(found, SIMULATION, 1) == (
         "The simulation of irb120-arm lacks backlash of 0.500 rad at joint 3. "
         "The torque of joint 1 has a constant part that the simulation does not have: 0.500 N m (0.4 to 0.6); "
-        "encoder offset fits as well. There is 1 more finding. "
+        "or it is encoder offset. There is 1 more finding. "
         "Something that no known effect explains acts at joints 1 and 3."
     )
 

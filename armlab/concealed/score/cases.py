@@ -17,6 +17,7 @@ from armlab.concealed.formats import LinkDeviation, TrueEffect, Truth, read_mode
 
 FAILURE_FILE = "failed.txt"  # in the place of a verdict: the error message of a diagnosis that failed
 TIME_FILE = "time.json"  # beside a verdict: how long the diagnosis took; written last, when the verdict is complete
+UNKNOWN_NAME = "unknown"  # of a finding without a name
 VALID_STATUSES = ("mismatch", "none", "inconclusive")
 MISSING_VERDICT: dict[str, Any] = {"status": "invalid", "findings": [], "unexplained": [], "fit": []}
 
@@ -49,8 +50,16 @@ class JudgedCase:
     @property
     def says_unknown(self) -> bool:
         """True if the verdict says that something is there that it cannot name."""
-        named = any(finding["effect"] == "unknown" for finding in self.findings)
+        named = any(finding["effect"] == UNKNOWN_NAME for finding in self.findings)
         return named or bool(self.verdict["unexplained"])
+
+    @property
+    def unknown_probability(self) -> float:
+        """The largest probability that a finding is none of the names; 1 for one without any probability."""
+        unknown = [each.get("probability", 1.0) for each in self.findings if each["effect"] == UNKNOWN_NAME]
+        members = (member for each in self.findings for member in each.get("class") or [])
+        unknown += [member["probability"] for member in members if member["effect"] == UNKNOWN_NAME]
+        return float(max(unknown, default=0.0))
 
 
 def read_cases(folder: Path, verdicts: Path, names: Sequence[str]) -> list[JudgedCase]:
@@ -111,6 +120,7 @@ def _read_seconds(folder: Path) -> float | None:
 
 
 Category = Literal["injected", "background", "identical", "misplaced", "unknown", "wrong"]
+RIGHT_CATEGORIES: tuple[Category, ...] = ("injected", "background", "identical")
 CONTAINED_EFFECTS = {  # what the law of an effect holds as a part
     "stribeck_friction": ("coulomb_friction", "viscous_friction"),
     "asymmetric_friction": ("coulomb_friction", "torque_offset", "viscous_friction"),
@@ -131,7 +141,7 @@ DELAY_LIKE_EFFECTS = ("viscous_friction",)
 def categorize_finding(case: JudgedCase, finding: dict[str, Any]) -> Category:
     """The category of one finding of a case; see the module."""
     truth, name = case.truth, finding["effect"]
-    if name == "unknown":
+    if name == UNKNOWN_NAME:
         return "injected" if any(effect.outside for effect in truth.injected) else "unknown"
     if any(is_same_effect(finding, effect) for effect in truth.injected):
         return "injected"

@@ -16,6 +16,7 @@ from armlab.concealed.score.measures import (
     detection_table,
     detection_table_by_effect,
     effect_table,
+    reliability_table,
 )
 from armlab.concealed.score.rows import ScoreRows
 
@@ -219,7 +220,7 @@ def _draw_grid_lines(axes: Any, rows: list[str], columns: list[str]) -> None:
     axes.axvline(sum(each in LIBRARY_NAMES for each in columns) - 0.5, color=BLACK, lw=1)
 
 
-FIGURES_OF_ALL_TIERS = ("gap", "seconds", "detection", "detection_by_effect")  # both tiers in one figure
+FIGURES_OF_ALL_TIERS = ("gap", "seconds", "reliability", "detection", "detection_by_effect")  # both tiers in one figure
 FIGURES_OF_ONE_TIER = ("confusion_{}", "confusion_{}_all", "names_{}")
 LINE_STYLES = {"clean": "-", "realistic": "--"}
 
@@ -232,6 +233,8 @@ def draw_figures(rows: ScoreRows, folder: Path) -> list[Path]:
     drawn = [save_figure(_draw_seconds(rows, tiers), folder / "seconds.svg")]
     if rows.cases["gap_closed"].notna().any():
         drawn.append(save_figure(_draw_gap(rows, tiers), folder / "gap.svg"))
+    if "probability" in rows.claims and rows.claims["probability"].notna().any():
+        drawn.append(save_figure(_draw_reliability(rows, tiers), folder / "reliability.svg"))
     if len(rows.effects):
         drawn.append(save_figure(draw_detection(rows, tiers), folder / "detection.svg"))
         drawn.append(save_figure(draw_detection_by_effect(rows), folder / "detection_by_effect.svg"))
@@ -253,6 +256,29 @@ def _draw_tier(rows: ScoreRows, tier: str, folder: Path) -> list[Path]:
     if len(names):
         drawn.append(save_figure(_draw_names(names, large), folder / f"names_{tier}.svg"))
     return drawn
+
+
+def _draw_reliability(rows: ScoreRows, tiers: list[str]) -> Any:
+    """Share of right claims against the probability that they state, in bins, a panel a tier."""
+    figure, panels = make_figure((4.4 * len(tiers), 4.0), columns=len(tiers), sharey=True)
+    for axes, tier in zip(np.atleast_1d(panels), tiers, strict=True):
+        table = reliability_table(rows, tier)
+        axes.plot([0, 1], [0, 1], color=GREY, linestyle=":")
+        axes.errorbar(
+            table["mean"],
+            table["share"],
+            yerr=[table["share"] - table["low"], table["high"] - table["share"]],
+            color=TIER_COLORS[tier],
+            marker=TIER_MARKERS[tier],
+            linestyle="none",
+            capsize=3,
+        )
+        for each in table.itertuples():
+            axes.annotate(f"{each.number}", (each.mean, each.share), (6, -10), textcoords="offset points", fontsize=8)
+        axes.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), xlabel="stated probability, mean of a bin")
+        axes.set_title(f"{tier} tier", fontsize=9)
+    np.atleast_1d(panels)[0].set_ylabel("share that is right")
+    return figure
 
 
 def _draw_gap(rows: ScoreRows, tiers: list[str]) -> Any:

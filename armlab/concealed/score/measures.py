@@ -7,8 +7,11 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+from scipy.stats import fisher_exact
 
+from armlab.common.arrays import Array
 from armlab.common.statistics import wilson_interval
+from armlab.concealed.score.cases import RIGHT_CATEGORIES
 from armlab.concealed.score.rows import ScoreRows
 
 CONFIDENCE_LEVEL = 0.95
@@ -21,7 +24,17 @@ WANTED_BOUNDS = {
     "at least 98 %": (0.98, 1.0),
     "90-98 %": (0.9, 0.98),
     "at least 0.9": (0.9, np.inf),
+    "above 0": (0.0, np.inf),
     "none": (0.0, 0.0),
+    "within 50-70 %": (0.5, 0.7),
+    "within 70-90 %": (0.7, 0.9),
+    "within 90-100 %": (0.9, 1.0),
+}
+WITHIN = "within "  # of a bound that the interval of a figure has to reach
+RELIABILITY_BINS = {  # of the stated probability: from, and below
+    "right_when_doubtful": (0.5, 0.7),
+    "right_when_likely": (0.7, 0.9),
+    "right_when_sure": (0.9, np.inf),
 }
 Unit = Literal["share", "s", ""]
 
@@ -53,6 +66,8 @@ class Measure:
         if not self.wanted or self.value is None:
             return None
         least, most = WANTED_BOUNDS[self.wanted]
+        if self.wanted.startswith(WITHIN) and self.low is not None and self.high is not None:
+            return least <= self.high and self.low <= most
         return least <= self.value <= most
 
     @property
@@ -77,8 +92,13 @@ MEASURE_TEXTS = {
     "false_claims_on_nulls": MeasureText("false claims on nulls", "at most 2 %"),
     "false_claims_on_decoys": MeasureText("false claims on decoys", "at most 2 %"),
     "false_unknown": MeasureText("unknown said on nulls and decoys"),
-    "wrong_names": MeasureText("wrong names among claims", "at most 5 %"),
-    "wrong_names_beyond_background": MeasureText("wrong names among claims beyond background"),
+    "wrong_names": MeasureText("wrong names among claims"),
+    "wrong_names_beyond_background": MeasureText("wrong names among claims beyond background", "at most 5 %"),
+    "right_when_doubtful": MeasureText("right among names of probability 0.5-0.7", "within 50-70 %"),
+    "right_when_likely": MeasureText("right among names of probability 0.7-0.9", "within 70-90 %"),
+    "right_when_sure": MeasureText("right among names of probability 0.9-1", "within 90-100 %"),
+    "brier_skill": MeasureText("Brier score of probabilities: share below that of the base rate", "above 0"),
+    "log_skill": MeasureText("log score of probabilities: share below that of the base rate", "above 0"),
     "misplaced": MeasureText("misplaced among claims"),
     "right_name_or_class": MeasureText(f"right name or class of four, {ABOVE}", "at least 90 %"),
     "right_name": MeasureText(f"right first name, {ABOVE}"),
@@ -107,13 +127,14 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
     large_outside = outside[outside["multiple"] > MIN_NAMED_MULTIPLE]
     named = inside[inside["named_first"].astype(bool)]
     classed = inside[inside["named_class"].astype(bool)]
-    beyond = claims[claims["category"] != "background"]
+    wrong, beyond = is_wrong_name(claims), claims["category"] != "background"
     return [
         share_measure("false_claims_on_nulls", nulls["false_claims"] > 0),
         share_measure("false_claims_on_decoys", decoys["false_claims"] > 0),
         share_measure("false_unknown", pd.concat([nulls, decoys])["false_unknown"]),
-        share_measure("wrong_names", claims["category"] == "wrong"),
-        share_measure("wrong_names_beyond_background", beyond["category"] == "wrong"),
+        share_measure("wrong_names", wrong),
+        share_measure("wrong_names_beyond_background", wrong[beyond]),
+        *reliability_measures(claims[beyond]),
         share_measure("misplaced", claims["category"] == "misplaced"),
         share_measure("right_name_or_class", large["named_class"]),
         share_measure("right_name", large["named_first"]),
@@ -129,6 +150,68 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
         longest_measure("seconds_longest", cases["seconds"]),
         share_measure("missing_verdicts", cases["status"] == "invalid"),
     ]
+
+
+def is_wrong_name(claims: pd.DataFrame) -> "pd.Series[bool]":
+    """Which claims are names, or classes of names, none of which is there."""
+    return (claims["category"] == "wrong") & ~claims["class_right"].astype(bool)
+
+
+def is_right_name(claims: pd.DataFrame) -> "pd.Series[bool]":
+    """Which claims have a first name that is there; `unknown` is right where an effect outside the library is."""
+    return claims["category"].isin(RIGHT_CATEGORIES)
+
+
+def reliability_measures(claims: pd.DataFrame) -> list[Measure]:
+    """How often claims are right of which a probability says how often they should be; claims without one are left out.
+
+    The base rate is the share of right names among the same claims.
+    """
+    stated = claims[claims["probability"].notna()]
+    chances, right = stated["probability"].to_numpy(dtype=np.float64), is_right_name(stated)
+    bins = RELIABILITY_BINS.items()
+    out = [share_measure(id, right[(chances >= low) & (chances < high)]) for id, (low, high) in bins]
+    hits = np.asarray(right, dtype=np.float64)
+    base = np.full(len(hits), np.mean(hits)) if len(hits) else hits
+    brier = skill_measure("brier_skill", (chances - hits) ** 2, (base - hits) ** 2)
+    return [*out, brier, skill_measure("log_skill", log_scores(chances, hits), log_scores(base, hits))]
+
+
+def reliability_table(rows: ScoreRows, tier: str) -> pd.DataFrame:
+    """A row a bin of the stated probability of claims beyond background: mean, share that is right, its interval."""
+    claims = rows.claims[(rows.claims["tier"] == tier) & (rows.claims["category"] != "background")]
+    stated = claims[claims["probability"].notna()]
+    chances, right = stated["probability"].astype(float), is_right_name(stated)
+    out = []
+    for low, high in ((0.0, 0.5), *RELIABILITY_BINS.values()):
+        own = (chances >= low) & (chances < high)
+        number, hits = int(own.sum()), int(right[own].sum())
+        if number:
+            ends = wilson_interval(hits, number, CONFIDENCE_LEVEL)
+            out.append((float(chances[own].mean()), hits / number, *ends, number))
+    return pd.DataFrame(out, columns=["mean", "share", "low", "high", "number"])
+
+
+LEAST_CHANCE = 1e-3  # of a log score: what never happened is no proof that it never will
+
+
+def log_scores(chances: Array, hits: Array) -> Array:
+    """The logarithm of the probability of what is true, negative, of each claim."""
+    bounded = np.clip(chances, LEAST_CHANCE, 1 - LEAST_CHANCE)
+    return np.asarray(-np.log(np.where(hits > 0, bounded, 1 - bounded)))
+
+
+def skill_measure(id: str, scores: Array, base: Array) -> Measure:
+    """The share by which the mean of scores, small ones good, is below that of a base; with a bootstrap interval."""
+    wanted, count = MEASURE_TEXTS[id].wanted, len(scores)
+    if not count or not np.any(base):
+        return Measure(id, None, None, None, count, wanted)
+    chosen = np.random.default_rng(0).integers(0, count, (1000, count))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        skills = 1 - np.mean(scores[chosen], axis=1) / np.mean(base[chosen], axis=1)
+    tail = (1 - CONFIDENCE_LEVEL) / 2
+    low, high = np.quantile(skills[np.isfinite(skills)], [tail, 1 - tail])
+    return Measure(id, float(1 - np.mean(scores) / np.mean(base)), float(low), float(high), count, wanted)
 
 
 def split_tier(effects: pd.DataFrame, tier: str) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -205,7 +288,8 @@ def _bin_shares(curves: Sequence[tuple[str, pd.DataFrame, str]], bins: tuple[flo
 def effect_table(rows: ScoreRows, tier: str) -> pd.DataFrame:
     """Share named above three limits and the number of wrong claims of each effect."""
     effects = rows.effects[rows.effects["tier"] == tier]
-    wrong = rows.claims[(rows.claims["tier"] == tier) & rows.claims["category"].isin(["wrong", "misplaced"])]
+    false = rows.claims["category"].isin(["wrong", "misplaced"]) & ~rows.claims["class_right"].astype(bool)
+    wrong = rows.claims[(rows.claims["tier"] == tier) & false]
     out = []
     for name in sorted(set(effects["effect"]) | set(wrong["effect"])):
         own = effects[effects["effect"] == name]
@@ -223,6 +307,46 @@ def effect_table(rows: ScoreRows, tier: str) -> pd.DataFrame:
     return pd.DataFrame(out, columns=["effect", "hidden", "above", "first", "class", "wrong_claims"])
 
 
+EFFECTS_WITH_PARTS = ("joint_elasticity", "backlash", "flexible_base", "slosh")  # of the first engine alone
+
+
+def engine_table(rows: ScoreRows) -> pd.DataFrame:
+    """What is wanted, of each tier, by the second engine and by the first one; empty without a case of the second.
+
+    Effects with parts of their own, and the cases that hide one, are left out.
+    """
+    if "engine" not in rows.cases or "sticking" not in set(rows.cases["engine"]):
+        return pd.DataFrame()
+    parted = rows.effects[rows.effects["effect"].isin(EFFECTS_WITH_PARTS)]["case"]
+    cases, effects, claims = (each[~each["case"].isin(parted)] for each in (rows.cases, rows.effects, rows.claims))
+    whole = replace(rows, cases=cases, effects=effects, claims=claims)
+    out = []
+    for tier in sorted(set(rows.cases["tier"])):
+        for name, flags in _compared_flags(whole, tier).items():
+            counts = [(int(each.astype(bool).sum()), len(each)) for each in (flags["sticking"], flags["mujoco"])]
+            chance = float(fisher_exact([[hits, number - hits] for hits, number in counts]).pvalue)
+            out.append([tier, name, *(f"{hits} of {number}" for hits, number in counts), chance])
+    return pd.DataFrame(out, columns=["tier", "measure", "second engine", "MuJoCo", "by chance"])
+
+
+def _compared_flags(rows: ScoreRows, tier: str) -> dict[str, dict[str, "pd.Series[Any]"]]:
+    """The flags behind each share that is compared, by engine."""
+    cases, claims = (each[each["tier"] == tier] for each in (rows.cases, rows.claims))
+    inside, outside = split_tier(rows.effects, tier)
+    nulls, beyond = cases[cases["kind"] == "null"], claims[claims["category"] != "background"]
+    large, large_outside = (each[each["multiple"] > MIN_NAMED_MULTIPLE] for each in (inside, outside))
+    frames = {
+        "false_claims_on_nulls": (nulls, nulls["false_claims"] > 0),
+        "wrong_names_beyond_background": (beyond, is_wrong_name(beyond)),
+        "right_name_or_class": (large, large["named_class"]),
+        "unknown_outside": (large_outside, large_outside["named_class"]),
+    }
+    return {
+        MEASURE_TEXTS[id].title: {engine: flags[frame["engine"] == engine] for engine in ("sticking", "mujoco")}
+        for id, (frame, flags) in frames.items()
+    }
+
+
 def confusion_table(rows: ScoreRows, tier: str, above: float = 0.0) -> pd.DataFrame:
     """Counts: what was hidden (rows) against what was said (columns); nulls and decoys in the last row.
 
@@ -230,7 +354,8 @@ def confusion_table(rows: ScoreRows, tier: str, above: float = 0.0) -> pd.DataFr
     """
     effects = rows.effects[(rows.effects["tier"] == tier) & (rows.effects["multiple"] > above)]
     empty = rows.cases[(rows.cases["tier"] == tier) & rows.cases["kind"].isin(["null", "decoy"])]
-    false = rows.claims[rows.claims["case"].isin(empty["case"]) & rows.claims["category"].isin(["wrong", "unknown"])]
+    wrong = rows.claims["category"].isin(["wrong", "unknown"]) & ~rows.claims["class_right"].astype(bool)
+    false = rows.claims[rows.claims["case"].isin(empty["case"]) & wrong]
     first = false.drop_duplicates("case").set_index("case")["effect"]
     silent = ["invalid" if status == "invalid" else "none" for status in empty["status"]]
     said = [str(first.get(case, what)) for case, what in zip(empty["case"], silent, strict=True)]

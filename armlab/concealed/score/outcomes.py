@@ -3,7 +3,7 @@
 Every hidden effect above three detection limits is in exactly one of the groups `named`, `class`, `missed`,
 `unknown` and `not unknown`, or, where its right name stands at a wrong joint, among the wrong claims. Every null and
 decoy is in one of `silent`, `false claim`, `false unknown` and `no verdict`; there a false claim is an item of its
-own. A class whose first name is wrong is a wrong claim too, as in the measures.
+own. A class is a wrong claim where none of its names is there, as in the measures.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,7 +39,6 @@ OUTCOME_GROUPS = {
     "no verdict": OutcomeGroup("Nothing hidden, and no verdict", False),
 }
 OUTCOME_COLUMNS = ["group", "case", "tier", "kind", "effect", "joint", "limits", "answered"]
-FALSE_CATEGORIES = ("wrong", "misplaced", "unknown")
 
 
 def list_outcomes(table: ScoreRows) -> pd.DataFrame:
@@ -52,7 +51,7 @@ def list_outcomes(table: ScoreRows) -> pd.DataFrame:
     for case in to_records(table.cases):
         about = {key: case[key] for key in ("case", "tier", "kind")}
         own = effects.get(case["case"], [])
-        false = [each for each in claims.get(case["case"], []) if each["category"] in FALSE_CATEGORIES]
+        false = [each for each in claims.get(case["case"], []) if not each["class_right"]]
         items = _outcomes_with_hidden(own, false) if own else _outcomes_without_hidden(case, false)
         rows += [about | item for item in items]
     return pd.DataFrame(rows, columns=OUTCOME_COLUMNS).astype({"joint": "Int64"})

@@ -7,11 +7,17 @@ import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.gallery import CASES_PER_GROUP, GALLERY_PAGE, tally_outcomes
-from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure, arm_table, effect_table
+from armlab.concealed.score.measures import (
+    MEASURE_TEXTS,
+    MIN_NAMED_MULTIPLE,
+    Measure,
+    arm_table,
+    effect_table,
+    engine_table,
+)
 from armlab.concealed.score.rows import ScoreRows
 
 STRICTER_MEASURES = {  # shown below the measure that is wanted: the same, counted more strictly
-    "wrong_names": "wrong_names_beyond_background",
     "gap_closed": "gap_closed_beyond_friction",
 }
 MAX_SHOWN_MISSES = 30
@@ -22,9 +28,14 @@ A *detection limit* is the size at which an oracle that knows the true law and t
 expected above {MIN_NAMED_MULTIPLE:g} limits. *Clean*: only the hidden effects differ from the simulation. *Realistic*:
 every link is 3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden. *Decoy*: only
 links are wrong. A *claim* is a finding. A claim of something that is there is right, friction of the background
-included. A claim whose first name is wrong is a wrong claim, even if the right name is among its rivals. Intervals are
-95 %: Wilson's for shares (as if the effects of a case were independent), bootstrap for medians. *Met*: the figure is as
-wanted. *Surely*: so is its whole interval (or, if not met, none of it). *Perhaps*: the interval crosses the bound."""
+included. A class is wrong where none of its answers is right. Intervals are 95 %: Wilson's for shares (as if the
+effects of a case were independent), bootstrap for medians. *Met*: the figure is as wanted; of a bin of probabilities,
+its interval reaches the bin. *Surely*: so is its whole interval (or, if not met, none of it). *Perhaps*: the interval
+crosses the bound."""
+HOW_ENGINES_ARE_COMPARED = (
+    "Cases of the engine whose joints stick beside those of MuJoCo, without effects that have parts of their own: the "
+    "second engine has none. *By chance*: probability of such a difference where both are alike (Fisher 1935)."
+)
 CAPTIONS = {
     "detection": "Size against share named. Bands: Wilson, 95 %; dotted: three limits.",
     "detection_by_effect": (
@@ -38,6 +49,10 @@ CAPTIONS = {
     "confusion_realistic": "The same, realistic tier ([all sizes](confusion_realistic_all.svg)).",
     "names_clean": "Names by effect. To the left: how often a name was claimed wrongly, at any size.",
     "names_realistic": "The same, realistic tier.",
+    "reliability": (
+        "How often a claim beyond background is right, against the probability that it states. Bars: Wilson, 95 %; the "
+        "number is that of the claims; on the line, probabilities hold."
+    ),
     "gap": (
         "Share of the gap to the true floor that was closed on held-out runs, case by case. Right: counted from a "
         "model that has plain friction already."
@@ -60,6 +75,9 @@ def render_page(table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, 
     parts += ["## Figures", *(f"{text}\n\n![{name}]({name}.svg)" for name, text in CAPTIONS.items() if name in drawn)]
     parts += ["## Misses, one by one", _misses_section(missed), "## All measures", _all_measures_table(tiers)]
     parts += ["## The cases", _frame_table(_count_kinds(table)), "## By arm", _frame_table(arm_table(table))]
+    engines = engine_table(table)
+    if len(engines):
+        parts += ["## Second engine", HOW_ENGINES_ARE_COMPARED, _frame_table(engines)]
     for tier in tiers:
         names = effect_table(table, tier)
         if len(names):
@@ -131,7 +149,8 @@ def _all_measures_table(tiers: dict[str, list[Measure]]) -> str:
 
 
 def _find_measure(measures: list[Measure], id: str) -> Measure:
-    return next(each for each in measures if each.id == id)
+    unknown = Measure(id, None, None, None, 0, MEASURE_TEXTS[id].wanted)  # of a score that is older than the measure
+    return next((each for each in measures if each.id == id), unknown)
 
 
 def _count_kinds(table: ScoreRows) -> pd.DataFrame:

@@ -7,11 +7,18 @@ from typing import Any
 import pandas as pd
 
 from armlab.concealed.formats import InjectedEffect, TrueEffect
-from armlab.concealed.score.cases import JudgedCase, categorize_finding, is_same_effect
+from armlab.concealed.score.cases import (
+    RIGHT_CATEGORIES,
+    UNKNOWN_NAME,
+    JudgedCase,
+    categorize_finding,
+    is_same_effect,
+)
 from armlab.concealed.score.held_out import measure_gap_closed
 
 MAX_CLASS_SIZE = 4
-KEY_COLUMNS = ["case", "tier", "kind"]
+MIN_UNKNOWN_PROBABILITY = 0.5  # of a finding that is counted as one without a name
+KEY_COLUMNS = ["case", "tier", "engine", "kind"]
 GAP_COLUMNS = ["gap_closed", "gap_closed_beyond_friction", "gap_source"]
 CASE_COLUMNS = [*KEY_COLUMNS, "arm", "noise", "status", "false_claims", "false_unknown", *GAP_COLUMNS, "seconds"]
 EFFECT_COLUMNS = [
@@ -29,9 +36,12 @@ EFFECT_COLUMNS = [
     "right_joint",
     "answered",
 ]
-CLAIM_COLUMNS = [*KEY_COLUMNS, "effect", "joint", "category", "class_size"]
+CLAIM_COLUMNS = [*KEY_COLUMNS, "effect", "joint", "category", "class_size", "class_right", "probability"]
 COMPARISON_COLUMNS = ["parameter", "truth", "value", "relative_error", "covered"]
 PARAMETER_COLUMNS = ["case", "tier", "effect", "joint", "hidden_as", *COMPARISON_COLUMNS]
+
+
+Name = tuple[str, int | None]  # effect, and joint from 1 or None for the whole robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +73,17 @@ def to_records(frame: pd.DataFrame) -> list[dict[str, Any]]:
 
 
 def _key_values(case: JudgedCase) -> dict[str, Any]:
-    return {"case": case.name, "tier": case.truth.tier, "kind": case.truth.kind}
+    return {"case": case.name, "tier": case.truth.tier, "engine": case.truth.engine, "kind": case.truth.kind}
 
 
 def _case_row(case: JudgedCase) -> dict[str, Any]:
-    categories = [categorize_finding(case, finding) for finding in case.findings]
+    claims = list(_claim_rows(case))
     gap = measure_gap_closed(case)
     return _key_values(case) | {
         "arm": case.truth.arm,
         "noise": case.truth.noise.kind,
         "status": case.verdict["status"],
-        "false_claims": sum(each in ("wrong", "misplaced", "unknown") for each in categories),
+        "false_claims": sum(not row["class_right"] for row in claims),
         "false_unknown": case.says_unknown and not case.truth.injected,
         "gap_closed": gap.closed,
         "gap_closed_beyond_friction": gap.beyond,
@@ -83,11 +93,12 @@ def _case_row(case: JudgedCase) -> dict[str, Any]:
 
 
 def _effect_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
+    says_unknown = case.unknown_probability >= MIN_UNKNOWN_PROBABILITY
     for effect in case.truth.injected:
         named = [each for each in case.findings if each["effect"] == effect.effect]
         named = named or _equivalent_findings(case, effect)
         in_class = [finding for finding in case.findings if _class_holds(finding, effect.effect)]
-        sizes = [1 + len(finding["rivals"]) for finding in in_class]
+        sizes = [len(class_names(finding)) for finding in in_class]
         right_joint = any(each["joint"] == effect.joint for each in named)
         yield _key_values(case) | {
             "arm": case.truth.arm,
@@ -97,8 +108,8 @@ def _effect_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
             "joint": effect.joint,
             "outside": effect.outside,
             "multiple": effect.multiple,
-            "named_first": case.says_unknown if effect.outside else bool(named),
-            "named_class": case.says_unknown if effect.outside else bool(named or in_class),
+            "named_first": says_unknown if effect.outside else bool(named),
+            "named_class": says_unknown if effect.outside else bool(named or in_class),
             "class_size": min(sizes) if sizes else None,
             "right_joint": right_joint if named and not effect.outside else None,
             "answered": _given_answer(case, effect),
@@ -112,10 +123,19 @@ def _equivalent_findings(case: JudgedCase, effect: InjectedEffect) -> list[dict[
     return parts if {each["effect"] for each in parts} == set(effect.equivalent) else []
 
 
+def class_names(finding: dict[str, Any]) -> list[Name]:
+    """The answers that a finding leaves open, its own first; that of a finding without a name is `unknown` alone."""
+    if finding["effect"] == UNKNOWN_NAME:
+        return [(UNKNOWN_NAME, finding["joint"])]
+    members = [*(finding.get("class") or []), *finding["rivals"]]
+    names = [(finding["effect"], finding["joint"]), *((each["effect"], each["joint"]) for each in members)]
+    return list(dict.fromkeys(names))
+
+
 def _class_holds(finding: dict[str, Any], effect: str) -> bool:
     """True for a class of at most four names with the right one among them."""
-    names = [finding["effect"], *(rival["effect"] for rival in finding["rivals"])]
-    return len(names) <= MAX_CLASS_SIZE and effect in names
+    names = class_names(finding)
+    return len(names) <= MAX_CLASS_SIZE and effect in [name for name, _ in names]
 
 
 def _given_answer(case: JudgedCase, effect: InjectedEffect) -> str:
@@ -133,12 +153,20 @@ def _given_answer(case: JudgedCase, effect: InjectedEffect) -> str:
 
 def _claim_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
     for finding in case.findings:
-        known = {"effect": finding["effect"], "joint": finding["joint"], "category": categorize_finding(case, finding)}
-        yield _key_values(case) | known | {"class_size": 1 + len(finding["rivals"])}
+        names = class_names(finding)
+        categories = [categorize_finding(case, {"effect": name, "joint": joint}) for name, joint in names]
+        yield _key_values(case) | {
+            "effect": finding["effect"],
+            "joint": finding["joint"],
+            "category": categories[0],
+            "class_size": len(names),
+            "class_right": len(names) <= MAX_CLASS_SIZE and any(each in RIGHT_CATEGORIES for each in categories),
+            "probability": finding.get("probability"),
+        }
 
 
 def _parameter_rows(case: JudgedCase) -> Iterator[dict[str, Any]]:
-    about = {key: value for key, value in _key_values(case).items() if key != "kind"}
+    about = {"case": case.name, "tier": case.truth.tier}
     hidden: dict[str, tuple[TrueEffect, ...]] = {
         "injected": case.truth.injected,
         "background": case.truth.background,

@@ -98,6 +98,32 @@ def simulate(arm: ServoArm, command: Array, period: float, first: Array) -> Arra
     return out
 
 
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """How an arm moved: position and velocity (steps + 1, joints), rad and rad/s; torque of the drives at half of each
+    step, (steps, joints), N m."""
+
+    position: Array
+    velocity: Array
+    torque: Array
+
+
+def follow(
+    arm: ServoArm, gravity: tuple[float, float, float], step_s: float, given: Array, first: tuple[Array, Array]
+) -> Followed:
+    """The motion of an arm whose drives add given torques (steps, joints), N m, to those of their kp and kd.
+
+    first: position and velocity (joints,). Raises ArithmeticError where a step has no solution.
+    """
+    steps, joints = given.shape
+    position, velocity, torque = np.empty((steps + 1, joints)), np.empty((steps + 1, joints)), np.empty((steps, joints))
+    asked = (np.ascontiguousarray(each, dtype=float) for each in (given, *first))
+    pointers = [ffi.from_buffer("double *", each) for each in (*asked, position, velocity, torque)]
+    if lib.follow(joints, _bodies(arm), _servos(arm), list(gravity), step_s, steps, *pointers) != 0:
+        raise ArithmeticError("a step of the arm has no solution: its mass matrix is not positive definite")
+    return Followed(position, velocity, torque)
+
+
 def mass_and_bias(arm: ServoArm, position: Array, velocity: Array) -> tuple[Array, Array]:
     """Mass matrix (joints, joints) without rotors, kg m2, and torques (joints,) of gravity and velocity, N m."""
     given = (np.ascontiguousarray(each, dtype=float) for each in (GRAVITY, position, velocity))

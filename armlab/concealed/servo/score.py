@@ -14,9 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.concealed.score.cases import read_complaint
+from armlab.common.settings import read_json
+from armlab.concealed.folders import SETTINGS_FILE
+from armlab.concealed.score.cases import UNKNOWN_NAME, read_complaint
+from armlab.concealed.score.weighed import WeighedFinding, check_development, read_names
 from armlab.concealed.sealed_set import Share
 
 MAX_CLASS = 4  # names
@@ -219,6 +223,7 @@ def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> 
 def _class_of(finding: dict[str, Any]) -> list[Name]:
     """The names that a finding leaves open, its own first."""
     others = [*(finding.get("class") or []), *finding.get("rivals", [])]
+    others = [each for each in others if each["effect"] != UNKNOWN_NAME]
     names = [(each["effect"], each["joint"]) for each in (finding, *others)]
     return list(dict.fromkeys(names))
 
@@ -254,6 +259,37 @@ def _compare(
         if name in true and interval is not None and np.ndim(interval) == 1 and interval[1] > interval[0]:
             low, high = interval
             yield Number(effect, name, low <= true[name] <= high, (reported["value"] - true[name]) / (high - low))
+
+
+def read_weighed_motion(work: Path) -> tuple[str, list[WeighedFinding]]:
+    """What a development set is, and the names that were weighed for the findings in it.
+
+    Raises InputError for a folder that holds no verdicts, and for a set that judges: nothing is learnt from it.
+    """
+    settings = read_json(work / SETTINGS_FILE)
+    check_development(settings["seed"], work)
+    cases = sorted(path.stem for path in (work / "truth").glob("*.json") if (work / "verdicts" / path.stem).is_dir())
+    if not cases:
+        raise InputError(f"{work} holds no verdicts: `armlab prove-motion --seed SEED --work {work}` makes them")
+    about = f"motion, seed {settings['seed']}: {len(cases)} cases"
+    return about, [each for case in cases for each in _weighed_findings(work, case, settings["seed"])]
+
+
+def _weighed_findings(work: Path, case: str, seed: int) -> Iterator[WeighedFinding]:
+    truth = json.loads((work / "truth" / f"{case}.json").read_text(encoding="utf-8"))
+    lacking = LACKING[truth["knowledge"]]
+    for names in read_names(work / "verdicts" / case):
+        own = [(each["effect"], each["joint"]) for each in names]
+        named = [name[0] != UNKNOWN_NAME for name in own]
+        right = [is_name and _is_true(name, truth, lacking) for name, is_name in zip(own, named, strict=True)]
+        likeliest = max(range(len(names)), key=lambda at: names[at]["probability"])
+        yield WeighedFinding(
+            case=f"{seed} {case}",
+            tier="motion",
+            names=tuple(each["numbers"] for each in names),
+            right=tuple(each if is_name else not any(right) for each, is_name in zip(right, named, strict=True)),
+            background=own[likeliest][0] in lacking,
+        )
 
 
 def _label(name: Name) -> str:

@@ -212,6 +212,45 @@ static double wanted(const ServoData *servo, double t, double hold, double phase
     return command[row * joints + joint] + servo->offset;
 }
 
+/* A step from q and v to the next ones under the torques tau, friction as a set. middle, speed: q and v at half of it.
+ * load: of the gears, for friction that grows with it. Returns 0, or -1 where the step has no end. */
+static int advance(int joints, const BodyData *body, const ServoData *servo, const double *gravity, double h,
+    const double *middle, const double *speed, const double *tau, double *q, double *v, double *before, double *load)
+{
+    double bias[MAX_JOINTS], b[MAX_JOINTS], level[MAX_JOINTS], next[MAX_JOINTS];
+    double M[MAX_JOINTS * MAX_JOINTS], A[MAX_JOINTS * MAX_JOINTS];
+    mass_and_bias(joints, body, gravity, middle, speed, M, bias);
+    for (int i = 0; i < joints; i++) {
+        const ServoData *own = servo + i;
+        double slip = own->stribeck_velocity > 0 ? speed[i] / own->stribeck_velocity : 0;
+        level[i] = own->friction + own->static_extra * exp(-slip * slip) + own->load_friction * fabs(load[i]);
+    }
+    for (int i = 0; i < joints; i++) {
+        M[i * joints + i] += servo[i].armature;
+        b[i] = h * (tau[i] - bias[i] - servo[i].damping * v[i] / 2);
+        for (int j = 0; j < joints; j++)
+            b[i] += M[i * joints + j] * v[j];
+        level[i] *= h;
+        next[i] = v[i];
+    }
+    memcpy(A, M, sizeof A);
+    for (int i = 0; i < joints; i++)
+        A[i * joints + i] += h * servo[i].damping / 2;
+    if (solve_friction(joints, A, b, level, next) < 0)
+        return -1;
+    for (int i = 0; i < joints; i++) {
+        double gear = bias[i] - servo[i].armature * (next[i] - v[i]) / h;
+        for (int j = 0; j < joints; j++)
+            gear += M[i * joints + j] * (next[j] - v[j]) / h;
+        load[i] = gear;
+    }
+    memcpy(before, v, joints * sizeof *v);
+    memcpy(v, next, joints * sizeof *v);
+    for (int i = 0; i < joints; i++)
+        q[i] = middle[i] + h / 2 * v[i];
+    return 0;
+}
+
 /* positions: (steps + 1, joints) out. position: the first one, at rest. Returns 0, or -1 where a step has no end. */
 int simulate(int joints, const BodyData *body, const ServoData *servo, const ArmData *arm, int64_t steps,
     int64_t commands, const double *command, const double *first, double *positions)
@@ -223,14 +262,12 @@ int simulate(int joints, const BodyData *body, const ServoData *servo, const Arm
     for (int i = 0; i < joints; i++)
         total += servo[i].limit;
     for (int64_t step = 0; step < steps; step++) {
-        double middle[MAX_JOINTS], speed[MAX_JOINTS], tau[MAX_JOINTS], bias[MAX_JOINTS], b[MAX_JOINTS];
-        double level[MAX_JOINTS], next[MAX_JOINTS], M[MAX_JOINTS * MAX_JOINTS], A[MAX_JOINTS * MAX_JOINTS];
+        double middle[MAX_JOINTS], speed[MAX_JOINTS], tau[MAX_JOINTS];
         double supply = 1 - arm->sag * used / total;
         for (int i = 0; i < joints; i++) {
             middle[i] = q[i] + h / 2 * v[i];
             speed[i] = 1.5 * v[i] - 0.5 * before[i];
         }
-        mass_and_bias(joints, body, arm->gravity, middle, speed, M, bias);
         used = 0;
         for (int i = 0; i < joints; i++) {
             const ServoData *own = servo + i;
@@ -251,33 +288,39 @@ int simulate(int joints, const BodyData *body, const ServoData *servo, const Arm
                 limit = fmax(limit - own->limit_slope * fabs(speed[i]), 0);
             tau[i] = clip(tau[i], limit);
             used += fabs(tau[i]);
-            double slip = own->stribeck_velocity > 0 ? speed[i] / own->stribeck_velocity : 0;
-            level[i] = own->friction + own->static_extra * exp(-slip * slip) + own->load_friction * fabs(load[i]);
         }
-        for (int i = 0; i < joints; i++) {
-            M[i * joints + i] += servo[i].armature;
-            b[i] = h * (tau[i] - bias[i] - servo[i].damping * v[i] / 2);
-            for (int j = 0; j < joints; j++)
-                b[i] += M[i * joints + j] * v[j];
-            level[i] *= h;
-            next[i] = v[i];
-        }
-        memcpy(A, M, sizeof A);
-        for (int i = 0; i < joints; i++)
-            A[i * joints + i] += h * servo[i].damping / 2;
-        if (solve_friction(joints, A, b, level, next) < 0)
+        if (advance(joints, body, servo, arm->gravity, h, middle, speed, tau, q, v, before, load) < 0)
             return -1;
-        for (int i = 0; i < joints; i++) {
-            double gear = bias[i] - servo[i].armature * (next[i] - v[i]) / h;
-            for (int j = 0; j < joints; j++)
-                gear += M[i * joints + j] * (next[j] - v[j]) / h;
-            load[i] = gear;
-        }
-        memcpy(before, v, sizeof v);
-        memcpy(v, next, joints * sizeof *v);
-        for (int i = 0; i < joints; i++)
-            q[i] = middle[i] + h / 2 * v[i];
         memcpy(positions + (step + 1) * joints, q, joints * sizeof *q);
+    }
+    return 0;
+}
+
+/* An arm whose drives add torques of kp and kd to given ones: tau = given - kp q - kd v, at half of each step.
+ *
+ * given, torques: (steps, joints), in and out. position, velocity: the first ones. positions: (steps + 1, joints) out,
+ * velocities: the same. Returns 0, or -1 where a step has no end. */
+int follow(int joints, const BodyData *body, const ServoData *servo, const double *gravity, double h, int64_t steps,
+    const double *given, const double *position, const double *velocity, double *positions, double *velocities,
+    double *torques)
+{
+    double q[MAX_JOINTS], v[MAX_JOINTS], before[MAX_JOINTS], load[MAX_JOINTS] = {0};
+    memcpy(q, position, joints * sizeof *q);
+    memcpy(v, velocity, joints * sizeof *v);
+    memcpy(before, velocity, joints * sizeof *v);
+    memcpy(positions, q, joints * sizeof *q);
+    memcpy(velocities, v, joints * sizeof *v);
+    for (int64_t step = 0; step < steps; step++) {
+        double middle[MAX_JOINTS], speed[MAX_JOINTS], *tau = torques + step * joints;
+        for (int i = 0; i < joints; i++) {
+            middle[i] = q[i] + h / 2 * v[i];
+            speed[i] = 1.5 * v[i] - 0.5 * before[i];
+            tau[i] = given[step * joints + i] - servo[i].kp * middle[i] - servo[i].kd * speed[i];
+        }
+        if (advance(joints, body, servo, gravity, h, middle, speed, tau, q, v, before, load) < 0)
+            return -1;
+        memcpy(positions + (step + 1) * joints, q, joints * sizeof *q);
+        memcpy(velocities + (step + 1) * joints, v, joints * sizeof *v);
     }
     return 0;
 }

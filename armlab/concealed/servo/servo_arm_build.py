@@ -23,6 +23,9 @@ void mass_and_bias(int joints, const BodyData *body, const double *gravity, cons
     double *mass, double *bias);
 int simulate(int joints, const BodyData *body, const ServoData *servo, const ArmData *arm, int64_t steps,
     int64_t commands, const double *command, const double *first, double *positions);
+int follow(int joints, const BodyData *body, const ServoData *servo, const double *gravity, double h, int64_t steps,
+    const double *given, const double *position, const double *velocity, double *positions, double *velocities,
+    double *torques);
 """
 
 ffibuilder = cffi.FFI()

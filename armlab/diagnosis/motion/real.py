@@ -15,7 +15,7 @@ from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion
 from armlab.diagnosis.motion.peer import NO_FIELD, PeerComparison, compare_with_sysid, import_sysid
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay, tool_rms
 from armlab.diagnosis.motion.servo import KEYS, PARAMETERS, Servos, place
-from armlab.diagnosis.motion.words import current_phrase, finding_phrase, summary_of
+from armlab.diagnosis.motion.words import current_phrase, finding_phrases, summary_of
 from armlab.recordings.motion import MotionRecording, load_motion_recording
 from armlab.recordings.public_motion import SO101_CONTACT, XL330_GAINS, fetch_motion_recording
 
@@ -41,7 +41,7 @@ def bench_real_motion(
     alone = _replay_one_gain(diagnosis)
     lines = [
         summary_of(diagnosis),
-        *(finding_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.findings),
+        *finding_phrases(diagnosis),
         *(current_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.currents),
     ]
     table = _replay_table(diagnosis, alone)
@@ -64,7 +64,7 @@ def bench_real_motion(
         f"Held out: {_held_out(diagnosis)}. Left out before any fit, as contact: {_contact()}. "
         f"{diagnosis.seconds:.0f} s for the diagnosis.",
         summary_of(diagnosis),
-        "\n".join(f"- {finding_phrase(diagnosis.recording.recorded_arm, each)}" for each in diagnosis.findings),
+        "\n".join(f"- {each}" for each in finding_phrases(diagnosis)),
         "The current is that of the supply, without sign; it took no part in the diagnosis.",
         "\n".join(f"- {current_phrase(diagnosis.recording.recorded_arm, each)}" for each in diagnosis.currents),
         "Root mean square of simulated minus measured position on the held-out runs, mrad; at the tool mm. Whole arm, "

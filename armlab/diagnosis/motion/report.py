@@ -9,7 +9,7 @@ from armlab.common.report.page import Table, render_page
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis
 from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
-from armlab.diagnosis.motion.words import current_phrase, finding_phrase, finding_with_numbers, summary_of
+from armlab.diagnosis.motion.words import current_phrase, finding_phrases, finding_with_numbers, summary_of
 from armlab.effects.library import effect_named
 from problem.joint_words import joint_at_start, joint_in_table
 
@@ -35,7 +35,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         tool=_tool_text(diagnosis),
         replayed=pictures[shown : shown + 1],
         pictures=[*pictures[:shown], *pictures[shown + 1 :]],
-        findings=[finding_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.findings],
+        findings=finding_phrases(diagnosis),
         currents=[current_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.currents],
         numbers=_number_table(diagnosis) if known else None,
         missing=_missing_fields(diagnosis),

@@ -11,6 +11,7 @@ import yaml
 from armlab.common.errors import InputError
 from armlab.diagnosis.formats import (
     VERDICT_SCHEMA,
+    ClassMember,
     CurrentEntry,
     FindingEntry,
     FitEntry,
@@ -26,10 +27,14 @@ from armlab.diagnosis.formats import (
 from armlab.diagnosis.motion import servo_plugin
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.export import lines_without_field, mjcf_text, servos_json
+from armlab.diagnosis.motion.naming import servo_naming, weigh_servo
 from armlab.diagnosis.motion.robot_learning import isaac_lab_text, mjlab_text
 from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.words import summary_of
+from armlab.diagnosis.naming.names_file import names_texts
+from armlab.diagnosis.tuning import NamingTuning
+from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from problem.robot_file import built_in_arms
 
@@ -39,7 +44,9 @@ IN_COMPONENTS = ("viscous_friction", "coulomb_friction", "rotor_inertia", "load_
 
 def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
     """All files of the verdict but the report, as they are to stand in a folder."""
+    last = len(diagnosis.chosen)
     texts = {"verdict.json": make_motion_verdict(diagnosis).to_json()}
+    texts |= names_texts([weigh_servo(each, last) for each in diagnosis.findings])
     if diagnosis.servos is not None:
         simulation, servos = diagnosis.simulation, diagnosis.servos
         step = float(simulation.model().opt.timestep)
@@ -115,13 +122,20 @@ def _finding(each: ServoFinding, share: float, last: int) -> FindingEntry:
     parameter = ParameterEntry(
         value=each.value, ci95=(float(each.interval[0]), float(each.interval[1])), unit=each.parameter.unit
     )
-    return FindingEntry(
-        effect=each.effect,
-        kind=kind_of_effect(effect_named(each.effect)),
+    naming = servo_naming(each, last)
+    members = [
+        ClassMember(effect=member.effect, joint=member.joint, probability=member.probability)
+        for member in naming.members(NamingTuning())
+    ]
+    effect = UNKNOWN.id if naming.is_unknown else each.effect
+    entry = FindingEntry(
+        effect=effect,
+        kind=kind_of_effect(effect_named(effect)),
         joint=each.joint,
         joints=(each.joint,),
-        form=each.name if each.effect == "controller_gain_error" else None,
-        parameters={each.name: parameter},
+        form=each.name if effect == "controller_gain_error" else None,
+        parameters={} if naming.is_unknown else {each.name: parameter},
+        probability=naming.probability_of(effect, each.joint),
         equation=each.equation,
         heldout_rms_before=each.before,
         heldout_rms_after=each.after,
@@ -132,6 +146,7 @@ def _finding(each: ServoFinding, share: float, last: int) -> FindingEntry:
         ),
         next_experiment=(each.parameter.experiment or effect_named(each.effect).experiment) if each.rivals else None,
     )
+    return entry.model_copy(update={"class_": tuple(members)}) if members else entry
 
 
 def _unexplained(diagnosis: MotionDiagnosis) -> tuple[UnexplainedEntry, ...]:

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from armlab.common.report.numbers import format_unit
 from armlab.common.report.words import join_words
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
+from armlab.diagnosis.motion.naming import servo_naming
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.witness import CurrentWitness
-from armlab.diagnosis.report.words import LESS_MASS
+from armlab.diagnosis.report.words import LESS_MASS, format_chance
 from armlab.effects.library import effect_named
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words
@@ -113,19 +114,24 @@ def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
     """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint."""
     arm = diagnosis.recording.recorded_arm
     yield f"{diagnosis.status.upper()}: {summary_of(diagnosis)}"
-    for each in diagnosis.findings:
-        yield f"  {finding_phrase(arm, each)}"
+    yield from (f"  {each}" for each in finding_phrases(diagnosis))
     for error in diagnosis.errors:
         yield f"  {error_phrase(arm, error)}"
     for current in diagnosis.currents:
         yield f"  {current_phrase(arm, current)}"
 
 
-def finding_phrase(arm: Arm, finding: ServoFinding) -> str:
-    """A finding in one line. arm: with the joints of the recording."""
+def finding_phrases(diagnosis: MotionDiagnosis) -> list[str]:
+    """Each finding in one line, with the probability of its name."""
+    arm, last = diagnosis.recording.recorded_arm, len(diagnosis.chosen)
+    return [_finding_phrase(arm, each, last) for each in diagnosis.findings]
+
+
+def _finding_phrase(arm: Arm, finding: ServoFinding, last: int) -> str:
     rivals = " or ".join(effect_named(each).words for each in finding.rivals)
     also = f"; it could also be {rivals}" if rivals else ""
-    return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}{also}"
+    chance = format_chance(servo_naming(finding, last).probability_of(finding.effect, finding.joint))
+    return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}; probability of the name {chance}{also}"
 
 
 def finding_with_numbers(finding: ServoFinding) -> str:

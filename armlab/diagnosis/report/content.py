@@ -12,6 +12,7 @@ from armlab.common.report.words import join_words
 from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.diagnosis.report.words import (
+    chance_at_start,
     compared_in_words,
     effect_in_words,
     finding_in_words,
@@ -20,11 +21,12 @@ from armlab.diagnosis.report.words import (
     format_probability,
     format_share,
     joint_unit,
+    member_in_words,
     parameter_rows,
     rival_in_words,
     variable_in_words,
 )
-from armlab.diagnosis.result import Claim, Diagnosis, Rival
+from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.story import claims_by_share, tell_story
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
@@ -45,7 +47,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class FindingDetail:
-    """One finding. share: of the error that it explains. picture: its evidence."""
+    """One finding. share: of the error that it explains. picture: its evidence. chance: how probable its name is."""
 
     title: str
     share: str
@@ -55,6 +57,7 @@ class FindingDetail:
     picture: Markup
     numbers: Table
     gain: str
+    chance: str
     rivals: Sequence[str]
     next_experiment: str
 
@@ -178,7 +181,8 @@ def _finding_detail(diagnosis: Diagnosis, claim: Claim, picture: Markup, share: 
         picture=picture,
         numbers=parameter_table(claim),
         gain=gain,
-        rivals=[_rival_text(arm, each) for each in claim.rivals],
+        chance=chance_at_start(claim),
+        rivals=_rival_texts(arm, claim),
         next_experiment=claim.next_experiment or "",
     )
 
@@ -197,13 +201,13 @@ def parameter_table(claim: Claim) -> Table:
     return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3))
 
 
-def _rival_text(arm: Arm, each: Rival) -> str:
-    why = (
-        "no motion of that joint alone can tell the two apart; armlab next says whether one of the whole arm can"
-        if each.identical
-        else f"on this very motion it fits as well ({format_number(each.deficit)} units of log likelihood worse)"
-    )
-    return f"{rival_in_words(arm, each)}: {why}"
+def _rival_texts(arm: Arm, claim: Claim) -> list[str]:
+    """What else a finding may be, with probabilities, and what no motion tells from it."""
+    same = [each for each in claim.rivals if each.identical]
+    others = [each for each in claim.members if not each.is_of(claim.effect, claim.joint)]
+    chances = [f"{member_in_words(arm, each)}: probability {each.probability:.2f}" for each in others]
+    why = "no motion of that joint alone can tell the two apart; armlab next says whether one of the whole arm can"
+    return [*chances, *(f"{rival_in_words(arm, each)}: {why}" for each in same)]
 
 
 def unexplained_lines(diagnosis: Diagnosis) -> list[str]:

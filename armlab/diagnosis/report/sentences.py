@@ -56,7 +56,7 @@ def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most:
 def _differing_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
     """One effect where it was found, with its numbers; of several places without intervals."""
     rivals = rivals_in_words(claims[0])
-    also = f"; {rivals} fits as well" if rivals else ""
+    also = f"; or it is {rivals}" if rivals else ""
     if len(claims) == 1:
         return finding_sentence(claims[0], simulation) + also
     ordered = sorted(claims, key=lambda each: each.joint or 0)

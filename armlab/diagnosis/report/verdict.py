@@ -17,6 +17,7 @@ from armlab.diagnosis.report.residuals import (
 )
 from armlab.diagnosis.report.sentences import claim_figures, findings_in_sentences, model_in_words
 from armlab.diagnosis.report.words import (
+    chance_in_words,
     compared_in_words,
     finding_in_words,
     format_fixed,
@@ -237,9 +238,11 @@ def _claim_lines(number: int, claim: Claim, share: float, simulation: Simulation
     where, growth = joint_in_words(arm, evidence.joint + 1), format_growth(evidence.rms_before, evidence.rms_after)
     probability = format_probability(evidence.corrected)
     gain = f"{format_share(share)} of the error; without it the held-out error of {where} is {growth}; p {probability}"
-    yield from (f"     {line}" for line in wrap(gain, LINE_WIDTH - 5))
-    rivals = ", ".join(rival_in_words(arm, each) for each in claim.rivals)
-    if rivals:
-        yield from (f"     {line}" for line in wrap(f"fits as well: {rivals}", LINE_WIDTH - 5))
+    chance = chance_in_words(arm, claim)
+    whole = f"{gain}; {chance}" if chance else gain
+    yield from (f"     {line}" for line in wrap(whole, LINE_WIDTH - 5))
+    same = ", ".join(rival_in_words(arm, each) for each in claim.rivals if each.identical)
+    if same:
+        yield from (f"     {line}" for line in wrap(f"no such motion tells it from {same}", LINE_WIDTH - 5))
     if claim.next_experiment:
         yield from (f"     {line}" for line in wrap(f"to tell: {claim.next_experiment}", LINE_WIDTH - 5))

@@ -8,7 +8,7 @@ from string import Formatter
 import numpy as np
 
 from armlab.common.report.numbers import format_number, format_unit
-from armlab.diagnosis.result import Claim, Rival
+from armlab.diagnosis.result import Claim, Member, Rival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import UNKNOWN
@@ -51,6 +51,34 @@ def finding_in_words(arm: Arm, claim: Claim) -> str:
 def rival_in_words(arm: Arm, rival: Rival) -> str:
     """An effect that fits as well, with its place."""
     return _at_place(arm, effect_in_words(rival.effect), rival)
+
+
+def chance_in_words(arm: Arm, claim: Claim) -> str:
+    """How probable the name of a finding is, and what else it may be; empty where that was not weighed."""
+    if claim.probability is None:
+        return ""
+    others = [each for each in claim.members if not each.is_of(claim.effect, claim.joint)]
+    also = [f"{member_in_words(arm, each)} {each.probability:.2f}" for each in others]
+    what = "that no effect of the library is it" if claim.effect == UNKNOWN.id else "of the name"
+    return f"probability {what} {format_chance(claim.probability)}" + (f"; or {', '.join(also)}" if also else "")
+
+
+def member_in_words(arm: Arm, member: Member) -> str:
+    """A name that a finding may have, with its place."""
+    return SOMETHING_UNKNOWN if member.effect == UNKNOWN.id else rival_in_words(arm, member.as_rival)
+
+
+def chance_at_start(claim: Claim) -> str:
+    """The probability of a finding, at the start of a line; empty where it was not weighed."""
+    if claim.probability is None:
+        return ""
+    what = "that no effect of the library is it" if claim.effect == UNKNOWN.id else "of the name"
+    return f"Probability {what}: {format_chance(claim.probability)}"
+
+
+def format_chance(value: float) -> str:
+    """A probability with two digits, never 1."""
+    return "above 0.99" if value > 0.99 else f"{value:.2f}"
 
 
 def _at_place(arm: Arm, name: str, claim: Claim | Rival) -> str:

@@ -13,6 +13,7 @@ from armlab.common.files import write_texts
 from armlab.common.report.page import render_page
 from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.naming.names_file import names_texts
 from armlab.diagnosis.report import content, measured
 from armlab.diagnosis.report.gallery import Gallery, draw_gallery
 from armlab.diagnosis.report.residuals import select_residuals
@@ -133,7 +134,7 @@ def diagnose_recording(
     options += [word for form in dict.fromkeys(tables) for word in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
-    texts: dict[str, str | bytes] = {**pages, **predicted_texts(diagnosis)}
+    texts: dict[str, str | bytes] = {**pages, **names_texts(diagnosis.weighed), **predicted_texts(diagnosis)}
     if diagnosis.claims:
         texts |= table_files("joints", measured.joint_table(diagnosis), tables)
     moved = None

@@ -1,0 +1,230 @@
+"""How far could anyone get? An oracle that knows all laws, of the library and outside it, and names hidden effects.
+
+The oracle of detection limits knows the law and asks whether it is there. This one knows the noise, the motion and
+every law, and asks which it is. With s the whitened torque of a hidden effect and u that of another law, both without
+what free columns explain, the other law of the size that fits best leaves
+
+    d^2 = |s|^2 - (s . u)^2 / |u|^2
+
+of the effect. Twice the expected difference of log likelihoods is d^2, its standard deviation d, so that the oracle
+prefers the right law with the probability Phi(d / 2), Phi the normal distribution. With its rivals ordered by d, it has
+the right name with the probability that it prefers it to all of them, and the right class of four where it prefers it
+to all but three; the comparisons are taken as independent.
+
+The numbers of another law are sought: many draws as a set has them, then steps about the best. A law of a link may be
+any sum of draws, because its parameters are linear. Laws with parts of their own act on motions of their own.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from armlab.common.arrays import Array
+from armlab.concealed.effects.hidden import HiddenEffect
+from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.engine import Track
+from armlab.concealed.outside import OUTSIDE
+from armlab.concealed.plan import Plan
+from armlab.concealed.score.cases import CONTAINED_EFFECTS
+from armlab.concealed.simulate import (
+    Controller,
+    arm_with_effects,
+    coarse_track,
+    draw_controller,
+    effect_torque,
+    law_torque,
+    reference_track,
+    simulate_runs,
+)
+from armlab.concealed.sizing import (
+    Oracle,
+    SimulatedCase,
+    companion_columns,
+    identification_tracks,
+    limit_noncentrality,
+    make_oracle,
+    oracle_grid,
+)
+
+LOOKS, LINK_DRAWS = 3, 12  # draws at every place, and where the sum of draws counts
+SOUGHT, DRAWS, STEPS, ROUNDS = 6, 12, 8, 2  # laws that are sought further, by draws and by rounds of steps
+STEP_SHARE = 0.3  # of a number, standard deviation of a step about the best draw
+HELD_NUMBERS = ("from", "direction", "run")  # of a law's shape, which are no quantities
+CLASS_SIZE = 4
+
+
+@dataclass(frozen=True)
+class OracleAnswer:
+    """What the oracle says of one hidden effect. multiple: its size in detection limits.
+
+    rival: the law that is hardest to tell from it, at its place (from 1, None for the whole arm), and distance: d.
+    right_name, right_class: probabilities.
+    """
+
+    case: str
+    tier: str
+    effect: str
+    form: str
+    joint: int | None
+    outside: bool
+    multiple: float
+    rival: str
+    rival_joint: int | None
+    distance: float
+    right_name: float
+    right_class: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Bench:
+    """Where laws are compared: coarse tracks of a case, and rows without what is free.
+
+    others: effects beside the one that is asked. basis: further free rows, orthonormal.
+    """
+
+    plan: Plan
+    controller: Controller
+    wanted: Sequence[Track]
+    tracks: Sequence[Track]
+    others: tuple[HiddenEffect, ...]
+    oracle: Oracle
+    beside: Sequence[Array] | None
+
+    def rows(self, effect: HiddenEffect) -> Array:
+        """Whitened rows of an effect of any law, free columns projected out."""
+        hidden = tuple(each for each in self.others if each not in self.plan.background)
+        tracks = self.tracks
+        if effect.has_parts:
+            played = simulate_runs(self.plan, (*hidden, effect), self.controller, self.wanted, self.wanted)
+            tracks = identification_tracks(self.plan, played)
+        arms = arm_with_effects(self.plan, (*hidden, effect)), arm_with_effects(self.plan, hidden)
+        torque = [
+            effect_torque(effect, self.others, arms, track, run, oracle_grid(track)) for run, track in enumerate(tracks)
+        ]
+        return self.oracle.rows_without_free(torque, self.beside)
+
+
+def ask_oracle(case: SimulatedCase, least: float) -> Iterator[OracleAnswer]:
+    """What the oracle says of each hidden effect of a case. least: detection limits; smaller effects are left out."""
+    for number, multiple in enumerate(case.multiples):
+        if multiple > least:
+            yield _ask(case, number)
+
+
+def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
+    effect, plan = case.hidden[number], case.plan
+    bench = _make_bench(case, number)
+    own = bench.rows(effect)
+    power = case.multiples[number] ** 2 * limit_noncentrality(plan.machine.joints)
+    own = own * np.sqrt(power / max(float(own @ own), 1e-300))  # as large as in the recording
+    rng = plan.stream(f"oracle {number}")
+    rivals = sorted(_distances(bench, effect, own, rng), key=lambda each: each[0])
+    better = [float(norm.cdf(each[0] / 2)) for each in rivals]
+    distance, law, place = rivals[0]
+    return OracleAnswer(
+        case=plan.name,
+        tier=plan.tier,
+        effect=effect.effect,
+        form=effect.form,
+        joint=effect.place,
+        outside=type(effect) in OUTSIDE,
+        multiple=case.multiples[number],
+        rival=law,
+        rival_joint=place,
+        distance=distance,
+        right_name=float(np.prod(better)),
+        right_class=float(np.prod(better[CLASS_SIZE - 1 :])),
+    )
+
+
+def _make_bench(case: SimulatedCase, number: int) -> _Bench:
+    plan, effect = case.plan, case.hidden[number]
+    wanted = [coarse_track(reference_track(plan, at, run)) for at, run in enumerate(plan.runs)]
+    tracks = [coarse_track(track) for track in case.tracks]
+    others = tuple(each for each in case.all_effects if each is not effect)
+    controller = draw_controller(plan.stream("controller"), plan.machine.arm)
+    oracle, chosen = make_oracle(plan, tracks), identification_tracks(plan, tracks)
+    return _Bench(plan, controller, wanted, chosen, others, oracle, companion_columns(plan, effect, chosen))
+
+
+def _distances(
+    bench: _Bench, effect: HiddenEffect, own: Array, rng: np.random.Generator
+) -> Iterator[tuple[float, str, int | None]]:
+    """The distance of each other law at each place, with its name and place."""
+    machine = bench.plan.machine
+    peak = np.max(
+        [np.abs(track.load + law_torque(bench.others, track, 0)).max(axis=0) for track in bench.tracks], axis=0
+    )
+    places = [(kind, int(joint)) for kind in (*LIBRARY, *OUTSIDE) for joint in kind.places(machine)]
+    looked = [each for each in (_first_look(bench, effect, own, place, peak, rng) for place in places) if each]
+    looked.sort(key=lambda each: each[0])
+    for left, kind, first in looked[:SOUGHT]:
+        if kind.where != "link" and not first.has_parts:
+            draws = [first, *_draws(kind, first.joint, bench, peak, rng, DRAWS)]
+            left = min(left, _left_by_best(bench, own, draws, rng))
+        yield float(np.sqrt(max(left, 0.0))), first.effect, first.place
+    for left, _, first in looked[SOUGHT:]:
+        yield float(np.sqrt(max(left, 0.0))), first.effect, first.place
+
+
+def _first_look(
+    bench: _Bench,
+    effect: HiddenEffect,
+    own: Array,
+    place: tuple[type[HiddenEffect], int],
+    peak: Array,
+    rng: np.random.Generator,
+) -> tuple[float, type[HiddenEffect], HiddenEffect] | None:
+    """What a law at a place leaves by a few draws, and the best of them; None for what has the right name."""
+    kind, joint = place
+    first, *more = _draws(kind, joint, bench, peak, rng, LINK_DRAWS if kind.where == "link" else LOOKS)
+    if _is_right(first, effect):
+        return None
+    if kind.where == "link":
+        return _left_by_all(own, [bench.rows(each) for each in (first, *more)]), kind, first
+    tried = [first] if first.has_parts else [first, *more]
+    left = [_left_by(own, bench.rows(each)) for each in tried]
+    return min(left), kind, tried[int(np.argmin(left))]
+
+
+def _draws(
+    kind: type[HiddenEffect], joint: int, bench: _Bench, peak: Array, rng: np.random.Generator, count: int
+) -> list[HiddenEffect]:
+    return [kind.draw(rng, bench.plan.machine, joint).with_peak_torque(peak) for _ in range(count)]
+
+
+def _is_right(other: HiddenEffect, effect: HiddenEffect) -> bool:
+    """Whether another law has the right name, or one that is no mistake: a part of the law."""
+    parts = CONTAINED_EFFECTS.get(effect.effect, ())
+    return other.place == effect.place and other.effect in (effect.effect, *parts, *effect.equivalent)
+
+
+def _left_by_best(bench: _Bench, own: Array, draws: Sequence[HiddenEffect], rng: np.random.Generator) -> float:
+    """What the best of some laws leaves, and the best of steps about it."""
+    tried = [(_left_by(own, bench.rows(each)), each) for each in draws]
+    for _ in range(ROUNDS):
+        left, best = min(tried, key=lambda each: each[0])
+        tried = [(left, best)]
+        tried += [(_left_by(own, bench.rows(each)), each) for each in (_stepped(best, rng) for _ in range(STEPS))]
+    return min(each[0] for each in tried)
+
+
+def _stepped(effect: HiddenEffect, rng: np.random.Generator) -> HiddenEffect:
+    """The same law with other numbers nearby."""
+    moved = {
+        name: value if name in HELD_NUMBERS else float(value * (1 + STEP_SHARE * rng.normal()))
+        for name, value in effect.shape.items()
+    }
+    return replace(effect, shape=moved)
+
+
+def _left_by(own: Array, other: Array) -> float:
+    power = float(other @ other)
+    return float(own @ own) - (float(own @ other) ** 2 / power if power > 0 else 0.0)
+
+
+def _left_by_all(own: Array, others: Sequence[Array]) -> float:
+    rest = own - np.column_stack(others) @ np.linalg.lstsq(np.column_stack(others), own, rcond=1e-9)[0]
+    return float(rest @ rest)

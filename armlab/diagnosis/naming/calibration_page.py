@@ -1,0 +1,51 @@
+"""The files of a calibration: `calibration.json`, which the diagnosis reads, and `calibration.md` for people."""
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.diagnosis.naming.calibrate import Calibration, Reliability
+from armlab.diagnosis.naming.decide import CALIBRATION_FILE
+
+CALIBRATION_SCHEMA = "calibration/1"
+PAGE_FILE = "calibration.md"
+DIGITS = 4
+
+
+def write_calibration(found: Calibration, sources: Sequence[str], out: Path) -> tuple[Path, ...]:
+    """Writes both files. sources: the sets from which the weights are."""
+    weights = {key: round(value, DIGITS) for key, value in sorted(found.weights.items())}
+    content = {"schema": CALIBRATION_SCHEMA, "sets": list(sources), "findings": found.findings, "weights": weights}
+    page = markdown_page(
+        "Probabilities of names: calibration",
+        f"From {found.findings} findings and candidates of these sets: {'; '.join(sources)}.",
+        "## Reliability\n\nLikeliest answers beyond background, in cases that were left out in turn.",
+        markdown_table(("tier", "probability", "answers", "mean probability", "right"), list(_rows(found))),
+        markdown_table(("tier", "Brier score", "of the base rate", "log score", "of the base rate"), _scores(found)),
+        "## Weights",
+        markdown_table(("what speaks for a name", "weight"), [(key, f"{value:.2f}") for key, value in weights.items()]),
+    )
+    return write_texts({CALIBRATION_FILE: json.dumps(content, indent=1) + "\n", PAGE_FILE: page}, out)
+
+
+def calibration_lines(found: Calibration) -> Iterator[str]:
+    """The reliability, a line a bin, for the terminal."""
+    for tier, chance, number, mean, right in _rows(found):
+        yield f"{tier}, probability {chance}: {number} answers, mean {mean}, right {right}"
+
+
+def _rows(found: Calibration) -> Iterator[tuple[str, ...]]:
+    for tier, reliability in found.tiers.items():
+        for each in reliability.bins:
+            low, high = each.interval
+            share = f"{100 * each.right / each.findings:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+            yield tier, f"{each.low:g}-{each.high:g}", str(each.findings), f"{each.mean:.2f}", share
+
+
+def _scores(found: Calibration) -> list[tuple[str, ...]]:
+    def row(tier: str, own: Reliability) -> tuple[str, ...]:
+        return (tier, *(f"{value:.3f}" for value in (*own.brier, *own.log)))
+
+    return [row(tier, own) for tier, own in found.tiers.items()]

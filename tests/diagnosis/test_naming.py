@@ -1,0 +1,133 @@
+"""Names of findings with probabilities: the choice model, what is claimed, and what a reader is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.naming.calibrate import Finding, calibrate, judge_reliability
+from armlab.diagnosis.naming.choice import Example, fit_weights, probabilities
+from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of
+from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
+from armlab.diagnosis.tuning import NamingTuning
+
+TUNING = NamingTuning()
+
+
+@pytest.fixture(autouse=True)
+def plain_weights(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One number, whose weight is one."""
+    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda: {"for it": 1.0})
+
+
+def weighed(unknown: float, **names: float) -> Weighed:
+    """Names of joint 2 with these probabilities."""
+    known = [WeighedName(name, 2, (2,), {"for it": float(np.log(chance))}) for name, chance in names.items()]
+    return (*known, WeighedName("unknown", 2, (2,), {"for it": float(np.log(unknown))}))
+
+
+def claim(effect: str, names: Weighed, rivals: tuple[Rival, ...] = ()) -> Claim:
+    evidence = Evidence(1, 1e-9, 1e-8, 0.5, 1e-6, 0.5, 1.0, 0.5, 100.0)
+    return Claim(effect, 2, (2,), (), "tau_2 += 1", evidence, np.ones((3, 2)), rivals, weighed=names)
+
+
+def test_probabilities_sum_to_one_and_follow_what_speaks_for_a_name() -> None:
+    found = probabilities([{"for it": 2.0}, {"for it": 0.0, "not asked": 9.0}, {}], {"for it": 1.0})
+    assert found.sum() == pytest.approx(1)
+    assert found[0] / found[1] == pytest.approx(np.exp(2))
+    assert found[1] == found[2]
+
+
+def test_weights_are_found_that_made_the_choices() -> None:
+    rng, true = np.random.default_rng(0), {"one": 2.0, "other": -1.0}
+    examples = []
+    for _ in range(3000):
+        names = tuple(dict(zip(true, rng.normal(size=2), strict=True)) for _ in range(3))
+        chosen = rng.choice(3, p=probabilities(names, true))
+        examples.append(Example(names, tuple(at == chosen for at in range(3))))
+    found = fit_weights(examples, dict.fromkeys(true, 0.0), dict.fromkeys(true, 2.0))
+    assert found["one"] == pytest.approx(2.0, abs=0.15)
+    assert found["other"] == pytest.approx(-1.0, abs=0.15)
+    findings = [Finding(str(number % 50), "clean", each, False) for number, each in enumerate(examples)]
+    calibration = calibrate(findings).tiers["clean"]
+    assert all(low <= each.mean <= high for each in calibration.bins for low, high in [each.interval])
+    assert calibration.brier[0] < calibration.brier[1]
+
+
+def test_two_right_names_count_together() -> None:
+    both = [Example(({"a": 1.0}, {"b": 1.0}, {"none": 1.0}), (True, True, False))] * 50
+    found = fit_weights(both, {"a": 0.0, "b": 0.0, "none": 0.0}, {"a": 1.0, "b": 1.0, "none": 1.0})
+    assert found["a"] == pytest.approx(found["b"])
+    assert found["none"] < found["a"]
+
+
+def test_reliability_is_of_the_likeliest_answer() -> None:
+    found = judge_reliability([np.array([0.8, 0.2])] * 5, [(True, False)] * 4 + [(False, True)])
+    assert [(each.findings, each.right, each.mean) for each in found.bins] == [(5, 4, pytest.approx(0.8))]
+
+
+def test_a_probable_name_is_claimed_alone() -> None:
+    names = weighed(0.03, coulomb_friction=0.95, viscous_friction=0.02)
+    (found,) = named_claims([claim("coulomb_friction", names)], TUNING)
+    assert (found.effect, found.probability, found.members, found.rivals) == (
+        "coulomb_friction",
+        pytest.approx(0.95),
+        (),
+        (),
+    )
+
+
+def test_else_a_class_whose_probabilities_add_up() -> None:
+    names = weighed(0.2, coulomb_friction=0.6, stribeck_friction=0.16, viscous_friction=0.04)
+    (found,) = named_claims([claim("coulomb_friction", names)], TUNING)
+    assert found.probability == pytest.approx(0.6)
+    assert [(each.effect, round(each.probability, 2)) for each in found.members] == [
+        ("coulomb_friction", 0.6),
+        ("unknown", 0.2),
+        ("stribeck_friction", 0.16),
+    ]
+    assert [each.effect for each in found.rivals] == ["stribeck_friction"]
+
+
+def test_else_it_is_unknown_with_a_probability_of_its_own() -> None:
+    names = weighed(0.5, coulomb_friction=0.3, stribeck_friction=0.2)
+    (found,) = named_claims([claim("coulomb_friction", names)], TUNING)
+    assert (found.effect, found.joint, found.probability) == ("unknown", 2, pytest.approx(0.5))
+    assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
+    assert found.candidate is None
+    assert found.equation == "tau_2 += f(the motion)"
+
+
+def test_more_than_four_names_are_no_class() -> None:
+    names = weighed(0.05, **{f"law_{number}": 0.19 for number in range(5)})
+    assert naming_of(names, TUNING).is_unknown
+    assert naming_of(names, replace(TUNING, max_class=5)).open == 5
+
+
+def test_what_may_be_nothing_needs_names_that_are_probable_without_unknown() -> None:
+    assert not naming_of(weighed(0.2, coulomb_friction=0.8), TUNING).sure
+    assert naming_of(weighed(0.08, coulomb_friction=0.5, viscous_friction=0.42), TUNING).sure
+
+
+def test_two_unknowns_of_a_joint_are_one_finding() -> None:
+    names = weighed(0.9, coulomb_friction=0.1)
+    other = replace(claim("unknown", weighed(0.6, coulomb_friction=0.4)), depends_on=("position_2",))
+    (found,) = named_claims([claim("coulomb_friction", names), other], TUNING)
+    assert found.probability == pytest.approx(0.9)
+    assert np.array_equal(found.prediction, 2 * np.ones((3, 2)))
+    assert found.depends_on == ("position_2",)
+
+
+def test_what_no_motion_separates_stays_beside_a_probable_name() -> None:
+    same = Rival("rotor_inertia", 2, (2,), identical=True)
+    names = weighed(0.03, payload=0.97)
+    (found,) = named_claims([claim("payload", names, (same,))], TUNING)
+    assert found.rivals == (same,)
+    assert found.next_experiment
+
+
+def test_the_weights_of_the_package_were_learnt_from_development_sets() -> None:
+    weights = calibrated_weights()
+    assert {"found none", "left none", "structure none"} <= set(weights)
+    assert all(np.isfinite(list(weights.values())))
