@@ -11,6 +11,7 @@ from armlab.diagnosis.naming.choice import Example, fit_weights, probabilities
 from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.tuning import NamingTuning
+from armlab.effects.friction import CoulombFriction
 
 TUNING = NamingTuning()
 
@@ -97,6 +98,14 @@ def test_else_it_is_unknown_with_a_probability_of_its_own() -> None:
     assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
     assert found.candidate is None
     assert found.equation == "tau_2 += f(the motion)"
+
+
+def test_friction_keeps_the_law_that_was_found_with_its_probability() -> None:
+    names = weighed(0.5, coulomb_friction=0.3, stribeck_friction=0.2)
+    own = replace(claim("coulomb_friction", names), candidate=CoulombFriction(2, (2,), (1,)))
+    (found,) = named_claims([own], TUNING)
+    assert (found.effect, found.probability) == ("coulomb_friction", pytest.approx(0.3))
+    assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
 
 
 def test_more_than_four_names_are_no_class() -> None:

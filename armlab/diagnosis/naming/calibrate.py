@@ -18,7 +18,10 @@ FOLDS = 5
 BINS = (0.0, 0.5, 0.7, 0.9, 1.0)
 # Stated before any finding: no number speaks for or against a name, and no effect is likelier than another one. How far
 # a weight may be from that, a standard deviation: an effect twice as likely as another one is usual (log 2 = 0.7).
+# How many effects stand at a joint, and whether something is left at others, is how a set was drawn: a real arm has
+# several of each, so little may be learnt of that.
 EFFECT_PREFIX, EFFECT_SPREAD, SPREAD = "is ", 0.7, 2.0
+COMPANY, COMPANY_SPREAD = ("found beside", "found crowd", "found structure elsewhere", "structure beside"), 0.3
 CONFIDENCE = 0.95
 
 
@@ -80,8 +83,14 @@ def calibrate(findings: Sequence[Finding]) -> Calibration:
 def weights_of(examples: Sequence[Example]) -> dict[str, float]:
     """The likeliest weights near those that were stated before."""
     keys = sorted({key for each in examples for name in each.names for key in name})
-    spread = {key: EFFECT_SPREAD if key.startswith(EFFECT_PREFIX) else SPREAD for key in keys}
-    return fit_weights(examples, dict.fromkeys(keys, 0.0), spread)
+    return fit_weights(examples, dict.fromkeys(keys, 0.0), {key: stated_spread(key) for key in keys})
+
+
+def stated_spread(key: str) -> float:
+    """How far a weight may be from zero, a standard deviation."""
+    if key in COMPANY:
+        return COMPANY_SPREAD
+    return EFFECT_SPREAD if key.startswith(EFFECT_PREFIX) else SPREAD
 
 
 def left_out_probabilities(examples: Sequence[Example], cases: Sequence[str]) -> list[Array]:

@@ -88,9 +88,11 @@ def named_claims(claims: Sequence[Claim], tuning: NamingTuning) -> tuple[Claim, 
 
 def _named(claim: Claim, tuning: NamingTuning) -> Claim:
     naming = naming_of(claim.weighed, tuning)
-    if claim.effect == UNKNOWN.id or naming.is_unknown:
+    # friction and offsets are on every arm: the law may be another one, but something of the kind is there
+    expected = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
+    if claim.effect == UNKNOWN.id or (naming.is_unknown and not expected):
         return _without_name(claim, naming, tuning)
-    members = naming.members(tuning)
+    members = naming.members(tuning) if naming.probability_of(claim.effect, claim.joint) < tuning.level else ()
     others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     identical = [each for each in claim.rivals if each.identical]
     known = {(each.effect, each.joint) for each in identical}
