@@ -97,11 +97,14 @@ class _Bench:
         hidden = tuple(each for each in self.others if each not in self.plan.background)
         tracks = self.tracks
         if effect.has_parts:
-            played = simulate_runs(self.plan, (*hidden, effect), self.controller, self.wanted, self.wanted)
-            tracks = identification_tracks(self.plan, played)
+            plan = replace(self.plan, engine="mujoco")  # which alone has parts
+            played = simulate_runs(plan, (*hidden, effect), self.controller, self.wanted, self.wanted)
+            tracks = identification_tracks(plan, played)
         arms = arm_with_effects(self.plan, (*hidden, effect)), arm_with_effects(self.plan, hidden)
+        grids = [oracle_grid(track) for track in self.tracks]
         torque = [
-            effect_torque(effect, self.others, arms, track, run, oracle_grid(track)) for run, track in enumerate(tracks)
+            effect_torque(effect, self.others, arms, track, run, grid)
+            for run, (track, grid) in enumerate(zip(tracks, grids, strict=True))
         ]
         return self.oracle.rows_without_free(torque, self.beside)
 
