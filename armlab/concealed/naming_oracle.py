@@ -81,7 +81,8 @@ class OracleAnswer:
 class _Bench:
     """Where laws are compared: coarse tracks of a case, and rows without what is free.
 
-    others: effects beside the one that is asked. basis: further free rows, orthonormal.
+    others: effects beside the one that is asked. beside: plain friction that is free for it, (samples, joints, columns)
+    a run, or None.
     """
 
     plan: Plan

@@ -39,7 +39,7 @@ def read_weighed(folder: Path, verdicts: Path) -> tuple[str, list[WeighedFinding
     check_development(manifest.seed, folder)
     cases = read_cases(folder, verdicts, manifest.cases)
     about = f"torque, seed {manifest.seed}, {manifest.kind}: {len(manifest.cases)} cases"
-    return about, [each for case in cases for each in _weighed_findings(case, manifest.seed)]
+    return about, [each for case in cases for each in label_findings(case, manifest.seed)]
 
 
 def check_development(seed: int, folder: Path) -> None:
@@ -56,7 +56,8 @@ def read_names(folder: Path) -> list[list[dict[str, Any]]]:
     return [finding["names"] for finding in content["findings"]]
 
 
-def _weighed_findings(case: JudgedCase, seed: int) -> Iterator[WeighedFinding]:
+def label_findings(case: JudgedCase, seed: int) -> Iterator[WeighedFinding]:
+    """The weighed findings of a case, each name right or not by its answer."""
     outside = any(effect.outside for effect in case.truth.injected)
     for names in read_names(case.folder):
         categories = [categorize_finding(case, name) for name in names]
