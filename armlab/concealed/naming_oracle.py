@@ -27,9 +27,10 @@ from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.engine import Track
 from armlab.concealed.outside import OUTSIDE
 from armlab.concealed.plan import Plan
-from armlab.concealed.score.cases import CONTAINED_EFFECTS
+from armlab.concealed.score.cases import CONTAINED_EFFECTS, is_indistinguishable
 from armlab.concealed.simulate import (
     Controller,
+    absorbed_rotors,
     arm_with_effects,
     coarse_track,
     draw_controller,
@@ -53,6 +54,11 @@ SOUGHT, DRAWS, STEPS, ROUNDS = 6, 12, 8, 2  # laws that are sought further, by d
 STEP_SHARE = 0.3  # of a number, standard deviation of a step about the best draw
 HELD_NUMBERS = ("from", "direction", "run")  # of a law's shape, which are no quantities
 CLASS_SIZE = 4
+LIMITS = {  # what a law is at an end of the range of its numbers, beside what it holds as a part
+    "friction_curve": ("nonlinear_viscous_friction", "stribeck_friction"),
+    "nonlinear_viscous_friction": ("viscous_friction", "coulomb_friction"),
+    "asymmetric_friction": ("nonlinear_viscous_friction",),
+}
 
 
 @dataclass(frozen=True)
@@ -82,7 +88,7 @@ class _Bench:
     """Where laws are compared: coarse tracks of a case, and rows without what is free.
 
     others: effects beside the one that is asked. beside: plain friction that is free for it, (samples, joints, columns)
-    a run, or None.
+    a run, or None. absorbed_rotors: joints (from 1) whose rotor no motion separates from the links.
     """
 
     plan: Plan
@@ -92,6 +98,7 @@ class _Bench:
     others: tuple[HiddenEffect, ...]
     oracle: Oracle
     beside: Sequence[Array] | None
+    absorbed_rotors: tuple[int, ...]
 
     def rows(self, effect: HiddenEffect) -> Array:
         """Whitened rows of an effect of any law, free columns projected out."""
@@ -150,7 +157,9 @@ def _make_bench(case: SimulatedCase, number: int) -> _Bench:
     others = tuple(each for each in case.all_effects if each is not effect)
     controller = draw_controller(plan.stream("controller"), plan.machine.arm)
     oracle, chosen = make_oracle(plan, tracks), identification_tracks(plan, tracks)
-    return _Bench(plan, controller, wanted, chosen, others, oracle, companion_columns(plan, effect, chosen))
+    beside = companion_columns(plan, effect, chosen)
+    absorbed = tuple(joint + 1 for joint in absorbed_rotors(plan.machine.arm))
+    return _Bench(plan, controller, wanted, chosen, others, oracle, beside, absorbed)
 
 
 def _distances(
@@ -184,7 +193,7 @@ def _first_look(
     """What a law at a place leaves by a few draws, and the best of them; None for what has the right name."""
     kind, joint = place
     first, *more = _draws(kind, joint, bench, peak, rng, LINK_DRAWS if kind.where == "link" else LOOKS)
-    if _is_right(first, effect):
+    if _is_right(first, effect, bench):
         return None
     if kind.where == "link":
         return _left_by_all(own, [bench.rows(each) for each in (first, *more)]), kind, first
@@ -199,10 +208,22 @@ def _draws(
     return [kind.draw(rng, bench.plan.machine, joint).with_peak_torque(peak) for _ in range(count)]
 
 
-def _is_right(other: HiddenEffect, effect: HiddenEffect) -> bool:
-    """Whether another law has the right name, or one that is no mistake: a part of the law."""
-    parts = CONTAINED_EFFECTS.get(effect.effect, ())
-    return other.place == effect.place and other.effect in (effect.effect, *parts, *effect.equivalent)
+def _is_right(other: HiddenEffect, effect: HiddenEffect, bench: _Bench) -> bool:
+    """Whether another law has the right name, or one that the score counts as right, or holds the right one.
+
+    A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred.
+    """
+    if other.place == effect.place and (
+        other.effect in (effect.effect, *effect.equivalent) or _holds(type(other), type(effect))
+    ):
+        return True
+    names = other.effect, other.place, effect.effect, effect.place
+    return is_indistinguishable(*names, bench.plan.machine.joints, bench.absorbed_rotors)
+
+
+def _holds(other: type[HiddenEffect], effect: type[HiddenEffect]) -> bool:
+    """Whether the law of an effect is a limit of that of another one."""
+    return effect.effect in (*CONTAINED_EFFECTS.get(other.effect, ()), *LIMITS.get(other.effect, ()))
 
 
 def _left_by_best(bench: _Bench, own: Array, draws: Sequence[HiddenEffect], rng: np.random.Generator) -> float:

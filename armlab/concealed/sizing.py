@@ -1,7 +1,9 @@
 """Sizes of hidden effects: the detection limit, and the search for the size that has a given multiple of it.
 
 The limit is the size that an oracle finds with 90 % power. The oracle knows the true law and the true noise. It tests
-one number, the size of the effect, in whitened rows from which all free columns are projected out. The level of its
+one number, the size of the effect, in whitened rows from which all free columns are projected out. Where a joint
+stands still, its friction takes any value up to its level, and no motion tells which: such rows are bridged by straight
+lines and count nothing. The level of its
 test is 1 % over all effects and places that a diagnosis may look at. The *multiple* of an effect is
 
     multiple = sqrt(noncentrality of the effect / noncentrality of the limit).
@@ -16,6 +18,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
@@ -97,17 +100,18 @@ def limit_noncentrality(joints: int) -> float:
 class Oracle:
     """Whitens rows by the true noise and projects out what is free.
 
-    noise: of the recording's samples at rate_hz. basis: (rows, columns), orthonormal, of the free columns.
+    noise: of the recording's samples at rate_hz. resting: of each run, (samples, joints), where a joint stands still;
+    empty where none does. basis: (rows, columns), orthonormal, of the free columns.
     """
 
     noise: Noise
     rate_hz: float
+    resting: tuple[NDArray[np.bool_], ...] = ()
     basis: Array | None = None
 
     def with_free_columns(self, columns: Sequence[Array]) -> "Oracle":
         """The oracle with free columns, a (samples, joints, columns) each run."""
-        flat = np.vstack([self._rows(run) for run in columns])
-        return Oracle(self.noise, self.rate_hz, _orthonormal_basis(flat))
+        return replace(self, basis=_orthonormal_basis(self._rows(columns)))
 
     def multiple(self, torque: Sequence[Array], beside: Sequence[Array] | None = None) -> float:
         """How many detection limits an effect is large whose torque is (samples, joints) in each run.
@@ -119,22 +123,36 @@ class Oracle:
 
     def rows_without_free(self, torque: Sequence[Array], beside: Sequence[Array] | None = None) -> Array:
         """Whitened rows (rows,) of a torque, (samples, joints) each run, without what free columns explain."""
-        rows = np.vstack([self._rows(run[..., None]) for run in torque])
+        rows = self._rows([run[..., None] for run in torque])
         parts = [] if self.basis is None else [self.basis]
         if beside is not None:
-            parts.append(_orthonormal_basis(_project_out(np.vstack([self._rows(run) for run in beside]), parts)))
+            parts.append(_orthonormal_basis(_project_out(self._rows(beside), parts)))
         return np.asarray(_project_out(rows, parts)[:, 0])
 
-    def _rows(self, columns: Array) -> Array:
-        """Whitened rows (samples * joints, columns)."""
+    def _rows(self, columns: Sequence[Array]) -> Array:
+        """Whitened rows (rows, columns) of all runs, (samples, joints, columns) each."""
         thinned = Noise(
             self.noise.kind,
             self.noise.white * np.sqrt(min(ORACLE.rate_hz / self.rate_hz, 1.0)),  # of a mean over several samples
             self.noise.coloured,
             self.noise.corner_hz,
         )
-        out = [thinned.whitened(columns[:, joint], joint, ORACLE.rate_hz) for joint in range(columns.shape[1])]
+        resting = self.resting or tuple(np.zeros(run.shape[:2], dtype=bool) for run in columns)
+        out = []
+        for run, rest in zip(columns, resting, strict=True):
+            for joint in range(run.shape[1]):
+                white = thinned.whitened(_bridged(run[:, joint], rest[:, joint]), joint, ORACLE.rate_hz)
+                out.append(np.where(rest[:, joint, None], 0.0, white))
         return np.vstack(out)
+
+
+def _bridged(columns: Array, gaps: NDArray[np.bool_]) -> Array:
+    """Columns (samples, columns) with straight lines over gaps (samples,)."""
+    if not gaps.any():
+        return columns
+    place, known = np.arange(len(columns)), np.flatnonzero(~gaps)
+    lines = [np.interp(place, known, column[known]) for column in columns.T] if len(known) else columns.T * 0
+    return np.column_stack(list(lines))
 
 
 def _project_out(rows: Array, bases: Sequence[Array]) -> Array:
@@ -214,12 +232,19 @@ def effect_multiples(plan: Plan, hidden: Sequence[HiddenEffect], tracks: Sequenc
 
 def make_oracle(plan: Plan, tracks: Sequence[Track]) -> Oracle:
     """Knows the noise; in the realistic tier base parameters and friction of every joint are free."""
-    oracle = Oracle(plan.noise, plan.rate_hz)
+    runs = identification_tracks(plan, tracks)
+    oracle = Oracle(plan.noise, plan.rate_hz, tuple(standstills(track, oracle_grid(track)) for track in runs))
     if not plan.realistic:
         return oracle
-    return oracle.with_free_columns(
-        [free_columns(plan.true_arm, track, oracle_grid(track)) for track in identification_tracks(plan, tracks)]
-    )
+    return oracle.with_free_columns([free_columns(plan.true_arm, track, oracle_grid(track)) for track in runs])
+
+
+def standstills(track: Track, grid: Array) -> NDArray[np.bool_]:
+    """Rows (samples, joints) at the instants of a grid, s, in which a joint stands still, or in one beside them."""
+    still = np.vstack([np.zeros(track.joints), np.cumsum(track.velocity == 0, axis=0)])
+    reach = 1.5 * (grid[1] - grid[0])
+    first, last = (np.searchsorted(track.time, grid + side * reach) for side in (-1, 1))
+    return np.asarray(still[last] > still[first])
 
 
 def effect_multiple(

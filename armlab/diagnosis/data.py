@@ -204,10 +204,10 @@ class Observed:
         whole = rows_in(self.of_role(role), self.rows)
         return np.flatnonzero(whole & ~rows_in(self.of_role(role, joint), self.rows))
 
-    def stretches_at_rest(self, joint: int) -> tuple[Segment, ...]:
-        """The stretches of time of those rows."""
-        rest = ~rows_in(self.used(joint), self.rows)
-        return tuple(part for each in self.segments for part in split_segment(each, rest, 1))
+    def stretches_at_rest(self, joint: int, segment: Segment) -> tuple[Segment, ...]:
+        """The stretches of a segment near a standstill or a reversal of a joint (from 0)."""
+        rest = ~rows_in(split_segment(segment, self.moving[:, joint], self.min_segment_rows), self.rows)
+        return tuple(split_segment(segment, rest, 1))
 
     def used(self, joint: int) -> tuple[Segment, ...]:
         """The parts of all segments in which a joint (from 0) moves."""

@@ -18,7 +18,6 @@ from armlab.diagnosis.intervals import extend_with_shapes
 from armlab.diagnosis.pruning import Pruned, look_again, withdraw
 from armlab.diagnosis.result import Claim
 from armlab.diagnosis.search import Step
-from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import PlausibilityTuning
 from armlab.effects.contract import Candidate, Kind, Parameter
@@ -78,27 +77,12 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: b
         covariance = wide.covariance(group)
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
         known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
-        known = known or (_is_early(candidate, values) and not sticks_where_it_acts(model, model.state, candidate))
         reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
             reason = reason or "its size may be zero"
         if reason is not None:
             out[group] = reason
     return out
-
-
-def _is_early(candidate: Candidate, values: Sequence[ParameterValue]) -> bool:
-    """Whether a law shifts the torque of one joint to before its motion."""
-    shifts = {each.name for each in candidate.facts.parameters if each.sampled}
-    return len(candidate.rows) == 1 and any(
-        each.name in shifts and isinstance(each.value, float) and each.value < 0 for each in values
-    )
-
-
-def sticks_where_it_acts(model: FittedModel, state: State, candidate: Candidate) -> bool:
-    """Whether friction of a state that sticks acts where a law does: while a joint sticks, its friction seems early."""
-    facts = [model.solver.groups[each].candidate for each in state.groups]
-    return any(each.facts.sticks and each.rows[0] in candidate.rows for each in facts)
 
 
 def links_that_data_tell(

@@ -27,6 +27,7 @@ from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.tuning import PredictionTuning
 from armlab.effects.contract import Candidate
+from armlab.effects.friction_curve import FrictionCurve
 from armlab.identification.regression import suggested_cutoff
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Role, Run
@@ -55,7 +56,8 @@ def fit_prediction(named: FittedModel) -> Prediction:
     own = named.state.groups
     more = [number for number, group in enumerate(groups) if number not in own and group.candidate.facts.common]
     numbers = (*own, *more)
-    candidates = [groups[number].candidate for number in numbers]
+    candidates = [groups[number].candidate for number in more]
+    candidates = [*(_of_found_size(named, number) for number in own), *candidates]
     start = tuple(range(len(own)))
     own_design = _smaller_design(named, numbers)
     suggested = max(suggested_cutoff(run) for run in identification_runs(named.design.observed))
@@ -77,6 +79,14 @@ def fit_prediction(named: FittedModel) -> Prediction:
     model = _settled(replace(best.trial.model, state=best.state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in best.state.groups}
     return Prediction(model, places, best.held_out)
+
+
+def _of_found_size(named: FittedModel, number: int) -> Candidate:
+    """A law of a model; a friction curve has a prior of its size, because slower signals do not tell of its details."""
+    law = named.solver.groups[number].candidate
+    if not isinstance(law, FrictionCurve):
+        return law
+    return replace(law, largest=float(np.abs(np.cumsum(named.solver.values(named.fit, number))).max()))
 
 
 def _better(usual: "_Improved", others: Sequence["_Improved"], tuning: PredictionTuning) -> "_Improved":
@@ -345,10 +355,8 @@ def _improved(trial: _Trial, tuning: PredictionTuning) -> _Improved:
 
 def _unit_noise(observed: Observed) -> Noise:
     """White noise of one newton metre, at rest too."""
-    joints = range(observed.joints)
-    return Noise(
-        tuple(np.ones(1) for _ in joints), tuple(1.0 for _ in joints), tuple(np.ones(observed.rows) for _ in joints)
-    )
+    joints, ones = observed.joints, np.ones(observed.rows)
+    return Noise((np.ones(1),) * joints, (1.0,) * joints, (ones,) * joints, (False,) * joints)
 
 
 def _is_sure(gains: Array, tuning: PredictionTuning) -> bool:

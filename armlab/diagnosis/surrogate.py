@@ -5,7 +5,7 @@ what they predict on data that took no part counts.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, islice
 
 import numpy as np
@@ -286,7 +286,7 @@ def find_structure(
     A slow structure that no surrogate foretold has passed for coloured noise, and whitening would hide it. As slow
     noise would pass for structure, it counts only if validation runs have it, too.
     """
-    plain = Noise(tuple(np.ones(1) for _ in noise.taps), tuple(1.0 for _ in noise.taps), noise.resting)
+    plain = replace(noise, taps=tuple(np.ones(1) for _ in noise.taps), scales=tuple(1.0 for _ in noise.taps))
     whitened = _find_structure(residual, joint, made, noise, observed, tuning)
     raw = _find_structure(residual, joint, made, plain, observed, tuning)
     least = tuning.min_structure_gain

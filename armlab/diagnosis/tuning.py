@@ -128,7 +128,19 @@ class NoiseTuning:
         meaning="loss of the whitened fit on held-out stretches, against a plain one, above which errors are white",
     )
     filter_correlation_rows: float = tuned(
-        1.5, unit="rows", meaning="rows at rest that the filter ties together", least=0.1
+        1.5, unit="rows", meaning="rows at rest that the filter of the torque ties together", least=0.1
+    )
+    min_moving_share: float = tuned(
+        0.5,
+        unit="of the rows",
+        meaning="rows in motion from which on the colour of their noise is that of rows at rest, too",
+        source="0.16 to 0.31 of the rows are at rest in quick motion, 0.8 in the slow one of a collaborative arm",
+    )
+    max_rest_ratio: float = tuned(
+        1.5,
+        unit="of the whitened errors in motion",
+        meaning="errors at rest up to which the colour of noise in motion is that of rest, too",
+        source="1.0 to 1.3 where friction follows velocity, 1.9 and more where joints stick (development sets)",
     )
 
 

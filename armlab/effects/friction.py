@@ -18,6 +18,7 @@ from armlab.effects.contract import (
     Scene,
     Value,
 )
+from armlab.effects.sensitivity import delay_signal
 from armlab.effects.term import SIGN_SIGMAS, EveryJoint, Term, format_number, format_sum, top_speed
 from problem.arm import Arm
 
@@ -124,6 +125,22 @@ LOAD_DEPENDENT_FACTS = Effect(
     figures="{coefficient}",
 )
 
+EARLY_FACTS = Effect(
+    "early_friction",
+    "friction that turns before the joint does",
+    (Parameter("impulse", f"{TORQUE}.s", positive=True), Parameter("lead", "s", detail=True)),
+    law=r"\Delta\tau_j = \text{impulse} \; "
+    r"(\operatorname{sgn} \dot{q}_j(t + \text{lead}) - \operatorname{sgn} \dot{q}_j(t)) / \text{lead}",
+    title="friction that turns early",
+    sentence="Friction turns before {place} does, which sticks at its reversals",
+    prior_scale=0.1,
+    common=True,
+    axis="velocity",
+    origin="friction",
+    experiment="record faster reversals: the time for which the joint sticks becomes shorter, a delay does not",
+    figures="{impulse}",
+)
+
 PARTS_PER_SAMPLE = 4  # of a sample's interval, for friction with memory
 
 
@@ -160,6 +177,8 @@ def mean_within_samples(fine: Array) -> Array:
     return np.asarray(fine.reshape(-1, PARTS_PER_SAMPLE).mean(axis=1))
 
 
+EARLY_LEADS = (0.003, 0.012)  # s, of a first look
+EARLY_LEAD_RANGE = (0.001, 0.02)  # s
 POWER_EXPONENTS = (0.3, 0.5, 0.7, 1.5, 2.0, 3.0)
 POWER_EXPONENT_RANGE = (0.25, 4.0)
 
@@ -187,6 +206,40 @@ class CoulombFriction(Term):
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
         return cls.at(arm, joints[0]), np.array([parameters["level"]])
+
+
+@dataclass(frozen=True)
+class EarlyFriction(Term):
+    """Friction at a reversal that turns before the joint does; shape: by how much at most, s.
+
+    A joint that sticks stands still while its friction goes from one side to the other, and then sets off slowly.
+    Motion that was smoothed seems to turn in the middle of that, later than the friction did. Where all friction, of
+    level F, turns early by the lead, the impulse is F times the lead; where it goes over slowly, it is less.
+    """
+
+    facts = EARLY_FACTS
+    names = ("impulse", "lead")
+    of_time = True
+
+    def columns(self, scene: Scene) -> Array:
+        direction, lead = direction_of_motion(scene, self.own), self.shape[0]
+        return self._stacked((delay_signal(scene, direction, -lead) - direction) / lead)
+
+    def parameters(self, coefficients: Array) -> dict[str, Value]:
+        return {"impulse": float(coefficients[0]), "lead": self.shape[0]}
+
+    def equation(self, coefficients: Array) -> str:
+        lead, impulse = format_number(self.shape[0]), format_number(coefficients[0])
+        return f"tau_{self.joint} += {impulse} (sgn(qd_{self.joint}(t + {lead})) - sgn(qd_{self.joint}(t))) / {lead}"
+
+    @classmethod
+    def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
+        return [cls.at(arm, joint, shape=(lead,), bounds=(EARLY_LEAD_RANGE,)) for lead in EARLY_LEADS]
+
+    @classmethod
+    def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
+        lead = float(parameters["lead"])
+        return cls.at(arm, joints[0], shape=(lead,), bounds=(EARLY_LEAD_RANGE,)), np.array([parameters["impulse"]])
 
 
 @dataclass(frozen=True)
@@ -250,6 +303,7 @@ def signed_power(velocity: Array, exponent: float) -> Array:
 
 
 COULOMB_FRICTION = EveryJoint(COULOMB_FACTS, (CoulombFriction,))
+EARLY_FRICTION = EveryJoint(EARLY_FACTS, (EarlyFriction,))
 VISCOUS_FRICTION = EveryJoint(VISCOUS_FACTS, (ViscousFriction,))
 NONLINEAR_VISCOUS = EveryJoint(NONLINEAR_VISCOUS_FACTS, (PowerFriction,))
 

@@ -40,13 +40,19 @@ class FrictionCurve(Term):
 
     velocities: of the knots, from zero up, rad/s (m/s). Coefficients: F just above zero velocity, then by how much F
     rises from each knot to the next. Both directions have the same curve: what differs by a constant is an offset, and
-    a curve of each direction would hold the offset as well.
+    a curve of each direction would hold the offset as well. largest: torque that no coefficient is much larger than,
+    where that is known.
     """
 
     facts = FRICTION_CURVE_FACTS
     names = ("velocities", "torques")
     replaces = ("coulomb_friction", "viscous_friction")
     velocities: tuple[float, ...] = ()
+    largest: float = float("inf")
+
+    def prior_scale(self, inertial: Array | None) -> float:
+        """The largest torque."""
+        return self.largest
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:

@@ -13,6 +13,7 @@ from armlab.effects.drive import ROTOR_INERTIA, TORQUE_GAIN, TORQUE_OFFSET, TORQ
 from armlab.effects.friction import (
     ASYMMETRIC,
     COULOMB_FRICTION,
+    EARLY_FRICTION,
     LOAD_DEPENDENT,
     NONLINEAR_VISCOUS,
     STRIBECK,
@@ -55,6 +56,7 @@ BUILT_IN: tuple[Family, ...] = (
     EXTERNAL_CONTACT,
     TORQUE_SATURATION,
     FRICTION_CURVE,
+    EARLY_FRICTION,
 )
 _BUILT_IN_BY_NAME = {family.effect: family for family in BUILT_IN}
 WITHOUT_FAMILY = {effect.id: effect for effect in (*SERVO_EFFECTS, UNKNOWN)}

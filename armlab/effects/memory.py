@@ -67,8 +67,8 @@ FRICTION_DRIFT_FACTS = Effect(
     "viscous friction that changes as the joint warms",
     (
         Parameter("initial", f"{TORQUE}.s/{ANGLE}", positive=True),
-        Parameter("final", f"{TORQUE}.s/{ANGLE}", positive=True),
-        Parameter("time_constant", "s", positive=True, plausible=WARMING_TIMES_SEEN),
+        Parameter("final", f"{TORQUE}.s/{ANGLE}", positive=True, detail=True),
+        Parameter("time_constant", "s", positive=True, plausible=WARMING_TIMES_SEEN, detail=True),
     ),
     law=(
         r"\Delta\tau_j = \left( \text{initial} + (\text{final} - \text{initial}) (1 - e^{-t / \text{time "

@@ -74,7 +74,7 @@ CABLE_STIFFNESS_FACTS = Effect(
     figures="{stiffness}",
 )
 
-MIN_ORDER = 4.0  # cycles a turn: slower waves are gravity and springs
+MIN_ORDER = 6.0  # cycles a turn, of a motor with three slots and two poles (Zhu 2000); slower waves are other physics
 MAX_ORDER = 400.0
 GRID_ORDERS = 150  # of a plain grid
 BINS_PER_CYCLE = 8  # positions a cycle of the highest order, where a scan averages what is left
@@ -174,7 +174,7 @@ def order_resolution(scenes: Sequence[Scene], joint: int) -> tuple[float, float]
 
 
 def _ripple_of_order(arm: Arm, joint: int, order: float, step: float) -> TorqueRipple:
-    return TorqueRipple.at(arm, joint, shape=(order,), bounds=((max(order - step, MIN_ORDER / 2), order + step),))
+    return TorqueRipple.at(arm, joint, shape=(order,), bounds=((max(order - step, MIN_ORDER), order + step),))
 
 
 def _spectrum(

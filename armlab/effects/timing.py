@@ -16,16 +16,11 @@ from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_l
 from problem.arm import Arm
 from problem.motion import Motion
 
-SHIFT = Parameter(
-    "seconds",
-    "s",
-    plausible=Range((0.0, 0.5), "torque follows its cause; buses, filters and logs take up to half a second"),
-    sampled=True,
-)
+LONGEST_SEEN = "buses, filters and logs take up to half a second"
 TIME_DELAY_FACTS = Effect(
     "time_delay",
     "torque recorded later than the motion",
-    (SHIFT,),
+    (Parameter("seconds", "s", positive=True, plausible=Range((0.0, 0.5), LONGEST_SEEN), sampled=True),),
     sentence="Torque and motion are recorded at different times",
     figures="{seconds}",
     law=r"\tau_{\text{recorded}}(t) = \tau(t - \text{seconds})",
@@ -38,7 +33,7 @@ TIME_DELAY_FACTS = Effect(
 CHANNEL_SKEW_FACTS = Effect(
     "channel_skew",
     "one channel recorded later than the others",
-    (SHIFT,),
+    (Parameter("seconds", "s", plausible=Range((-0.5, 0.5), f"of either channel: {LONGEST_SEEN}"), sampled=True),),
     sentence="A channel of {place} is recorded at another time than the other channels",
     figures="{seconds}",
     law=r"\tau_{\text{recorded},j}(t) = \tau_j(t - \text{seconds})",

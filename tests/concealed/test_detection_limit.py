@@ -86,3 +86,18 @@ def test_noise_is_some_tenths_of_a_per_cent_of_the_rating() -> None:
     for seed in range(50):
         noise = draw_noise(np.random.default_rng(seed), "coloured", rating, True)
         assert np.all((noise.level > 0.0014 * rating) & (noise.level < 0.0041 * rating))
+
+
+def test_where_a_joint_stands_still_its_torque_tells_nothing() -> None:
+    effect, free = _columns()
+    resting = np.zeros((SAMPLES, JOINTS), dtype=bool)
+    resting[500:510, 0] = True
+    oracle = Oracle(NOISE, ORACLE.rate_hz, (resting,)).with_free_columns([free[..., None]])
+    changed, pulse = effect.copy(), np.zeros((SAMPLES, JOINTS))
+    changed[500:510, 0] += 7.0
+    pulse[500:510, 0] = 1.0
+    assert oracle.multiple([changed]) == pytest.approx(oracle.multiple([effect]))
+    assert oracle.multiple([pulse]) == pytest.approx(0.0, abs=1e-9)
+    assert oracle.multiple([effect]) < Oracle(NOISE, ORACLE.rate_hz).with_free_columns([free[..., None]]).multiple(
+        [effect]
+    )

@@ -150,6 +150,7 @@ def test_a_contact_is_felt_in_its_run_and_its_time_alone() -> None:
 
 def test_the_library_and_the_vocabulary_have_the_same_effects_at_the_same_kind_of_place() -> None:
     named = {family.effect: family.facts.where for family in BUILT_IN}
+    del named["early_friction"]  # the joints of the second engine have it of themselves
     assert {kind.effect: kind.where for kind in LIBRARY} == named
 
 

@@ -41,6 +41,11 @@ def test_a_gain_of_a_horizontal_arm_is_mistaken_for_what_scales_its_torque() -> 
     assert found.rival in ("payload", "inertial_parameter_error", "rotor_inertia")
 
 
+def test_a_law_that_holds_the_right_one_as_a_limit_is_no_rival() -> None:
+    found = answer_to(Viscous(0, 0.05, 100.0, "linear", {"phase": 0.0}))
+    assert found.rival not in ("stribeck_friction", "friction_curve", "asymmetric_friction", "friction_drift")
+
+
 def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) -> None:
     answer = OracleAnswer("a", "clean", "payload", "compact", 2, False, 5.0, "rotor_inertia", 2, 3.0, 0.93, 1.0)
     row = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_first": False, "named_class": True}

@@ -21,6 +21,7 @@ from armlab.concealed.score.measures import (
     engine_table,
 )
 from armlab.concealed.score.rows import ScoreRows, make_rows
+from armlab.concealed.score.stated import StatedClaim, stated_measures
 
 
 def measured(table: ScoreRows, id: str) -> Measure:
@@ -116,6 +117,13 @@ def test_what_no_motion_separates_is_no_wrong_name(answer: Truth, said: dict[str
 @pytest.mark.parametrize(("answer", "said"), NOT_IDENTICAL)
 def test_what_motion_can_separate_is_a_wrong_name(answer: Truth, said: dict[str, Any]) -> None:
     assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == "wrong"
+
+
+@pytest.mark.parametrize(("engine", "category"), [("sticking", "background"), ("mujoco", "wrong")])
+def test_friction_turns_early_where_joints_stick(engine: str, category: str) -> None:
+    answer, said = truth(effect("coulomb_friction", 1)), finding("early_friction", 1)
+    answer = answer.model_copy(update={"engine": engine})
+    assert categorize_finding(judged(answer, verdict("mismatch", (said,))), said) == category
 
 
 def test_unknown_is_right_for_an_effect_outside_and_false_where_nothing_is() -> None:
@@ -219,3 +227,14 @@ def test_levels_by_direction_are_named_by_a_level_and_an_offset_together() -> No
     assert measured(both, "right_name").value == 1
     assert measured(both, "right_joint").value == 1
     assert measured(one, "right_name").value == 0
+
+
+def test_probabilities_of_a_set_without_tables_are_judged_as_those_of_torque() -> None:
+    sure = [StatedClaim("payload", 0.95, right=number > 0, in_class=number > 0) for number in range(20)]
+    doubtful = [StatedClaim("time_delay", 0.6, right=False, in_class=True), StatedClaim("unknown", 0.6, False, False)]
+    found = {each.id: each for each in stated_measures([*sure, *doubtful])}
+    assert found["wrong_names_beyond_background"].value == pytest.approx(1 / 22)
+    assert found["right_when_sure"].value == pytest.approx(0.95)
+    assert found["right_when_doubtful"].value == 0
+    assert found["right_when_likely"].value is None
+    assert found["brier_skill"].number == 22

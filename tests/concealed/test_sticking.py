@@ -18,7 +18,7 @@ from armlab.concealed.simulate import (
     servo_torques,
     simulate,
 )
-from armlab.concealed.sizing import simulate_case
+from armlab.concealed.sizing import oracle_grid, simulate_case, standstills
 from armlab.concealed.sticking import is_carried, play_sticking
 
 
@@ -69,6 +69,17 @@ def test_the_torque_of_the_motors_is_recorded_though_a_joint_sticks() -> None:
     still = np.abs(track.velocity[:, 1]) < 1e-9
     assert still.sum() > 10
     assert np.abs(friction[still, 1]).min() < 4.0  # at rest it takes any value up to its level
+
+
+def test_the_oracle_knows_where_a_joint_sticks() -> None:
+    plan, controller, goal = plan_of(0)
+    track = played(plan, controller, goal, (Coulomb(1, 5.0, np.inf, "sign", {"width": 0.0}),))
+    grid = oracle_grid(track)
+    still = standstills(track, grid)
+    assert not still[:, 0].any()
+    assert 0 < still[:, 1].mean() < 0.2
+    slow = np.abs(track.at(grid).velocity[:, 1])
+    assert slow[still[:, 1]].max() < 0.1 < slow[~still[:, 1]].max()
 
 
 def test_a_third_of_a_set_is_of_the_second_engine_without_parts() -> None:

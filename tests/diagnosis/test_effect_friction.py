@@ -28,6 +28,20 @@ def integrated(time: Array, position: Array, way: float) -> Array:
     return np.asarray(found.y[0])
 
 
+def test_early_friction_is_an_impulse_at_each_reversal_before_the_joint_turns() -> None:
+    where = scene("RR")
+    law = candidate("early_friction", [where], 1)
+    torque, direction = torque_of(law, np.array([0.3]), where)[:, 0], direction_of_motion(where, 0)
+    turns = np.flatnonzero(np.sign(direction[1:]) != np.sign(direction[:-1]))
+    assert turns.size >= 4
+    near = round(0.03 / where.step)
+    for turn in turns[(turns > near) & (turns < len(torque) - near)]:
+        impulse = np.sum(torque[turn - near : turn + near]) * where.step
+        assert impulse == pytest.approx(0.6 * np.sign(direction[turn + 2] - direction[turn - 2]), rel=0.02)
+        assert np.abs(torque[turn + 3 : turn + near]).max() < 1e-9
+    assert "should be positive" in str(law.objection(np.array([-0.3])))
+
+
 @pytest.mark.parametrize("way", [0.004, 0.05, 0.4])
 def test_presliding_state_is_the_solution_of_dahls_equation(way: float) -> None:
     time, motion = waves(1, 3, 4.0, rate_hz=1000)

@@ -50,6 +50,33 @@ def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Obs
     assert abs(np.mean(white[1:] * white[:-1])) < 0.06
 
 
+def test_coloured_noise_is_whitened_through_rest_and_counts_less_where_it_is_larger(observed: Observed) -> None:
+    coloured = lfilter([0.3], [1, -0.9], np.random.default_rng(0).standard_normal((observed.rows, 3)), axis=0)
+    assert observed.at_rest("identify", 0).size > 100
+    noise = fit_noise(coloured, observed, 0.0, TUNING.noise)
+    white = noise.white(coloured[:, :1], 0, observed, "identify")[:, 0]
+    rows = sum(each.stop - each.start - noise.lost(0) for each in observed.of_role("identify"))
+    assert (len(white), noise.through) == (rows, (True,) * 3)
+    assert np.var(white) == pytest.approx(1, abs=0.1)
+    rest = observed.stretches_at_rest(0, observed.segments[0])[-1]
+    shaken = np.zeros(coloured.shape)
+    shaken[rest.start : rest.stop] = np.random.default_rng(1).standard_normal((rest.stop - rest.start, 3))
+    doubted = fit_noise(coloured + 0.6 * shaken, observed, 0.0, TUNING.noise)
+    assert doubted.through == (True,) * 3
+    assert doubted.numbers(np.arange(observed.rows), 0, observed, "identify")[0] == noise.lost(0)
+    assert doubted.resting[0][rest.start] > 1.3 * noise.resting[0][rest.start]
+    assert not fit_noise(coloured + 30 * shaken, observed, 0.0, TUNING.noise).through[0]
+
+
+def test_rows_at_rest_count_nothing_in_motion(observed: Observed) -> None:
+    coloured = lfilter([0.3], [1, -0.9], np.random.default_rng(0).standard_normal((observed.rows, 3)), axis=0)
+    for noise in (fit_noise(coloured, observed, 0.0, TUNING.noise, colour) for colour in (True, False)):
+        white = noise.in_motion(observed).white(np.ones((observed.rows, 1)), 0, observed, "identify")[:, 0]
+        numbers = noise.numbers(np.arange(observed.rows), 0, observed, "identify")
+        assert not white[np.isin(numbers, observed.at_rest("identify", 0))].any()
+        assert np.mean(white != 0) > 0.4
+
+
 def test_a_fit_from_moments_is_the_least_squares_fit_of_the_whitened_rows(bench: DesignMatrix) -> None:
     solver = solved(bench)
     columns = bench.columns

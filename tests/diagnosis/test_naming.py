@@ -136,6 +136,13 @@ def test_what_no_motion_separates_stays_beside_a_probable_name() -> None:
     assert found.next_experiment
 
 
+def test_names_that_no_motion_separates_count_together() -> None:
+    same = Rival("rotor_inertia", 2, (2,), identical=True)
+    (found,) = named_claims([claim("payload", weighed(0.03, payload=0.3, rotor_inertia=0.67), (same,))], TUNING)
+    assert (found.effect, found.members, found.rivals) == ("payload", (), (same,))
+    assert found.probability == pytest.approx(0.97)
+
+
 def test_the_weights_of_the_package_were_learnt_from_development_sets() -> None:
     weights = calibrated_weights()
     assert {"found none", "left none", "structure none"} <= set(weights)

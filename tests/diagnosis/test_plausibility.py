@@ -74,8 +74,16 @@ def test_a_shift_below_one_sampling_interval_is_a_finding_of_a_model_alone_that_
     assert reason(shift, ("seconds", 0.004, (0.003, 0.005))) is None
 
 
-def test_torque_that_leads_needs_overwhelming_evidence() -> None:
-    assert "not plausible" in str(reason(TimeDelay.at(ARM, 1), ("seconds", -0.006, (-0.007, -0.005))))
+def test_the_torque_of_all_joints_does_not_lead_but_a_channel_may() -> None:
+    early = ("seconds", -0.006, (-0.007, -0.005))
+    assert "may be zero" in str(reason(TimeDelay.at(ARM, 1), early))
+    assert "should be positive" in str(TimeDelay.at(ARM, 1, shape=(0.001,)).objection(np.array([-0.006])))
+    assert reason(TorqueSkew.at(ARM, 2), early) is None
+
+
+def test_a_drift_is_known_though_its_time_constant_is_not() -> None:
+    drift = ViscousDrift.at(ARM, 1, shape=(600.0,))
+    assert reason(drift, ("time_constant", 600.0, (-50.0, 2000.0)), ("final", 3.0, (-40.0, 50.0))) is None
 
 
 def test_a_wave_of_unknown_order_or_phase_is_no_finding() -> None:

@@ -142,8 +142,8 @@ def test_coloured_noise_is_whitened() -> None:
 def test_whitening_that_neglects_the_frequencies_of_the_motion_costs_predictions() -> None:
     model = first_model(cases.recording(friction_and_trifle))
     tuning, rows = model.design.settings.tuning.noise, np.ones(model.design.observed.rows)
-    white = Noise((np.ones(1),) * 3, (cases.NOISE,) * 3, (rows,) * 3)
-    slow = Noise((np.array([1.0, -0.99]),) * 3, (cases.NOISE,) * 3, (rows,) * 3)
+    white = Noise((np.ones(1),) * 3, (cases.NOISE,) * 3, (rows,) * 3, (False,) * 3)
+    slow = Noise((np.array([1.0, -0.99]),) * 3, (cases.NOISE,) * 3, (rows,) * 3, (False,) * 3)
     assert np.all(whitening_losses(model, white, white) == 0)
     assert np.all(whitening_losses(model, slow, white) > tuning.max_prediction_loss)
     chosen = choose_noise(slow, white, np.array([True, False, True]))

@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from armlab.diagnosis.report.sentences import finding_sentence, findings_in_sentences
-from armlab.diagnosis.report.words import finding_in_words
+from armlab.diagnosis.report.words import finding_in_words, variables_in_words
 from armlab.diagnosis.result import Claim, Rival
 from armlab.diagnosis.simulation import Simulation
 from armlab.effects.contract import ANGLE, Effect, Parameter
@@ -33,6 +33,7 @@ SENTENCES = {
     "load_dependent_friction": "The simulation lacks load-dependent friction at joint 2",
     "presliding_hysteresis": "The simulation lacks presliding hysteresis at joint 2",
     "friction_drift": "The simulation lacks friction drift at joint 2",
+    "early_friction": ("Friction turns before joint 2 does, which sticks at its reversals: 0.500 N m s (0.4 to 0.6)"),
     "rotor_inertia": "The simulation lacks rotor inertia at joint 2",
     "torque_gain_error": "The torque of joint 2 is read too large or too small: factor 0.500 (0.4 to 0.6)",
     "torque_offset": (
@@ -222,3 +223,8 @@ def test_a_sentence_with_a_field_that_nothing_fills_is_refused() -> None:
         Effect("seal", "a seal that leaks", sentence="{joint} leaks")
     with pytest.raises(ValueError, match="has the fields level, known are frame, offset"):
         Effect("seal", "a seal that leaks", (Parameter("offset", ANGLE),), sentence="It leaks", figures="{level}")
+
+
+def test_what_depends_on_nothing_that_is_known_depends_on_the_motion() -> None:
+    assert variables_in_words(ARM, ()) == "the motion"
+    assert variables_in_words(ARM, ("velocity_2", "time")) == "velocity of joint 2 and time"

@@ -80,6 +80,7 @@ EXAMPLES = {
     "external_contact": Example((2,), {"start": 2.0, "end": 3.0, "peak": 8.0}, "half sine"),
     "torque_saturation": Example((2,), {"limit": 14.0}),
     "friction_curve": Example((2,), {"velocities": (0.0, 0.2, 0.6, 1.2), "torques": (2.0, 2.6, 3.0, 3.1)}),
+    "early_friction": Example((2,), {"impulse": 0.05, "lead": 0.01}),
 }
 
 

@@ -3,7 +3,8 @@
 A finding is injected, in the background, identical to one of them, misplaced, unknown, or wrong. What counts as
 identical is the table of effects that no motion separates, fixed before any verdict was scored: asymmetric Coulomb
 friction is Coulomb friction and an offset; a rotor is the inertia of its link where no motion separates them; a
-linear spring is a cable; a payload is a change of its link; an equal delay is viscous friction.
+linear spring is a cable; a payload is a change of its link; an equal delay is viscous friction. Where joints stick,
+friction that turns early is a part of their friction.
 """
 
 import json
@@ -135,6 +136,7 @@ CONTAINED_EFFECTS = {  # what the law of an effect holds as a part
     "torque_gain_error": ("inertial_parameter_error",),
     "sticky_patches": ("coulomb_friction",),
 }
+EARLY_FRICTION, DRY_FRICTION = "early_friction", ("coulomb_friction", "stribeck_friction")
 DELAY_LIKE_EFFECTS = ("viscous_friction",)
 
 
@@ -147,7 +149,9 @@ def categorize_finding(case: JudgedCase, finding: dict[str, Any]) -> Category:
         return "injected"
     if any(is_same_effect(finding, effect) for effect in truth.present):
         return "background"
-    if any(_is_indistinguishable(finding, effect, truth) for effect in truth.present):
+    if name == EARLY_FRICTION and _sticks(truth, finding["joint"]):
+        return "background"
+    if any(_is_identical(finding, effect, truth) for effect in truth.present):
         return "identical"
     if _is_sum_of_parts(finding, truth):
         return "identical"
@@ -159,24 +163,40 @@ def is_same_effect(finding: dict[str, Any], effect: TrueEffect | LinkDeviation) 
     return bool(finding["effect"] == effect.effect and finding["joint"] == effect.joint)
 
 
-def _is_indistinguishable(finding: dict[str, Any], effect: TrueEffect | LinkDeviation, truth: Truth) -> bool:
-    """True for a finding that no motion separates from an effect, or that is a part of its law."""
-    found, place, name = finding["effect"], finding["joint"], effect.effect
-    if name == "time_delay":
+def _is_identical(finding: dict[str, Any], effect: TrueEffect | LinkDeviation, truth: Truth) -> bool:
+    what, where = (finding["effect"], finding["joint"]), (effect.effect, effect.joint)
+    return is_indistinguishable(*what, *where, truth.joints, truth.absorbed_rotors)
+
+
+def is_indistinguishable(
+    found: str, place: int | None, effect: str, joint: int | None, joints: int, absorbed_rotors: Sequence[int]
+) -> bool:
+    """True for a name at a place that no motion separates from an effect at a joint, or that is a part of its law.
+
+    joints: of the arm. absorbed_rotors: joints whose rotor no motion separates from the links.
+    """
+    if effect == "time_delay":
         return found in DELAY_LIKE_EFFECTS
-    if name == "slosh":
-        return found in ("payload", "inertial_parameter_error") and place == truth.joints
-    if found == "rotor_inertia" and name == "inertial_parameter_error":
-        return place in truth.absorbed_rotors
-    if found not in CONTAINED_EFFECTS.get(name, ()) or place is None or effect.joint is None:
+    if effect == "slosh":
+        return found in ("payload", "inertial_parameter_error") and place == joints
+    if found == "rotor_inertia" and effect == "inertial_parameter_error":
+        return place in absorbed_rotors
+    if found not in CONTAINED_EFFECTS.get(effect, ()) or place is None or joint is None:
         return False
     if found == "payload":
-        return bool(place == truth.joints and abs(place - effect.joint) <= 1)
+        return place == joints and abs(place - joint) <= 1
     if found != "inertial_parameter_error":
-        return bool(place == effect.joint)
-    if name == "payload":
-        return bool(abs(place - effect.joint) <= 1)
-    return bool(place >= effect.joint)
+        return place == joint
+    if effect == "payload":
+        return abs(place - joint) <= 1
+    return place >= joint
+
+
+def _sticks(truth: Truth, joint: int) -> bool:
+    """Whether a joint (from 1) stands still at its reversals, so that its friction turns before it does."""
+    return truth.engine == "sticking" and any(
+        each.effect in DRY_FRICTION and each.joint == joint for each in truth.present
+    )
 
 
 def _is_sum_of_parts(finding: dict[str, Any], truth: Truth) -> bool:

@@ -20,6 +20,7 @@ WANTED_BOUNDS = {
     "at most 2 %": (0.0, 0.02),
     "at most 5 %": (0.0, 0.05),
     "at least 80 %": (0.8, 1.0),
+    "at least 85 %": (0.85, 1.0),
     "at least 90 %": (0.9, 1.0),
     "at least 98 %": (0.98, 1.0),
     "90-98 %": (0.9, 0.98),
@@ -30,6 +31,7 @@ WANTED_BOUNDS = {
     "within 70-90 %": (0.7, 0.9),
     "within 90-100 %": (0.9, 1.0),
 }
+NAMES_WANTED = {"clean": "at least 90 %", "realistic": "at least 85 %"}  # right name or class
 WITHIN = "within "  # of a bound that the interval of a figure has to reach
 RELIABILITY_BINS = {  # of the stated probability: from, and below
     "right_when_doubtful": (0.5, 0.7),
@@ -136,7 +138,7 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
         share_measure("wrong_names_beyond_background", wrong[beyond]),
         *reliability_measures(claims[beyond]),
         share_measure("misplaced", claims["category"] == "misplaced"),
-        share_measure("right_name_or_class", large["named_class"]),
+        replace(share_measure("right_name_or_class", large["named_class"]), wanted=NAMES_WANTED[tier]),
         share_measure("right_name", large["named_first"]),
         share_measure("right_name_all_sizes", inside["named_first"]),
         share_measure("right_joint", named["right_joint"]),

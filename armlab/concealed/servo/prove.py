@@ -7,7 +7,7 @@ from pathlib import Path
 from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_judged_set
 from armlab.concealed.servo.make import make_case, write_case
 from armlab.concealed.servo.plan import ServoCase, draw_cases
-from armlab.concealed.servo.score import score_lines, score_motion
+from armlab.concealed.servo.score import score_motion
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ def prove_motion(settings: MotionSet, work: Path, results: Path, jobs: int) -> I
     """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
     plans = list(draw_cases(settings.seed, settings.cases, settings.nulls))
     yield from SetMaker(_make, _question, "diagnosed").prove(settings, plans, work, jobs)
-    measures = score_motion(work, [plan.name for plan in plans], results)
-    yield from score_lines(measures)
-    log_judged_set("motion", settings.seed, len(plans), work, [share for share, _ in measures])
+    score = score_motion(work, [plan.name for plan in plans], results)
+    yield from score.lines
+    log_judged_set("motion", settings.seed, len(plans), work, [share for share, _ in score.measures])
 
 
 def _make(case: ServoCase, draft: Path) -> None:

@@ -20,6 +20,8 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import read_json
 from armlab.concealed.folders import SETTINGS_FILE
 from armlab.concealed.score.cases import UNKNOWN_NAME, read_complaint
+from armlab.concealed.score.measures import Measure
+from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
 from armlab.concealed.score.weighed import WeighedFinding, check_development, read_names
 from armlab.concealed.sealed_set import Share
 
@@ -80,15 +82,33 @@ class MotionOutcome:
     hidden: list[HiddenOutcome]
     numbers: list[Number]
     single_wrong_numbers: int
+    stated: list[StatedClaim]
 
 
-def score_motion(work: Path, names: Sequence[str], results: Path) -> list[tuple[Share, str]]:
-    """Judges all cases, and writes motion.md and motion.json; the measures, each with what was wanted."""
+@dataclass(frozen=True, eq=False)
+class MotionScore:
+    """The measures of a set, each with what was wanted, and those of the probabilities of names."""
+
+    measures: list[tuple[Share, str]]
+    stated: list[Measure]
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The measures as lines."""
+        yield from (f"{share.name}: {share.text}{f'; wanted {aim}' if aim else ''}" for share, aim in self.measures)
+        yield from stated_lines(self.stated)
+
+
+def score_motion(work: Path, names: Sequence[str], results: Path) -> MotionScore:
+    """Judges all cases, and writes motion.md and motion.json."""
     outcomes = [_judge(work, name) for name in names]
     measures = _measure(outcomes)
+    stated = stated_measures([claim for each in outcomes for claim in each.stated])
     page = markdown_page(
         "Recordings of motion: score",
         markdown_table(("measure", "value", "wanted"), [(share.name, share.text, aim) for share, aim in measures]),
+        HEADING,
+        stated_table(stated),
         f"## Effects above {LEAST_MULTIPLE:g} detection limits",
         markdown_table(("what is hidden", "cases", "right name", "right class"), _rows_of_kinds(outcomes)),
         "## Numbers\n\nError: reported less true, over the width of the 95 % interval; wanted below 0.25.",
@@ -97,14 +117,10 @@ def score_motion(work: Path, names: Sequence[str], results: Path) -> list[tuple[
         markdown_table(("case", "law, controller", "hidden (limits)", "said"), _rows_of_misses(outcomes)),
     )
     content = {"measures": [{**asdict(share), "wanted": aim} for share, aim in measures]}
+    content |= {"probabilities": [asdict(each) for each in stated]}
     content |= {"cases": [asdict(each) for each in outcomes]}
     write_texts({"motion.md": page, "motion.json": json.dumps(content, indent=1) + "\n"}, results)
-    return measures
-
-
-def score_lines(measures: Sequence[tuple[Share, str]]) -> Iterator[str]:
-    """The measures as lines."""
-    yield from (f"{share.name}: {share.text}{f'; wanted {aim}' if aim else ''}" for share, aim in measures)
+    return MotionScore(measures, stated)
 
 
 def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:
@@ -217,7 +233,17 @@ def judge(truth: dict[str, Any], verdict: dict[str, Any], refused: str = "") -> 
         ],
         numbers=[number for _, number in numbers],
         single_wrong_numbers=len(single),
+        stated=[_stated(finding, own, truth, lacking) for finding, own in classes if own[0][0] not in lacking],
     )
+
+
+def _stated(
+    finding: dict[str, Any], names: Sequence[Name], truth: dict[str, Any], lacking: Sequence[str]
+) -> StatedClaim:
+    """A finding beyond what the simulation lacks anyhow. names: its own first, then those that it leaves open."""
+    true = [_is_true(name, truth, lacking) for name in names]
+    in_class = len(true) <= MAX_CLASS and any(true)
+    return StatedClaim(finding["effect"], finding.get("probability"), true[0], in_class)
 
 
 def _class_of(finding: dict[str, Any]) -> list[Name]:

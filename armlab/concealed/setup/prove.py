@@ -13,7 +13,7 @@ from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_j
 from armlab.concealed.setup.mistakes import Injected, inject
 from armlab.concealed.setup.oracle import can_be_seen
 from armlab.concealed.setup.plan import SetupCase, draw_cases, draw_mistakes
-from armlab.concealed.setup.score import score_lines, score_setup
+from armlab.concealed.setup.score import score_setup
 from armlab.concealed.simulate import arm_with_effects
 from armlab.concealed.sizing import simulate_case
 from armlab.recordings.load import load_recording
@@ -34,9 +34,9 @@ def prove_setup(settings: SetupSet, work: Path, results: Path, jobs: int) -> Ite
     """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
     cases = list(draw_cases(settings.seed, settings.simulated, settings.real, settings.nulls))
     yield from SetMaker(_make, _question, "diagnosed").prove(settings, cases, work, jobs)
-    scored = score_setup(work, [case.name for case in cases], results)
-    yield from score_lines(scored)
-    log_judged_set("setup", settings.seed, len(cases), work, scored[0])
+    score = score_setup(work, [case.name for case in cases], results)
+    yield from score.lines
+    log_judged_set("setup", settings.seed, len(cases), work, score.shares)
 
 
 def _make(case: SetupCase, draft: Path) -> None:

@@ -17,6 +17,8 @@ from scipy.stats import fisher_exact
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.cases import read_complaint
+from armlab.concealed.score.measures import Measure
+from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
 from armlab.concealed.sealed_set import Share
 from armlab.concealed.setup.plan import SetupCase
 
@@ -45,12 +47,40 @@ class SetupOutcome:
     physics: int
     physics_right: int
     gravity_off: float | None
+    stated: list[StatedClaim]
 
 
-def score_setup(work: Path, names: Sequence[str], results: Path) -> tuple[list[Share], list[SetupOutcome]]:
+@dataclass(frozen=True, eq=False)
+class SetupScore:
+    """The measures of a set, and those of the probabilities of setup findings in it, all and on real recordings."""
+
+    shares: list[Share]
+    outcomes: list[SetupOutcome]
+
+    @property
+    def stated(self) -> list[Measure]:
+        """Of all sources."""
+        return stated_measures([claim for each in self.outcomes for claim in each.stated])
+
+    @property
+    def stated_real(self) -> list[Measure]:
+        """Of public recordings."""
+        return stated_measures([claim for each in self.outcomes if each.source == "real" for claim in each.stated])
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """The measures as lines."""
+        yield from (f"{each.name}: {each.text}" for each in self.shares)
+        yield f"{CHANCE}: {physics_chance(self.outcomes):.2g}"
+        yield from stated_lines(self.stated)
+        yield from (f"real: {each}" for each in stated_lines(self.stated_real))
+
+
+def score_setup(work: Path, names: Sequence[str], results: Path) -> SetupScore:
     """Judges all cases and writes setup.md and setup.json."""
     outcomes = [_judge(work, name) for name in names]
     shares = _measure(outcomes)
+    score = SetupScore(shares, outcomes)
     rows = [*((each.name, each.text) for each in shares), (CHANCE, f"{physics_chance(outcomes):.2g}")]
     missed = [
         (each.source, each.kind, "; ".join(each.mistakes), str(each.seen), "; ".join(each.named) or each.status)
@@ -61,19 +91,16 @@ def score_setup(work: Path, names: Sequence[str], results: Path) -> tuple[list[S
     page = markdown_page(
         "How recordings are read: score",
         markdown_table(("measure", "value"), rows),
+        HEADING,
+        "Setup findings of all sources, then those of real recordings alone.",
+        stated_table(score.stated),
+        stated_table(score.stated_real),
         "## Misses and false corrections",
         markdown_table(heads, missed) if missed else "None.",
     )
     content = json.dumps([asdict(each) for each in outcomes], indent=1) + "\n"
     write_texts({"setup.md": page, "setup.json": content}, results)
-    return shares, outcomes
-
-
-def score_lines(scored: tuple[list[Share], list[SetupOutcome]]) -> Iterator[str]:
-    """The measures as lines."""
-    shares, outcomes = scored
-    yield from (f"{each.name}: {each.text}" for each in shares)
-    yield f"{CHANCE}: {physics_chance(outcomes):.2g}"
+    return score
 
 
 def _measure(outcomes: Sequence[SetupOutcome]) -> list[Share]:
@@ -139,7 +166,15 @@ def _judge(work: Path, name: str) -> SetupOutcome:
         physics=len(truth["physics"]),
         physics_right=sum(each in named for each in truth["physics"]),
         gravity_off=_gravity_off(truth, setup),
+        stated=[_stated(finding, truth["mistakes"], single) for finding in setup],
     )
+
+
+def _stated(finding: dict[str, Any], mistakes: Sequence[dict[str, Any]], single: bool) -> StatedClaim:
+    """A setup finding. single: an arm of one joint, where all joints are that joint."""
+    own = [(finding["effect"], _place(finding["joint"], finding.get("joints") or []))]
+    right, in_class = (any(_is_named(each, names, single) for each in mistakes) for names in (own, _class_of(finding)))
+    return StatedClaim(finding["effect"], finding.get("probability"), right, in_class)
 
 
 def _gravity_off(truth: dict[str, Any], setup: Sequence[dict[str, Any]]) -> float | None:

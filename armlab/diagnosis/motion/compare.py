@@ -273,13 +273,14 @@ def _compare_joint(
     """All fitted numbers of one joint, changed or not. free: numbers that the model has. place_of: joint, tests in all.
 
     All numbers differ at first. The one whose two values are missed least is tied, until each of the others is missed.
+    Where each was tied while others stood in for it, the one that differs most surely where all do has changed.
     """
     joint, looks = place_of
     first, last = (to_coordinates(start) for start in starts)
     numbers = np.flatnonzero(free).tolist()
     every = _fit_pair(pair, (first, last - first), free, numbers, tuning.pair_evaluations)
     model = _Model(every, free, tuple(numbers), tuning.pair_evaluations)
-    judged = _other_half_errors(pair, model)
+    judged = apart = _other_half_errors(pair, model)
     gains: dict[int, tuple[float, float, float]] = {}
     samples = len(pair[0].position) + len(pair[1].position)
     while model.changing:
@@ -304,7 +305,13 @@ def _compare_joint(
     models = (model, _Model(every, free, tuple(numbers), tuning.pair_evaluations))
     judged_models = [(each, *_run_errors(pair, each)) for each in models]
     found, test = {number: gains[number] for number in model.changing}, (looks, tuning.max_p_value)
-    return [_change(pair, number, joint, judged_models[number not in found], found, test) for number in numbers]
+    changes = [_change(pair, number, joint, judged_models[number not in found], found, test) for number in numbers]
+    surest = min(changes, key=lambda each: each.p_value)
+    if found or surest.p_value > tuning.max_p_value:
+        return changes
+    before, after = (float(np.sqrt(each.sum() / samples)) for each in (judged, apart))
+    alone = replace(surest, changed=True, before=before, after=after)
+    return [alone if each is surest else each for each in changes]
 
 
 def _tie(pair: Pair, model: "_Model", number: int) -> "_Model":

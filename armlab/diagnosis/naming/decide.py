@@ -75,7 +75,10 @@ def naming_of(weighed: Weighed, tuning: NamingTuning) -> Naming:
 
 
 def named_claims(claims: Sequence[Claim], tuning: NamingTuning) -> tuple[Claim, ...]:
-    """Claims with their probabilities. Those without a name are one finding a joint."""
+    """Claims with their probabilities; names that no motion separates count together.
+
+    Those without a name are one finding a joint.
+    """
     out = list[Claim]()
     for each in (_named(claim, tuning) for claim in claims):
         there = next((at for at, other in enumerate(out) if _are_one(each, other)), None)
@@ -92,14 +95,15 @@ def _named(claim: Claim, tuning: NamingTuning) -> Claim:
     expected = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
     if claim.effect == UNKNOWN.id or (naming.is_unknown and not expected):
         return _without_name(claim, naming, tuning)
-    members = naming.members(tuning) if naming.probability_of(claim.effect, claim.joint) < tuning.level else ()
-    others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     identical = [each for each in claim.rivals if each.identical]
     known = {(each.effect, each.joint) for each in identical}
+    chance = sum(naming.probability_of(*each) for each in {(claim.effect, claim.joint), *known})
+    members = naming.members(tuning) if chance < tuning.level else ()
+    others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     rivals = [*identical, *(each.as_rival for each in others if (each.effect, each.joint) not in known)]
     return replace(
         claim,
-        probability=naming.probability_of(claim.effect, claim.joint),
+        probability=chance,
         members=members,
         rivals=tuple(rivals[: tuning.max_class - 1]),
         next_experiment=next_experiment(effect_named(claim.effect), rivals),

@@ -8,7 +8,7 @@ still raise the log evidence (`left`), and structure of which only a surrogate k
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,13 +18,12 @@ from armlab.diagnosis.added_body import PlacedBody, payload_groups, place_body
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.plausibility import sticks_where_it_acts
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.search import Search
-from armlab.diagnosis.solver import State
+from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import flexible_gain, is_structured, predicted_share
-from armlab.effects.contract import UNKNOWN
+from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
 
 Place = int | None  # a joint or link, from 1; None for the whole robot
@@ -36,8 +35,8 @@ LEAST_GAIN = 0.02  # of the held-out error, where gains are compared as ratios
 class _Trial:
     """A law in the place of a finding. score: of the model with it; growth: of the held-out error by it, a share.
 
-    own: whether the search took it. blurred: whether it shifts the torque of a joint that sticks: friction at rest may
-    look like that.
+    own: whether the search took it. early: whether it shifts the torque of a joint that sticks to before its motion,
+    as friction at rest may seem to. in_motion: what such a shift adds to the log likelihood of rows in motion.
     """
 
     effect: str
@@ -46,7 +45,8 @@ class _Trial:
     score: float
     growth: float
     own: bool = False
-    blurred: bool = False
+    early: bool = False
+    in_motion: float | None = None
 
 
 def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> Weighed:
@@ -147,11 +147,16 @@ def _for_name(kind: Kind, trial: _Trial, best: float, without: float) -> dict[st
     deficit = best - trial.score
     out = {
         f"is {trial.effect}": 1.0,
-        "shifts where a joint sticks": float(trial.blurred),
         f"{kind} deficit": float(np.log1p(deficit)),
         f"{kind} near deficit": min(deficit, 30.0) / 10,
     }
     out[f"{kind} searched"] = float(trial.own)
+    if trial.in_motion is not None:
+        out |= {
+            "shifts where a joint sticks": 1.0,
+            "early where a joint sticks": float(trial.early),
+            "shifts in motion": float(np.log1p(max(trial.in_motion, 0.0))),
+        }
     if kind == "found":
         return out | {"found growth": min(float(np.log1p(10 * max(trial.growth, 0.0))), 3.0)}
     return out | {f"{kind} earned": float(np.log1p(trial.score - without))}
@@ -234,8 +239,28 @@ def _in_place(
         fit = solver.fit(state)
         growth = _growth(model.moments.heldout_error(fit.coefficients), known)
         named = candidate.first_name(solver.values(fit, number), model.design.scenes)
-        shifts = candidate.facts.cause == "timing" and sticks_where_it_acts(model, state, candidate)
-        yield _Trial(named.effect, named.joint, named.joints, fit.score, growth, key == taken, shifts)
+        trial = _Trial(named.effect, named.joint, named.joints, fit.score, growth, key == taken)
+        if candidate.facts.cause == "timing" and _sticks_where_it_acts(model, state, candidate):
+            early = bool(solver.values(fit, number)[0] < 0)
+            trial = replace(trial, early=early, in_motion=_gain_in_motion(model, without, fit, candidate.rows))
+        yield trial
+
+
+def _sticks_where_it_acts(model: FittedModel, state: State, candidate: Candidate) -> bool:
+    """Whether friction of a state that sticks acts where a law does."""
+    facts = [model.solver.groups[each].candidate for each in state.groups]
+    return any(each.facts.sticks and each.rows[0] in candidate.rows for each in facts)
+
+
+def _gain_in_motion(model: FittedModel, without: State, fit: Fit, joints: Sequence[int]) -> float:
+    """By how much the log likelihood of rows in motion is larger with a fit than without it, at some joints."""
+    observed, less, gain = model.design.observed, model.solver.fit(without), 0.0
+    noise = model.noise.in_motion(observed)
+    for joint in joints:
+        left = np.column_stack([model.residual_at(joint, each) for each in (less, fit)])
+        white = noise.white(left, joint, observed, "identify")
+        gain += float(np.sum(white[:, 0] ** 2) - np.sum(white[:, 1] ** 2)) / 2
+    return gain
 
 
 def _independent(search: Search, scores: Array, beside: State, share: float) -> frozenset[int]:

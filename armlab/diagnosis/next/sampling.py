@@ -98,7 +98,7 @@ def white_noise_sampling(levels: Array, cutoff_hz: float) -> Sampling:
     scales = np.asarray(levels) * np.sqrt(
         kept_hz / (INDEPENDENT_PER_HERTZ * cutoff_hz)
     )  # rows that share their noise count less
-    return Sampling(kept_hz, cutoff_hz, Noise(tuple(np.ones(1) for _ in levels), tuple(scales.tolist()), ()))
+    return Sampling(kept_hz, cutoff_hz, Noise(tuple(np.ones(1) for _ in levels), tuple(scales.tolist()), (), ()))
 
 
 def kept_columns(

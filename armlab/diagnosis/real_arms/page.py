@@ -7,7 +7,6 @@ import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report.numbers import format_number
-from armlab.common.report.words import join_words
 from armlab.diagnosis.real_arms.checks import MIN_FRICTION_SHARE, Check, mass_agreement, mass_claims, named_mass
 from armlab.diagnosis.real_arms.checks import numbers_in_words as claim_numbers
 from armlab.diagnosis.real_arms.direct_reading import MIDDLE
@@ -19,7 +18,7 @@ from armlab.diagnosis.report.words import (
     finding_in_words,
     joint_unit,
     rival_in_words,
-    variable_in_words,
+    variables_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR
@@ -133,7 +132,7 @@ def _study_parts(study: ArmStudy) -> Iterator[str]:
             yield claims_table(diagnosis)
         for each in diagnosis.unexplained:
             arm, share = diagnosis.simulation.arm, f"{100 * each.share:.0f} %"
-            depends = join_words([variable_in_words(arm, name) for name in each.depends_on])
+            depends = variables_in_words(arm, each.depends_on)
             yield f"Unexplained at {joint_in_words(arm, each.joint)}: {share} of the held-out variance, by {depends}."
     if study.alone:
         yield from _alone_parts(study)

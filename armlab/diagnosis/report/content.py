@@ -25,6 +25,7 @@ from armlab.diagnosis.report.words import (
     parameter_rows,
     rival_in_words,
     variable_in_words,
+    variables_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.story import claims_by_share, tell_story
@@ -215,7 +216,7 @@ def unexplained_lines(diagnosis: Diagnosis) -> list[str]:
     arm = diagnosis.simulation.arm
     return [
         f"{joint_at_start(arm, each.joint)}: {100 * each.share:.0f} % of the held-out error variance depends on "
-        f"{join_words([variable_in_words(arm, name) for name in each.depends_on])}, and no effect of the library has "
+        f"{variables_in_words(arm, each.depends_on)}, and no effect of the library has "
         "that form. Neither model.yaml nor the errors of the model found hold it."
         for each in diagnosis.unexplained
     ]

@@ -7,7 +7,6 @@ from textwrap import wrap
 import numpy as np
 
 from armlab.common.report.numbers import count_of, format_number
-from armlab.common.report.words import join_words
 from armlab.diagnosis.report.residuals import (
     ShownResiduals,
     correlation_seconds,
@@ -28,7 +27,7 @@ from armlab.diagnosis.report.words import (
     joint_unit,
     rival_in_words,
     shorten_name,
-    variable_in_words,
+    variables_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Unexplained
 from armlab.diagnosis.simulation import Simulation
@@ -143,7 +142,7 @@ def _rest_sentence(diagnosis: Diagnosis, data: ShownResiduals | None, joint: int
         return ""
     for each in diagnosis.unexplained:
         if each.joint == best.joint:
-            variables = join_words([variable_in_words(arm, name) for name in each.depends_on])
+            variables = variables_in_words(arm, each.depends_on)
             return (
                 f" {100 * each.share:.0f} % of the variance that is left there depends on {variables}, "
                 f"in a way that no known effect has{_floor_clause(best, each)}."
@@ -168,7 +167,9 @@ def _unknown_gain_sentence(diagnosis: Diagnosis, claim: Claim) -> str:
     """A surrogate tells how much there is to explain; it is no physics."""
     evidence, arm = claim.evidence, diagnosis.simulation.arm
     size, where = joint_unit(arm, evidence.joint), joint_in_words(arm, evidence.joint + 1)
-    variables = join_words([variable_in_words(arm, name) for name in claim.depends_on])
+    variables = variables_in_words(arm, claim.depends_on)
+    if evidence.rms_after >= evidence.rms_before:
+        return f"It depends on {variables}, in a way that does not repeat on held-out data of {where}."
     return (
         f"It depends on {variables}: a curve of these lowers the error of {where} on held-out data "
         f"from {format_fixed(evidence.rms_before)} to {format_fixed(evidence.rms_after)} {size}; "
@@ -192,7 +193,7 @@ def verdict_lines(diagnosis: Diagnosis) -> Iterator[str]:
     for number, (claim, share) in enumerate(claims_by_share(diagnosis), len(setup) + 1):
         yield from _claim_lines(number, claim, share, diagnosis.simulation)
     for each in diagnosis.unexplained:
-        variables = join_words([variable_in_words(arm, name) for name in each.depends_on])
+        variables = variables_in_words(arm, each.depends_on)
         yield f"  unexplained: {100 * each.share:.0f} % of {joint_in_words(arm, each.joint)}, by {variables}"
     yield from _error_lines(diagnosis)
 

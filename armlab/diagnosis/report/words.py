@@ -1,13 +1,14 @@
 """Words and numbers of a diagnosis: effects, places, and values with units and intervals."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
 
 import numpy as np
 
 from armlab.common.report.numbers import format_number, format_unit
+from armlab.common.report.words import join_words
 from armlab.diagnosis.result import Claim, Member, Rival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.simulation import Simulation
@@ -131,6 +132,11 @@ def variable_in_words(arm: Arm, name: str) -> str:
     """`velocity of shoulder_lift` of a variable like `velocity_2`; others, like `time`, as they are."""
     kind, _, joint = name.rpartition("_")
     return f"{kind} of {joint_in_words(arm, int(joint))}" if kind and joint.isdigit() else name
+
+
+def variables_in_words(arm: Arm, names: Sequence[str]) -> str:
+    """Variables that something depends on, with `and`; `the motion` where none is known."""
+    return join_words([variable_in_words(arm, name) for name in names]) if names else "the motion"
 
 
 def shorten_name(name: str) -> str:
