@@ -266,16 +266,33 @@ def relations(
 @click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a public recording [default: all].")
+@click.option("--seed", type=int, help="Draws random cases; 1000-1999 are for development [default: a fixed plan].")
+@click.option("--cases", type=click.IntRange(min=1), default=16, show_default=True, help="Random ones of a recording.")
+@click.option("--out", type=OutputPath(), help="Folder for the tables of random cases [default: RESULTS].")
+@click.option("--jobs", type=int, default=1, show_default=True, help="Processes for random cases.")
 @prints_lines
-def real_concealed(results: Path, recordings: Path, only: tuple[str, ...]) -> Iterator[str]:
+def real_concealed(
+    results: Path,
+    recordings: Path,
+    only: tuple[str, ...],
+    seed: int | None,
+    cases: int,
+    out: Path | None,
+    jobs: int,
+) -> Iterator[str]:
     """Judge diagnoses of effects concealed in real recordings.
 
     Conceals effects in public recordings of real arms, diagnoses them, and compares. Writes concealed.md,
-    concealed.csv and concealed.svg.
+    concealed.csv and concealed.svg; with --seed the tables cases.csv, claims.csv and recordings.csv, which
+    `armlab prove --tier real` scores.
     """
+    from armlab.diagnosis.real_concealed.at_random import REAL_ARMS, RandomCases, conceal_at_random
     from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 
-    return conceal_in_recordings(results, recordings, only, tell_progress)
+    if seed is None:
+        return conceal_in_recordings(results, recordings, only, tell_progress)
+    settings = RandomCases(only or REAL_ARMS, cases, seed)
+    return conceal_at_random(settings, recordings, results, out or results, jobs, tell_progress)
 
 
 @click.command()

@@ -237,7 +237,7 @@ def calibrate_names(sets: tuple[tuple[Path, Path], ...], motion_sets: tuple[Path
 @click.option(
     "--tier",
     "tiers",
-    type=click.Choice(["torque", "setup", "motion"]),
+    type=click.Choice(["torque", "setup", "motion", "real"]),
     multiple=True,
     help="Only this tier; may be given more than once [default: all].",
 )
@@ -250,13 +250,13 @@ def prove(
     nulls: int,
     work: Path | None,
     results: Path | None,
-    tiers: tuple[Literal["torque", "setup", "motion"], ...],
+    tiers: tuple[Literal["torque", "setup", "motion", "real"], ...],
     jobs: int,
 ) -> Iterator[str]:
     """Prove the diagnosis: conceal, diagnose blindly, score.
 
-    Tier by tier: torque, how recordings are read, motion only. Logs the scores. After an interruption the same command
-    continues (extra `engines`).
+    Tier by tier: torque, how recordings are read, motion only, real recordings with something concealed. Logs the
+    scores. After an interruption the same command continues (extra `engines`).
     """
     from armlab.concealed.prove import choose_proof
     from armlab.concealed.tiers import TIERS, prove_tiers

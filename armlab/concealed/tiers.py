@@ -1,4 +1,5 @@
-"""The whole proof, tier by tier: torque (clean and realistic, two engines), how recordings are read, and motion only.
+"""The whole proof, tier by tier: torque (clean and realistic, two engines), how recordings are read, motion only, and
+real recordings.
 
 Each tier has a folder of its own, below that of the proof, and continues there after an interruption. A judged proof
 has one seed for all of them, from the last commit that changed the code: results of one tier may be committed before
@@ -11,13 +12,17 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from armlab.concealed.prove import FINISHED_MARK, QUICK_NAME, QUICK_SEED, Proof, judged_seed, prove
+from armlab.concealed.real.prove import RealSet, prove_real
 from armlab.concealed.servo.prove import MotionSet, prove_motion
 from armlab.concealed.setup.prove import SetupSet, prove_setup
 
-TierName = Literal["torque", "setup", "motion"]
+TierName = Literal["torque", "setup", "motion", "real"]
 TIERS: tuple[TierName, ...] = get_args(TierName)
 QUICK_SETUP, QUICK_MOTION = (6, 0, 4), (4, 4)  # cases of each source, of a quick proof
 JUDGED_SETUP, JUDGED_MOTION = (300, 200, 300), (300, 300)
+RealSize = tuple[tuple[str, ...], int]  # recordings, and random cases of each
+QUICK_REAL: RealSize = ("emps", "staubli-tx40"), 1
+JUDGED_REAL: RealSize = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300"), 16
 
 
 def prove_tiers(proof: Proof, tiers: Sequence[TierName], work: Path, results: Path, jobs: int) -> Iterator[str]:
@@ -40,6 +45,9 @@ def _prove_other(proof: Proof, tier: TierName, work: Path, results: Path, jobs: 
     seed = judged_seed(proof.commit) if proof.commit else _development_seed(proof)
     if tier == "setup":
         return prove_setup(SetupSet(*(JUDGED_SETUP if judged else QUICK_SETUP), seed), work, results, jobs)
+    if tier == "real":
+        recordings, cases = JUDGED_REAL if judged else QUICK_REAL
+        return prove_real(RealSet(recordings, cases, seed), work, results, jobs, proof.commit)
     return prove_motion(MotionSet(*(JUDGED_MOTION if judged else QUICK_MOTION), seed), work, results, jobs)
 
 

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from armlab.concealed import tiers
-from armlab.concealed.prove import FINISHED_MARK, Proof, judged_seed
+from armlab.concealed.prove import FINISHED_MARK, QUICK_SEED, Proof, judged_seed
+from armlab.concealed.real.prove import RealSet
 from armlab.concealed.servo.prove import MotionSet
 from armlab.concealed.setup.prove import SetupSet
 from armlab.concealed.tiers import TIERS, prove_tiers
@@ -18,12 +19,12 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, Path, Path]]:
     """Stands in for every tier; lists what each was given."""
     given: list[tuple[Any, Path, Path]] = []
 
-    def stand_in(settings: Any, work: Path, results: Path, jobs: int) -> Iterator[str]:
+    def stand_in(settings: Any, work: Path, results: Path, jobs: int, commit: str | None = None) -> Iterator[str]:
         given.append((settings, work, results))
         work.mkdir(parents=True, exist_ok=True)
         yield "done"
 
-    for name in ("prove", "prove_setup", "prove_motion"):
+    for name in ("prove", "prove_setup", "prove_motion", "prove_real"):
         monkeypatch.setattr(tiers, name, stand_in)
     return given
 
@@ -31,11 +32,12 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, Path, Path]]:
 def test_each_tier_has_its_folder_and_all_have_one_judged_seed(asked: list[Any], tmp_path: Path) -> None:
     proof, commit = Proof({}, "judged", "a" * 40), "a" * 40
     list(prove_tiers(proof, TIERS, tmp_path / "work", tmp_path / "results", 1))
-    (torque, work, _), (setup, _, setup_results), (motion, _, _) = asked
+    (torque, work, _), (setup, _, setup_results), (motion, _, _), (real, _, _) = asked
     assert torque is proof
     assert work == tmp_path / "work" / "torque"
     assert setup == SetupSet(300, 200, 300, judged_seed(commit))
     assert motion == MotionSet(300, 300, judged_seed(commit))
+    assert (real.cases, real.seed, len(real.recordings)) == (16, judged_seed(commit), 5)
     assert setup_results == tmp_path / "results" / "setup"
 
 
@@ -47,3 +49,8 @@ def test_a_finished_tier_that_is_not_judged_starts_anew(asked: list[Any], tmp_pa
     list(prove_tiers(proof, ["motion"], tmp_path, tmp_path / "results", 1))
     assert not (tmp_path / "motion" / "old").exists()
     assert asked[0][0].cases < 10
+
+
+def test_a_quick_look_at_real_recordings_is_a_case_each_of_two(asked: list[Any], tmp_path: Path) -> None:
+    list(prove_tiers(Proof({}, "quick"), ["real"], tmp_path, tmp_path / "results", 1))
+    assert asked[0][0] == RealSet(("emps", "staubli-tx40"), 1, QUICK_SEED)

@@ -21,7 +21,7 @@ from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
 from problem.motion import Motion
 from problem.pseudo_inertia import link_from_centre_of_mass
-from problem.regressor import rigid_body_torque
+from problem.regressor import observation_matrix, rigid_body_torque
 
 MIXED_LAWS = ("direction", "cube root", "square", "load")
 """Laws of velocity or load that only improve a sum of laws. None is an effect by itself, so none can be named."""
@@ -190,57 +190,107 @@ MAIN_PARAMETER = {
     "payload": "mass",
     "cable_stiffness": "stiffness",
     "time_delay": "seconds",
-    "viscous_friction": "coefficient",
     "channel_skew": "seconds",
+    "viscous_friction": "coefficient",
+    "coulomb_friction": "level",
+    "torque_gain_error": "gain",
+    "torque_ripple": "amplitude",
     "rotor_inertia": "inertia",
+    "torque_offset": "offset",
 }
+LATE_KINDS = ("time_delay", "channel_skew")
 
 
 def add_disturbance(run: Run, arm: Arm, what: Disturbance) -> tuple[Run, Array]:
     """The run, even in time, with the disturbance, and what that adds to its torque, (samples, joints), N m (N).
 
     The motion is smoothed at the cut-off of least error of the acceleration, which is not that of the diagnosis. A
-    delay reads the recorded torque, noise and all, that much earlier by cubic splines; the first samples, before
+    late channel reads the recorded torque, noise and all, that much earlier by cubic splines; the first samples, before
     which nothing was recorded, are left out.
     """
     even = resample_evenly(run)
-    if what.effect == "time_delay":
+    if what.effect in LATE_KINDS:
         kept = even.time - what.size >= even.time[0]
         late = np.asarray(make_interp_spline(even.time, even.torque, k=3)(even.time[kept] - what.size))
+        if what.joint is not None:
+            others = np.arange(len(arm)) != what.joint - 1
+            late[:, others] = even.torque[kept][:, others]
         return replace(even.rows(kept), torque=late), late - even.torque[kept]
-    added = _disturbance_torque(what, arm, differentiate(even).motion)
+    added = _disturbance_torque(what, arm, even)
     return replace(even, torque=even.torque + added), added
 
 
-def sought_of_disturbance(what: Disturbance, joints: int) -> SoughtEffect:
-    """What should be named. joints: of the arm; a single one cannot tell its own skew from a delay of all, nor a load
-    from a rotor.
+def sought_of_disturbance(what: Disturbance, arm: Arm) -> SoughtEffect:
+    """What should be named.
+
+    The only joint of an arm cannot tell its own skew from a delay of all, nor a load from a rotor; no joint tells its
+    rotor from a link that may have any inertia about its axis.
     """
-    size: dict[str, KnownNumber] = {MAIN_PARAMETER[what.effect]: (what.size, None)}
+    value = 1 + what.size if what.effect == "torque_gain_error" else what.size
+    size: dict[str, KnownNumber] = {MAIN_PARAMETER[what.effect]: (value, None)}
+    if what.effect == "torque_ripple":
+        size["order"] = (float(what.order), None)
     numbers: dict[str, dict[str, KnownNumber]] = {what.effect: size}
     place = () if what.joint is None else (what.joint,)
     same = equivalent_effects(what.effect)
     numbers |= dict.fromkeys(same, size)
-    if joints == 1:
+    if len(arm) == 1:
         alike = tuple(name for name, other in EQUIVALENT_AT_ONLY_JOINT.items() if other == what.effect)
         same += alike
         numbers |= {name: {MAIN_PARAMETER[name]: (what.size, None)} for name in alike}
+    if what.effect == "rotor_inertia" and what.joint is not None and links_hold_rotor(arm, what.joint):
+        same += ("payload", *equivalent_effects("payload"))
     return SoughtEffect(str(what), (what.effect,), place, numbers, same)
 
 
-def _disturbance_torque(what: Disturbance, arm: Arm, motion: Motion) -> Array:
-    out = np.zeros(motion.position.shape)
+ROTOR_STATES = 200  # random states at which a rotor is compared with links
+MAX_ROTOR_REST = 1e-6  # of its torque, beyond which links do not hold it
+
+
+def links_hold_rotor(arm: Arm, joint: int) -> bool:
+    """Whether no motion separates the rotor of a joint, from 1, from inertial parameters of links."""
+    rng = np.random.default_rng(0)
+    motion = Motion(*rng.uniform(-2, 2, (3, ROTOR_STATES, len(arm))))
+    rotor = np.zeros((ROTOR_STATES, len(arm)))
+    rotor[:, joint - 1] = motion.acceleration[:, joint - 1]
+    links = observation_matrix(arm, motion)
+    held = links @ np.linalg.lstsq(links, rotor.ravel(), rcond=None)[0]
+    return bool(np.linalg.norm(held - rotor.ravel()) < MAX_ROTOR_REST * np.linalg.norm(rotor))
+
+
+def _disturbance_torque(what: Disturbance, arm: Arm, run: Run) -> Array:
+    """Torque of a disturbance on an even run, (samples, joints), N m (N)."""
     if what.joint is None:
         raise ValueError(f"{what.effect} needs a joint")
-    joint = what.joint - 1
+    joint, motion = what.joint - 1, differentiate(run).motion
     if what.effect == "payload":
         ball = 0.4 * what.size * what.radius**2 * np.eye(3)
         phi = np.zeros(10 * len(arm))
         ten = slice(10 * joint, 10 * joint + 10)
         phi[ten] = link_from_centre_of_mass(what.size, np.array(what.centre), ball).parameters
         return rigid_body_torque(arm, motion, phi)
-    if what.effect == "cable_stiffness":
-        out[:, joint] = what.size * (motion.position[:, joint] - what.rest)
-    else:
-        out[:, joint] = what.size * motion.velocity[:, joint]
+    out = np.zeros(motion.position.shape)
+    out[:, joint] = what.size * _unit_law(what, joint, motion, run.torque)
     return out
+
+
+def _unit_law(what: Disturbance, joint: int, motion: Motion, torque: Array) -> Array:
+    """What a disturbance of size 1 adds at its joint, from 0, (samples,)."""
+    position, velocity = motion.position[:, joint], motion.velocity[:, joint]
+    match what.effect:
+        case "cable_stiffness":
+            return position - what.rest
+        case "viscous_friction":
+            return velocity
+        case "coulomb_friction":
+            return np.asarray(np.tanh(velocity / what.width))
+        case "torque_gain_error":
+            return torque[:, joint]
+        case "torque_ripple":
+            return np.asarray(np.sin(what.order * position + what.phase))
+        case "rotor_inertia":
+            return motion.acceleration[:, joint]
+        case "torque_offset":
+            return np.ones(len(position))
+        case _:
+            raise ValueError(f"{what.effect} is no law at one joint")

@@ -6,16 +6,16 @@ part of the key: its last digits differ from run to run with the memory layout o
 """
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
-from armlab.diagnosis.data import rows_in
+from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.real_concealed.conceal import (
     Reference,
@@ -30,10 +30,13 @@ from armlab.diagnosis.result import Claim, Diagnosis
 from armlab.diagnosis.stored import code_digest, recording_digest
 from armlab.effects.contract import UNKNOWN
 from armlab.identification.model_file import write_model
+from armlab.identification.real.looks import Looks
 from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.reading.answer import SetupFinding
 from armlab.recordings.recording import Recording
 
 Span = tuple[float, float]
+TimedTorque = tuple[Array, Array]  # stamps (samples,), s, and torque (samples, joints), N m (N)
 
 
 @dataclass(frozen=True)
@@ -55,14 +58,28 @@ class Rival:
 
 
 @dataclass(frozen=True)
+class PossibleName:
+    """A name that a finding may have, or `unknown` for none, with its probability."""
+
+    effect: str
+    joints: tuple[int, ...]
+    probability: float
+
+
+@dataclass(frozen=True)
 class ReportedFinding:
-    """A finding. joints: as in `SoughtEffect`."""
+    """A finding. joints: as in `SoughtEffect`.
+
+    probability: of its name, None where that was not weighed. members: of its class, empty where the name stands alone.
+    """
 
     effect: str
     joints: tuple[int, ...]
     equation: str
     sizes: tuple[ParameterSize, ...]
     rivals: tuple[Rival, ...]
+    probability: float | None = None
+    members: tuple[PossibleName, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -72,7 +89,7 @@ class Outcome:
     given: of the error of the simulation that was handed over. named: of the error with every named finding. found: of
     the error with the surrogates of unknown structure, too. hidden: of the torque that is concealed. torque: of the
     filtered torque as measured. recovered: share of the hidden torque that the findings sought explain; None in a
-    control.
+    control. refused: why nothing was diagnosed, empty where something was; there are no errors then.
     """
 
     case: str
@@ -84,6 +101,7 @@ class Outcome:
     torque: tuple[float, ...]
     recovered: float | None
     seconds: float
+    refused: str = ""
 
 
 def summarise_claim(claim: Claim) -> ReportedFinding:
@@ -96,7 +114,25 @@ def summarise_claim(claim: Claim) -> ReportedFinding:
         pair = (float(span[0]), float(span[1])) if span and not isinstance(span[0], tuple) else None
         sizes.append(ParameterSize(each.name, float(each.value), pair, each.unit))
     rivals = tuple(Rival(each.effect, _joints_of(each.joint, each.joints)) for each in claim.rivals)
-    return ReportedFinding(claim.effect, _joints_of(claim.joint, claim.joints), claim.equation, tuple(sizes), rivals)
+    members = tuple(
+        PossibleName(each.effect, _joints_of(each.joint, each.joints), each.probability) for each in claim.members
+    )
+    place = _joints_of(claim.joint, claim.joints)
+    return ReportedFinding(claim.effect, place, claim.equation, tuple(sizes), rivals, claim.probability, members)
+
+
+def summarise_mistake(found: SetupFinding) -> ReportedFinding:
+    """A mistake of reading: a delay that is corrected there is no claim of physics any more."""
+    own = found.mistake
+    place = own.joints if own.joint is None else (own.joint,)
+    rivals = tuple(Rival(each.effect, _joints_of(each.joint, each.joints)) for each in found.rivals)
+    own_name = PossibleName(own.effect, place, found.probability)
+    others = (PossibleName(each.effect, _joints_of(each.joint, each.joints), each.probability) for each in found.rivals)
+    sizes = tuple(
+        ParameterSize(name, value, None, unit) for name, value, unit in own.parameters if isinstance(value, float)
+    )
+    members = (own_name, *others) if rivals else ()
+    return ReportedFinding(own.effect, place, found.text, sizes, rivals, found.probability, members)
 
 
 def _joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
@@ -105,43 +141,72 @@ def _joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
     return joints if len(joints) > 1 else (joint,)
 
 
+def examine_stored(
+    reference: Reference, case: Case, stored: "OutcomeStore", looks: Looks, progress: Callable[[str], None]
+) -> Outcome:
+    """The stored outcome of a case, or a new one, whose looks at validation runs are logged first."""
+    outcome = stored.read(case, reference.recording)
+    if outcome is None:
+        for run in reference.recording.with_role("validate"):
+            looks.note(reference.recording.arm.name, run.name, f"concealed: {case.name}")
+        with TemporaryDirectory() as folder:
+            outcome = examine_case(reference, case, Path(folder) / "reference.yaml", progress)
+        stored.write(case, reference.recording, outcome)
+    return outcome
+
+
 def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> Outcome:
     """The outcome of a case. path: where the simulation that is handed over is written."""
     recording, handed = reference.recording, withhold_pieces(reference.model, case.withheld)
     write_model(handed, path)
-    added: list[Array] | None = None
+    added: dict[str, TimedTorque] | None = None
     runs = recording.runs
     if case.injected is not None:
         pairs = [add_disturbance(run, recording.arm, case.injected) for run in runs]
-        runs, added = tuple(run for run, _ in pairs), [torque for _, torque in pairs]
+        runs, added = tuple(run for run, _ in pairs), {run.name: (run.time, torque) for run, torque in pairs}
     diagnosis = diagnose(replace(recording, runs=runs, simulation=path), "nominal", progress=progress)
-    return _measure_outcome(
-        case, diagnosis, _concealed_torque(diagnosis, reference.model, handed, added), sought_in_case(reference, case)
-    )
+    findings = tuple(summarise_mistake(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
+    findings += tuple(summarise_claim(each) for each in diagnosis.claims)
+    if diagnosis.observed is None or diagnosis.final is None:
+        return Outcome(case.name, findings, (), (), (), (), (), None, diagnosis.seconds, diagnosis.summary)
+    hidden = _concealed_torque(diagnosis.observed, reference.model, handed, added)
+    return _measure_outcome(case, diagnosis, findings, hidden, sought_in_case(reference, case))
 
 
 def sought_in_case(reference: Reference, case: Case) -> tuple[SoughtEffect, ...]:
     """What should be named."""
     if case.injected is not None:
-        return (sought_of_disturbance(case.injected, len(reference.recording.arm)),)
+        return (sought_of_disturbance(case.injected, reference.recording.arm),)
     return sought_of_pieces(reference.model, case.withheld)
 
 
 def _concealed_torque(
-    diagnosis: Diagnosis, whole: TorqueModel, handed: TorqueModel, added: Sequence[Array] | None
+    observed: Observed, whole: TorqueModel, handed: TorqueModel, added: Mapping[str, TimedTorque] | None
 ) -> Array:
-    """Torque of what is concealed at the kept rows, (rows, joints)."""
-    if diagnosis.observed is None:
-        raise InputError(f"{diagnosis.recording.name}: {diagnosis.summary}")
-    signals = diagnosis.observed.signals
+    """Torque of what is concealed at the kept rows, (rows, joints).
+
+    added: of each run by its name; None where parts of the model are withheld. The diagnosis orders the runs in its own
+    way, and may have corrected their stamps.
+    """
     if added is None:
-        parts = [whole.filtered_torque(each) - handed.filtered_torque(each) for each in signals]
+        parts = [whole.filtered_torque(each) - handed.filtered_torque(each) for each in observed.signals]
     else:
-        parts = [np.asarray(each.filter(torque)) for each, torque in zip(signals, added, strict=True)]
+        parts = [np.asarray(each.filter(_read_at(*added[each.run.name], each.run.time))) for each in observed.signals]
     return np.concatenate(parts)
 
 
-def _measure_outcome(case: Case, diagnosis: Diagnosis, hidden: Array, wanted: tuple[SoughtEffect, ...]) -> Outcome:
+def _read_at(time: Array, torque: Array, wanted: Array) -> Array:
+    """Torque (samples, joints) at other stamps."""
+    return np.column_stack([np.interp(wanted, time, each) for each in torque.T])
+
+
+def _measure_outcome(
+    case: Case,
+    diagnosis: Diagnosis,
+    findings: tuple[ReportedFinding, ...],
+    hidden: Array,
+    wanted: tuple[SoughtEffect, ...],
+) -> Outcome:
     assert diagnosis.observed is not None
     assert diagnosis.nominal is not None
     assert diagnosis.final is not None
@@ -154,7 +219,7 @@ def _measure_outcome(case: Case, diagnosis: Diagnosis, hidden: Array, wanted: tu
     power = float(np.sum(hidden[rows] ** 2))
     return Outcome(
         case=case.name,
-        findings=tuple(summarise_claim(each) for each in diagnosis.claims),
+        findings=findings,
         given=_rms(diagnosis.nominal[rows]),
         named=_rms(named[rows]),
         found=_rms(diagnosis.final[rows]),
@@ -204,4 +269,6 @@ class OutcomeStore:
 
 def open_outcomes(folder: Path) -> OutcomeStore:
     """Outcomes of the code as it stands."""
-    return OutcomeStore(folder, code_digest(*Path(__file__).parent.glob("*.py")))
+    own = Path(__file__).parent
+    naming = own.parent / "naming"
+    return OutcomeStore(folder, code_digest(*own.glob("*.py"), *naming.glob("*.py"), *naming.glob("*.json")))

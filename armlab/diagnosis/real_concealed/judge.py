@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.real_concealed.conceal import (
     EQUIVALENT_AT_ONLY_JOINT,
     EQUIVALENT_NAMES,
@@ -70,14 +71,20 @@ class CaseVerdict:
 
 
 def judge_case(case: Case, outcome: Outcome, wanted: tuple[SoughtEffect, ...], control: Outcome) -> CaseVerdict:
-    """Judges a case. wanted: what should be named. control: the outcome with nothing concealed."""
-    judge = _Judge(control, len(outcome.given))
+    """Judges a case. wanted: what should be named. control: the outcome with nothing concealed.
+
+    Raises InputError where the diagnosis refused the case or the control.
+    """
+    for each in (outcome, control):
+        if each.refused:
+            raise InputError(f"{case.recording}, {each.case}: {each.refused}")
+    judge = Judge(control, len(outcome.given))
     new = tuple(each for each in outcome.findings if not judge.is_in_control(each))
     unsought = tuple(each for each in new if not any(judge.answers(each, one) for one in wanted))
     parts = tuple(judge.judge_part(each, outcome.findings, new, unsought) for each in wanted)
     used = {id(each.finding) for each in parts}
     left = [each for each in unsought if id(each) not in used and not judge.findings_in_control(each)]
-    laws = tuple(each for each in left if any(_is_same_kind(each, one) for one in wanted))
+    laws = tuple(each for each in left if any(is_same_kind(each, one) for one in wanted))
     others = tuple(each for each in left if each not in laws)
     over = np.array(outcome.hidden) / np.array(control.given)
     joint = int(np.argmax(over))
@@ -87,8 +94,8 @@ def judge_case(case: Case, outcome: Outcome, wanted: tuple[SoughtEffect, ...], c
 
 
 @dataclass(frozen=True)
-class _Judge:
-    """The control, and the number of joints of the arm."""
+class Judge:
+    """What a finding means beside the control. joints: of the arm."""
 
     control: Outcome
     joints: int
@@ -113,8 +120,11 @@ class _Judge:
 
     def answers(self, finding: ReportedFinding, sought: SoughtEffect) -> bool:
         """Whether a finding has a name that is sought, at the place."""
-        keys = {self.common_key(effect, sought.joints) for effect in (*sought.effects, *sought.identical)}
-        return self.common_key(finding.effect, finding.joints) in keys
+        return self.common_key(finding.effect, finding.joints) in self.common_keys(sought)
+
+    def common_keys(self, sought: SoughtEffect) -> set[tuple[str, tuple[int, ...]]]:
+        """The same of all names that answer."""
+        return {self.common_key(effect, sought.joints) for effect in (*sought.effects, *sought.identical)}
 
     def judge_part(self, sought: SoughtEffect, findings: Findings, new: Findings, unsought: Findings) -> JudgedPart:
         """The answer to one thing that is sought.
@@ -128,7 +138,7 @@ class _Judge:
             same = {each.effect for each in named} in ({*sought.effects}, set())
             numbers = tuple(held for each in answering for held in self.compare_numbers(sought, each, same))
             return JudgedPart(sought, "named" if named else "identical", (named or answering)[0], numbers)
-        same_kind = [each for each in unsought if _is_same_kind(each, sought)]
+        same_kind = [each for each in unsought if is_same_kind(each, sought)]
         if same_kind:
             return JudgedPart(sought, "law", same_kind[0], ())
         for each in unsought:
@@ -174,7 +184,8 @@ class _Judge:
         return compared
 
 
-def _is_same_kind(finding: ReportedFinding, sought: SoughtEffect) -> bool:
+def is_same_kind(finding: ReportedFinding, sought: SoughtEffect) -> bool:
+    """Whether it is another law of a kind that is withheld at the joint."""
     return finding.effect in sought.laws and finding.joints == sought.joints
 
 

@@ -1,4 +1,4 @@
-"""What is concealed in which real recording. The plan was written before any case was diagnosed.
+"""What is concealed in which real recording by the fixed plan, which was written before any case was diagnosed.
 
 The injected sizes follow from the error of each reference model on the validation runs: from about a third of it
 to five times as much, at the joint where the disturbance shows most.
@@ -8,6 +8,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 PieceKind = Literal["friction", "wrist coupling", "counterbalance", "payload"]
+DisturbanceKind = Literal[
+    "payload",
+    "cable_stiffness",
+    "time_delay",
+    "channel_skew",
+    "viscous_friction",
+    "coulomb_friction",
+    "torque_gain_error",
+    "torque_ripple",
+    "rotor_inertia",
+    "torque_offset",
+]
 
 
 @dataclass(frozen=True)
@@ -26,28 +38,46 @@ class Piece:
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What is added to a recorded torque. size: in `unit`; a delay's in seconds.
+    """What is added to a recorded torque. size: in `unit`; a delay's in seconds, a gain's the share that is read more.
 
     joint: from 1, the link of a payload, None for all channels. rest: of a spring, rad (m). centre: of a payload, m
-    in the link's frame. radius: of that body, a ball, m.
+    in the link's frame. radius: of that body, a ball, m. width: speed at which Coulomb friction turns over, rad/s
+    (m/s). order: of a ripple, cycles a turn (rad/m). phase: of a ripple, rad.
     """
 
-    effect: Literal["payload", "cable_stiffness", "time_delay", "viscous_friction"]
+    effect: DisturbanceKind
     joint: int | None
     size: float
     unit: str
     rest: float = 0.0
     centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
     radius: float = 0.05
+    width: float = 0.0
+    order: int = 0
+    phase: float = 0.0
 
     def __str__(self) -> str:
         """For a table."""
-        if self.effect == "time_delay":
-            return f"torque late by {1e3 * self.size:g} ms"
-        if self.effect == "payload":
-            return f"payload of {self.size:g} {self.unit} at link {self.joint}"
-        name = "spring" if self.effect == "cable_stiffness" else "viscous friction"
-        return f"{name} of {self.size:g} {self.unit} at joint {self.joint}"
+        size, place = f"{self.size:g} {self.unit}", f"at joint {self.joint}"
+        match self.effect:
+            case "time_delay":
+                return f"torque late by {1e3 * self.size:g} ms"
+            case "channel_skew":
+                return f"torque of joint {self.joint} late by {1e3 * self.size:g} ms"
+            case "payload":
+                return f"payload of {size} at link {self.joint}"
+            case "torque_gain_error":
+                return f"torque of joint {self.joint} times {1 + self.size:g}"
+            case "torque_ripple":
+                return f"ripple of {size}, order {self.order}, {place}"
+            case "cable_stiffness":
+                return f"spring of {size} {place}"
+            case "coulomb_friction":
+                return f"Coulomb friction of {size} {place}"
+            case "torque_offset":
+                return f"constant torque of {size} {place}"
+            case _:
+                return f"{self.effect.replace('_', ' ')} of {size} {place}"
 
 
 @dataclass(frozen=True)

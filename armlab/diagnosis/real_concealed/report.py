@@ -24,8 +24,9 @@ from armlab.diagnosis.real_concealed.plan import INJECTED
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_recording
 from armlab.diagnosis.report.words import effect_in_words
 from armlab.effects.contract import UNKNOWN
-from armlab.effects.library import effect_named
+from armlab.effects.library import EFFECT_IDS, effect_named
 from armlab.identification.real.looks import LOOKS_FILE, Looks
+from armlab.recordings.reading.words import NAMES as MISTAKE_NAMES
 
 ANSWER_WORDS = {
     "named": "named at its place",
@@ -41,10 +42,12 @@ ANSWER_WORDS = {
 def finding_in_words(finding: ReportedFinding) -> str:
     """A finding with its place, by number as the plan of the concealed effects."""
     place = "the whole robot"
+    is_mistake = finding.effect in MISTAKE_NAMES and finding.effect not in EFFECT_IDS
     if finding.joints:
-        kind = "link" if effect_named(finding.effect).where == "link" else "joint"
+        kind = "link" if not is_mistake and effect_named(finding.effect).where == "link" else "joint"
         place = f"{kind} {' from joint '.join(map(str, finding.joints[:2]))}"
-    return f"{effect_in_words(finding.effect)}, {place}"
+    words = MISTAKE_NAMES[finding.effect] if is_mistake else effect_in_words(finding.effect)
+    return f"{words}, {place}"
 
 
 def answer_in_words(part: JudgedPart) -> str:

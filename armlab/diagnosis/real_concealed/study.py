@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armlab.diagnosis.real_concealed.conceal import Reference, identify_reference
-from armlab.diagnosis.real_concealed.examine import Outcome, OutcomeStore, examine_case, sought_in_case
+from armlab.diagnosis.real_concealed.examine import Outcome, OutcomeStore, examine_stored, sought_in_case
 from armlab.diagnosis.real_concealed.judge import CaseVerdict, judge_case
 from armlab.diagnosis.real_concealed.plan import Case, cases_of
 from armlab.identification.real.looks import Looks
@@ -44,19 +44,11 @@ def study_cases(
     reference: Reference, cases: tuple[Case, ...], stored: OutcomeStore, looks: Looks, progress: Progress
 ) -> ConcealedStudy:
     """The cases of a recording, the control first."""
-    stored.folder.mkdir(parents=True, exist_ok=True)
-    path = stored.folder / f"{reference.recording.name}.yaml"
     outcomes = []
     for number, case in enumerate(cases, 1):
         heading = f"{case.recording}, {number} of {len(cases)}: {case.name}"
         progress(heading)
-        outcome = stored.read(case, reference.recording)
-        if outcome is None:
-            for run in reference.recording.with_role("validate"):
-                looks.note(reference.recording.arm.name, run.name, f"concealed: {case.name}")
-            outcome = examine_case(reference, case, path, _progress_under(heading, progress))
-            stored.write(case, reference.recording, outcome)
-        outcomes.append(outcome)
+        outcomes.append(examine_stored(reference, case, stored, looks, _progress_under(heading, progress)))
     control = next(each for case, each in zip(cases, outcomes, strict=True) if case.control)
     pairs = [(case, each) for case, each in zip(cases, outcomes, strict=True) if not case.control]
     verdicts = tuple(judge_case(case, each, sought_in_case(reference, case), control) for case, each in pairs)
