@@ -36,7 +36,8 @@ def prove_tiers(proof: Proof, tiers: Sequence[TierName], work: Path, results: Pa
         if proof.commit is None and (folder / FINISHED_MARK).is_file():
             shutil.rmtree(folder)  # as for torque: a finished proof that is not judged starts again from nothing
         yield from _prove_other(proof, tier, folder, results / tier, jobs)
-        (folder / FINISHED_MARK).touch()
+        if folder.is_dir():  # a tier that was skipped has none
+            (folder / FINISHED_MARK).touch()
 
 
 def _prove_other(proof: Proof, tier: TierName, work: Path, results: Path, jobs: int) -> Iterator[str]:

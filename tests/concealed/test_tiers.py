@@ -54,3 +54,9 @@ def test_a_finished_tier_that_is_not_judged_starts_anew(asked: list[Any], tmp_pa
 def test_a_quick_look_at_real_recordings_is_a_case_each_of_two(asked: list[Any], tmp_path: Path) -> None:
     list(prove_tiers(Proof({}, "quick"), ["real"], tmp_path, tmp_path / "results", 1))
     assert asked[0][0] == RealSet(("emps", "staubli-tx40"), 1, QUICK_SEED)
+
+
+def test_a_tier_that_is_skipped_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(tiers, "prove_real", lambda *_: iter(["skipped"]))
+    assert list(prove_tiers(Proof({}, "quick"), ("real",), tmp_path / "work", tmp_path, 1)) == ["tier real", "skipped"]
+    assert not (tmp_path / "work").exists()
