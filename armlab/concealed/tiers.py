@@ -14,6 +14,7 @@ from typing import Literal, get_args
 from armlab.concealed.prove import FINISHED_MARK, QUICK_NAME, QUICK_SEED, Proof, judged_seed, prove
 from armlab.concealed.real.prove import RealSet, prove_real
 from armlab.concealed.servo.prove import MotionSet, prove_motion
+from armlab.concealed.setup.plan import PUBLIC
 from armlab.concealed.setup.prove import SetupSet, prove_setup
 
 TierName = Literal["torque", "setup", "motion", "real"]
@@ -22,7 +23,7 @@ QUICK_SETUP, QUICK_MOTION = (6, 0, 4), (4, 4)  # cases of each source, of a quic
 JUDGED_SETUP, JUDGED_MOTION = (300, 200, 300), (300, 300)
 RealSize = tuple[tuple[str, ...], int]  # recordings, and random cases of each
 QUICK_REAL: RealSize = ("emps", "staubli-tx40"), 1
-JUDGED_REAL: RealSize = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300"), 16
+JUDGED_REAL: RealSize = PUBLIC, 16
 
 
 def prove_tiers(proof: Proof, tiers: Sequence[TierName], work: Path, results: Path, jobs: int) -> Iterator[str]:

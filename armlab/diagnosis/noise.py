@@ -111,13 +111,12 @@ def fit_noise(residuals: Array, observed: Observed, fitted: float, tuning: Noise
         taps.append(found)
         scales.append(float(np.sqrt(variance * spare)))
         left, least = residuals[:, joint], float(np.sqrt(_mean_square(parts) * spare))
-        whole = _rest_scales(left, least, joint, observed) * np.sqrt(tuning.filter_correlation_rows)
+        resting.append(_rest_scales(left, least, joint, observed) * np.sqrt(tuning.filter_correlation_rows))
         through.append(False)
         if len(found) > 1 and count >= tuning.min_moving_share * len(residuals):
             filtered, at_rest = _scales_through_rest(left, found, scales[-1], joint, observed)
-            through[-1] = at_rest <= tuning.max_rest_ratio * scales[-1]
-            whole = filtered if through[-1] else whole
-        resting.append(whole)
+            if at_rest <= tuning.max_rest_ratio * scales[-1]:
+                resting[-1], through[-1] = filtered, True
     return Noise(tuple(taps), tuple(scales), tuple(resting), tuple(through))
 
 

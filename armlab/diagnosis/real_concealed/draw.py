@@ -7,6 +7,7 @@ size, so that one division gives the size that has the target strength; delays a
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 
@@ -19,26 +20,15 @@ from armlab.diagnosis.real_concealed.conceal import (
     add_disturbance,
     withhold_pieces,
 )
-from armlab.diagnosis.real_concealed.plan import Case, Disturbance, DisturbanceKind, Piece
+from armlab.diagnosis.real_concealed.plan import Case, Disturbance, DisturbanceKind, Piece, PieceKind
 from armlab.effects.contract import UNITS
 from armlab.identification.real.study import recipe_named
 from armlab.recordings.differentiate import Signals
 from problem.arm import Arm
 
 STRENGTHS = (0.3, 8.0)  # targets, log-uniform
-INJECTED_KINDS: tuple[DisturbanceKind, ...] = (
-    "payload",
-    "cable_stiffness",
-    "time_delay",
-    "channel_skew",
-    "viscous_friction",
-    "coulomb_friction",
-    "torque_gain_error",
-    "torque_ripple",
-    "rotor_inertia",
-    "torque_offset",
-)
-WITHHELD_KINDS = (Piece("friction"), Piece("wrist coupling"), Piece("counterbalance"), Piece("payload"))
+INJECTED_KINDS: tuple[DisturbanceKind, ...] = get_args(DisturbanceKind)
+WITHHELD_KINDS = tuple(Piece(kind) for kind in get_args(PieceKind))
 UNIT_FORMS = {
     "payload": "kg",
     "cable_stiffness": "{torque}/{position}",
