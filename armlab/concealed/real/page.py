@@ -1,6 +1,5 @@
 """The page of a score on real recordings, its figures, and the tables beside it."""
 
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -72,19 +71,13 @@ def write_score(seed: int, tables: RealTables, folder: Path) -> tuple[Path, ...]
     """Writes page, tables and figures, all or none."""
     texts = {
         PAGE_FILE: render_page(seed, tables),
-        CASES_TABLE: _csv_text(tables.cases),
-        CLAIMS_TABLE: _csv_text(tables.claims),
-        RECORDINGS_TABLE: _csv_text(tables.recordings),
+        CASES_TABLE: tables.cases.to_csv(index=False, lineterminator="\n"),
+        CLAIMS_TABLE: tables.claims.to_csv(index=False, lineterminator="\n"),
+        RECORDINGS_TABLE: tables.recordings.to_csv(index=False, lineterminator="\n"),
         RELIABILITY_FILE: svg_text(draw_reliability(tables), "reliability"),
         STRENGTH_FILE: svg_text(draw_strengths(tables), "strength"),
     }
     return write_texts(texts, folder)
-
-
-def _csv_text(frame: pd.DataFrame) -> str:
-    out = StringIO()
-    frame.to_csv(out, index=False, lineterminator="\n")
-    return out.getvalue()
 
 
 def render_page(seed: int, tables: RealTables) -> str:

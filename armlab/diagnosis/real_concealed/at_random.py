@@ -5,7 +5,6 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -140,13 +139,10 @@ def random_tables(studies: Sequence[RandomStudy]) -> dict[str, str]:
         pd.DataFrame(claims, columns=list(CLAIM_COLUMNS)),
         pd.DataFrame(about, columns=list(RECORDING_COLUMNS)),
     )
-    return {name: _csv_text(frame) for name, frame in zip(TABLES, frames, strict=True)}
-
-
-def _csv_text(frame: pd.DataFrame) -> str:
-    out = StringIO()
-    frame.to_csv(out, index=False, float_format="%.4g", lineterminator="\n")
-    return out.getvalue()
+    return {
+        name: frame.to_csv(index=False, float_format="%.4g", lineterminator="\n")
+        for name, frame in zip(TABLES, frames, strict=True)
+    }
 
 
 def _case_rows(number: int, verdict: DrawnVerdict) -> Iterator[tuple[Any, ...]]:
