@@ -58,22 +58,28 @@ def whitened_rows(
 ) -> WhitenedRows:
     """Design and errors of a fit: links, effects in their order, then the extra columns (rows, count) by joint."""
     designs, errors, blocks = [], [], []
-    base, stretches = len(fit.links), block_numbers(observed, tuning.block_s, tuning.min_blocks)
-    for joint, (matrix, index) in enumerate(zip(columns.matrices, columns.index, strict=True)):
-        scaled = matrix[:, :-1] / lengths[index[:-1]]
-        loading = index[:-1] < base
-        links = scaled[:, loading] @ fit.links[index[:-1][loading]]
-        effects = np.zeros((len(matrix), len(fit.columns)))
-        at = {int(column): place for place, column in enumerate(index[:-1])}
-        for place, column in enumerate(fit.columns):
-            if int(column) in at:
-                effects[:, place] = scaled[:, at[int(column)]]
-        left = matrix[:, -1] - scaled @ fit.coefficients[index[:-1]]
-        design = np.column_stack([links, effects, *([extra[joint]] if joint in extra else [])])
+    stretches = block_numbers(observed, tuning.block_s, tuning.min_blocks)
+    for joint in range(columns.joints):
+        own, left = rows_of_fit(columns, fit, lengths, joint)
+        design = np.column_stack([own, *([extra[joint]] if joint in extra else [])])
         designs.append(noise.white(design, joint, observed, "identify"))
         errors.append(noise.white(left[:, None], joint, observed, "identify")[:, 0])
         blocks.append(noise.numbers(stretches, joint, observed, "identify"))
     return WhitenedRows(tuple(designs), tuple(errors), tuple(blocks))
+
+
+def rows_of_fit(columns: Columns, fit: Fit, lengths: Array, joint: int) -> tuple[Array, Array]:
+    """Design (rows, parameters) of a fit at a joint, links and then effects in their order, and what it leaves."""
+    matrix, index, base = columns.matrices[joint], columns.index[joint], len(fit.links)
+    scaled = matrix[:, :-1] / lengths[index[:-1]]
+    loading = index[:-1] < base
+    links = scaled[:, loading] @ fit.links[index[:-1][loading]]
+    effects = np.zeros((len(matrix), len(fit.columns)))
+    at = {int(column): place for place, column in enumerate(index[:-1])}
+    for place, column in enumerate(fit.columns):
+        if int(column) in at:
+            effects[:, place] = scaled[:, at[int(column)]]
+    return np.column_stack([links, effects]), matrix[:, -1] - scaled @ fit.coefficients[index[:-1]]
 
 
 def block_numbers(observed: Observed, length_s: float, least: int) -> NDArray[np.intp]:

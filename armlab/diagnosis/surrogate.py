@@ -17,6 +17,7 @@ from armlab.diagnosis.blocks import block_numbers, held_out_gain
 from armlab.diagnosis.data import Observed, Segment, rows_in
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.tuning import SurrogateTuning
+from armlab.effects.memory import dahl_state
 
 Thirds = tuple[tuple[Array, ...], tuple[Array, ...], NDArray[np.intp]]
 
@@ -176,14 +177,16 @@ def feature_banks(observed: Observed, joint: int, load: Array, tuning: Surrogate
         own[:, None] * _hats(position[:, joint], tuning.position_hats),
     ]
     yield _standardise(loaded, thirds)
+    yield _standardise([(_smooth_signs(load, tuning.sign_widths), (torque,))], thirds)
     yield _standardise([(columns, (speed,)) for columns in fast], thirds)
     yield _standardise([(columns, (place, speed)) for columns in mapped], thirds)
     yield _standardise([(_hats(position[:, joint], tuning.fine_position_hats), (place,))], thirds)
     driven = _products(own, acceleration[:, joint], tuning.product_speeds)
     yield _standardise([(driven, (speed, change))], thirds)
     for other in range(observed.joints):
+        theirs = f"velocity_{other + 1}"
+        yield _standardise([(_turns(observed, other, tuning.turning_ways), (theirs,))], thirds)
         if other != joint:
-            theirs = f"velocity_{other + 1}"
             both = _products(position[:, joint], position[:, other], tuning.product_positions)
             smooth = _smooth_signs(velocity[:, other], tuning.sign_widths)
             moved = [_hats(velocity[:, other], hats), smooth, _lags(observed, smooth[:, 2], memories)]
@@ -226,10 +229,24 @@ def _waves(values: Array, rng: np.random.Generator, count: int) -> Array:
     return np.asarray(np.cos(scaled @ frequency + rng.uniform(0, 2 * np.pi, count)))
 
 
-def _smooth_signs(velocity: Array, widths: Sequence[float]) -> Array:
-    """Smooth signs (rows, widths). widths: of the top speed."""
-    top = max(float(np.abs(velocity).max()), 1e-9)
-    return np.column_stack([np.tanh(velocity / (width * top)) for width in widths])
+def _smooth_signs(values: Array, widths: Sequence[float]) -> Array:
+    """Smooth signs (rows, widths) of a signal. widths: of its largest value."""
+    top = max(float(np.abs(values).max()), 1e-9)
+    return np.column_stack([np.tanh(values / (width * top)) for width in widths])
+
+
+def _turns(observed: Observed, joint: int, ways: Sequence[float]) -> Array:
+    """Signs of a joint's motion that turn over some way after a reversal (Dahl 1968), run by run, (rows, ways).
+
+    ways: of its travel. It is what hysteresis makes of the motion, however fast that is.
+    """
+    positions = [each.motion.position[:, joint] for each in observed.signals]
+    travel = max(max(float(np.ptp(each)) for each in positions), 1e-9)
+    parts = [
+        np.column_stack([dahl_state(position, way * travel) for way in ways])[each.filter.rows]
+        for position, each in zip(positions, observed.signals, strict=True)
+    ]
+    return np.concatenate(parts)
 
 
 def _lags(observed: Observed, values: Array, memories: Sequence[float]) -> Array:

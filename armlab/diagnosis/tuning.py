@@ -428,10 +428,16 @@ class SurrogateTuning:
     max_pairs: int = tuned(6, unit="pairs", meaning="pairs of other joints that get waves")
     sign_widths: tuple[float, ...] = tuned(
         (0.005, 0.02, 0.06, 0.2, 0.6),
-        unit="of the top speed",
-        meaning="widths of smooth signs of the velocity",
+        unit="of the largest value",
+        meaning="widths of smooth signs of the velocity, and of the load",
         least=1e-6,
         count=3,
+    )
+    turning_ways: tuple[float, ...] = tuned(
+        (0.01, 0.03, 0.1, 0.3),
+        unit="of a joint's travel",
+        meaning="ways after a reversal over which hysteresis turns",
+        least=1e-6,
     )
     memories_s: tuple[float, ...] = tuned(
         (0.02, 0.1, 0.5),

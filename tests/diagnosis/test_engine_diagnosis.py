@@ -1,6 +1,7 @@
 """The whole engine on small recordings: what is hidden is named, and nothing else is."""
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.verdict_files import make_verdict, write_verdict
 from armlab.identification.identifier import Identifier
 from problem.motion import Motion
+from problem.regressor import rigid_body_torque
 from problem.robot_file import load_arm
 
 SLIGHT = 0.006  # N m s/rad: some ten standard errors of noise
@@ -37,6 +39,17 @@ def product_of_positions(motion: Motion, time: Array) -> Array:
     return torque
 
 
+def read_wrongly(reading: Callable[[Array], Array]) -> cases.Hidden:
+    """What is read of the torque of joint 2 beside the torque itself."""
+
+    def hidden(motion: Motion, time: Array) -> Array:
+        torque = np.zeros(motion.position.shape)
+        torque[:, 1] = reading(rigid_body_torque(load_arm("irb120-arm"), motion)[:, 1])
+        return torque
+
+    return hidden
+
+
 @pytest.fixture(scope="module")
 def viscous_found() -> Diagnosis:
     return diagnose(cases.recording(viscous))
@@ -55,6 +68,34 @@ def test_hidden_viscous_friction_is_the_only_finding_with_an_interval_around_the
     assert (claim.effect, claim.joint) == ("viscous_friction", 3)
     assert np.ptp(coefficient.interval) < 0.02
     assert coefficient.interval[0] < 0.8 < coefficient.interval[1]
+
+
+def test_a_scale_that_is_not_straight_speaks_against_a_wrong_gain() -> None:
+    straight = diagnose(cases.recording(read_wrongly(lambda torque: 0.03 * torque)))
+    assert [(each.effect, each.joint) for each in straight.claims] == [("torque_gain_error", 2)]
+    bent = diagnose(cases.recording(read_wrongly(lambda torque: 0.001 * torque**2)))
+    assert lacking(straight) == 0
+    assert lacking(bent) > 10
+    assert straight.claims[0].members == ()
+    assert "unknown" in [each.effect for each in bent.claims[0].members]
+
+
+def lacking(found: Diagnosis) -> float:
+    """The log evidence that a wrong gain, which the search found, lacks of the best law."""
+    own = next(each for each in found.weighed[0] if each.effect == "torque_gain_error")
+    assert own.numbers["found searched"] == 1
+    return float(np.expm1(own.numbers["found deficit"]))
+
+
+def test_small_torques_that_are_lost_have_no_name_and_depend_on_the_torque() -> None:
+    band = 0.5
+    lost = diagnose(
+        cases.recording(
+            read_wrongly(lambda torque: -band * np.tanh(torque / band) * np.exp(-((torque / 2 / band) ** 2)))
+        )
+    )
+    unknown = [each for each in lost.claims if each.effect == "unknown"]
+    assert [(each.joint, each.depends_on) for each in unknown] == [(2, ("torque_2",))]
 
 
 def test_the_gap_between_refitted_arm_and_noise_is_closed(viscous_found: Diagnosis) -> None:

@@ -16,6 +16,7 @@ from armlab.diagnosis.solver import Solver, State
 from armlab.diagnosis.surrogate import feature_banks, find_structure, flexible_features
 from armlab.diagnosis.tuning import Tuning
 from armlab.effects.library import library
+from armlab.effects.memory import dahl_state
 from problem.base_parameters import base_parameters
 
 TUNING = Tuning()
@@ -161,6 +162,18 @@ def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed)
     assert set(best.depends_on) <= {"torque_2", "velocity_2"}
     chance = [find_structure(left, 1, each, noise, observed, TUNING.surrogate) for each in banks]
     assert min(each.p_value for each in chance) * len(chance) > 0.1
+
+
+def test_hysteresis_of_another_joint_is_found_at_any_speed(observed: Observed) -> None:
+    left = 0.05 * np.random.default_rng(4).standard_normal(observed.rows)
+    noise = fit_noise(np.column_stack([left] * 3), observed, 0.0, TUNING.noise)
+    turned = [dahl_state(each.motion.position[:, 2], 0.2)[each.filter.rows] for each in observed.signals]
+    hose = 0.05 * np.concatenate(turned)
+    banks = feature_banks(observed, 0, np.zeros(observed.rows), TUNING.surrogate)
+    found = [find_structure(left + hose, 0, each, noise, observed, TUNING.surrogate) for each in banks]
+    best = min(found, key=lambda each: each.p_value)
+    assert best.depends_on == ("velocity_3",)
+    assert best.gain > 0.3
 
 
 def test_a_gain_in_few_stretches_is_sure_but_in_one_alone_is_not() -> None:

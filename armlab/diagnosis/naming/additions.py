@@ -20,6 +20,9 @@ from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import is_structured, unknown_claim
+from armlab.effects.contract import Candidate
+
+Found = tuple[int, State, Evidence]  # a group beside a model, the state with it, and what speaks for it
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +49,11 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
     exact = not any(is_structured(each, model.design.settings.tuning) for each in left)
     tuning, banned, out = model.design.settings.tuning, frozenset[int](), Additions(model, {}, {})
     for _ in range(tuning.naming.max_additions):
-        found = _likeliest(out.model, banned)
-        if found is None:
+        first = _likeliest(out.model, banned)
+        if first is None:
             break
+        found, names = _named(out.model, first, left)
         group, state, evidence = found
-        names = weigh_addition(out.model, group, state, evidence, left)
         naming = naming_of(names, tuning.naming)
         believed = not doubtful_names(replace(out.model, state=state), {group: evidence}, exact=exact)
         certain = (
@@ -58,7 +61,7 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
             and evidence.corrected <= tuning.pruning.level
             and not evidence.worse
         )
-        what = out.model.solver.groups[group].candidate
+        what = _candidate(out.model, group)
         likeliest = naming.answers[0].is_of(what.effect, what.joint)
         if believed and (naming.sure or (certain and likeliest and not naming.is_unknown)):
             step = Step(f"+ {what.effect} {what.joint}, which is probable", out.model.solver.fit(state).score)
@@ -66,7 +69,7 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
             effects = {each: known for each, known in out.effects.items() if each in state.groups}
             out = replace(out, model=added, effects=effects | {group: evidence}, names=out.names | {group: names})
             continue
-        banned |= _acting_at(out.model, what.rows[0])
+        banned |= _acting_where(out.model, first[0]) | _acting_where(out.model, group)
         if believed and certain:
             out = replace(out, unnamed=(*out.unnamed, _unnamed(out.model, group, state, evidence, names)))
         else:
@@ -78,32 +81,65 @@ def _unnamed(model: FittedModel, group: int, state: State, evidence: Evidence, n
     """The finding without a name of what a group explains beside a model."""
     own, columns = np.zeros(model.moments.size), model.solver.groups[group].columns
     own[columns] = model.solver.values(model.solver.fit(state), group)
-    axis, joint = model.solver.groups[group].candidate.facts.axis, evidence.joint + 1
+    axis, joint = _candidate(model, group).facts.axis, evidence.joint + 1
     depends_on = (f"{axis}_{joint}",) if axis in MOTION_AXES else ()
     return unknown_claim(joint, evidence, model.columns.torque_of(own), depends_on, names)
 
 
-def _acting_at(model: FittedModel, joint: int) -> frozenset[int]:
-    """Groups whose torque acts at a joint (from 0) first."""
-    return frozenset(number for number, each in enumerate(model.solver.groups) if each.candidate.rows[0] == joint)
+def _acting_where(model: FittedModel, group: int) -> frozenset[int]:
+    """Groups whose torque acts at the same joint as that of a group first."""
+    joints = [each.candidate.rows[0] for each in model.solver.groups]
+    return frozenset(number for number, joint in enumerate(joints) if joint == joints[group])
 
 
-def _likeliest(model: FittedModel, banned: frozenset[int]) -> tuple[int, State, Evidence] | None:
-    """The unusual effect that raises the score most and breaks no law of physics, the state with it, its evidence."""
+def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
+    """The unusual effect that raises the score most and breaks no law of physics."""
     solver, tuning = model.solver, model.design.settings.tuning.naming
     search = Search(solver, model.design.settings, True, 0)
     gains, asked = search.gains(model.state), 0
     for group in map(int, np.argsort(-gains)):
         if gains[group] < tuning.least_addition or asked >= tuning.max_asked:
             return None
-        usual = solver.groups[group].candidate.facts.usual
-        if group in banned or usual or search.excluded(model.state, group):
+        if group in banned or not _may_be_added(model, search, group):
             continue
         asked += 1
-        state = search.with_group(model.state, group)
-        if search.objection(state, group) is not None:
-            continue
-        evidence = Judge(replace(model, state=state), state).effects()[group]
-        if evidence.objection is None and evidence.score >= tuning.least_addition:
-            return group, state, evidence
+        found = _added(model, search, group)
+        if found is not None:
+            return found
     return None
+
+
+def _named(model: FittedModel, found: Found, left: Sequence[Structure]) -> tuple[Found, Weighed]:
+    """What raises the score most, or the effect with the likeliest name in its place, and its names."""
+    names = weigh_addition(model, *found, left)
+    answer, own = naming_of(names, model.design.settings.tuning.naming).answers[0], _candidate(model, found[0])
+    if answer.is_of(own.effect, own.joint):
+        return found, names
+    search = Search(model.solver, model.design.settings, True, 0)
+    gains = search.gains(model.state)
+    for group in map(int, np.argsort(-gains)):
+        each = _candidate(model, group)
+        if answer.is_of(each.effect, each.joint) and _may_be_added(model, search, group):
+            likelier = _added(model, search, group)
+            if likelier is not None:
+                return likelier, weigh_addition(model, *likelier, left)
+    return found, names
+
+
+def _candidate(model: FittedModel, group: int) -> Candidate:
+    return model.solver.groups[group].candidate
+
+
+def _may_be_added(model: FittedModel, search: Search, group: int) -> bool:
+    """Whether a group is nothing that every arm has, and has room beside a model."""
+    return not _candidate(model, group).facts.usual and not search.excluded(model.state, group)
+
+
+def _added(model: FittedModel, search: Search, group: int) -> Found | None:
+    """A model with one more group, and its evidence; None where that breaks a law of physics or is too little."""
+    state = search.with_group(model.state, group)
+    if search.objection(state, group) is not None:
+        return None
+    evidence = Judge(replace(model, state=state), state).effects()[group]
+    enough = evidence.score >= model.design.settings.tuning.naming.least_addition
+    return (group, state, evidence) if enough and evidence.objection is None else None

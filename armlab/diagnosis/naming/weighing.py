@@ -15,15 +15,17 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.added_body import PlacedBody, payload_groups, place_body
+from armlab.diagnosis.blocks import rows_of_fit
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.result import Weighed, WeighedName
-from armlab.diagnosis.search import Search
+from armlab.diagnosis.search import Search, contained_groups
 from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import flexible_gain, is_structured, predicted_share
 from armlab.effects.contract import UNKNOWN, Candidate
+from armlab.effects.library import effect_named
 from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
 
 Place = int | None  # a joint or link, from 1; None for the whole robot
@@ -51,9 +53,10 @@ class _Trial:
 
 def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> Weighed:
     """The names of an effect of a model. claimed: all its effects; left: structure of its joints."""
-    evidence, without = claimed[group], model.state.minus(group)
+    evidence, without, best = claimed[group], model.state.minus(group), model.fit.score
     candidate = model.solver.groups[group].candidate
     trials = list(_in_place(model, without, group, beside=model.state))
+    trials += _other_friction(model, without, group)
     if group in payload_groups(model) and model.design.prior is not None:
         trials += _bodies(model, without, place_body(model, without), candidate.joints[0])
     others = [each for each in claimed if each != group]
@@ -62,7 +65,8 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
         none["found usual"] = 1.0
     else:
         none["found flexible"] = _flexible_ratio(model, without, evidence)
-    return _weighed("found", trials, none, candidate.joint, candidate.joints, model)
+        best += _bent_gain(model, without, group)
+    return _weighed("found", trials, none, candidate.joint, candidate.joints, model, best)
 
 
 def weigh_link(
@@ -127,14 +131,15 @@ def _weighed(
     joint: Place,
     joints: tuple[int, ...],
     model: FittedModel,
+    nameless: float = -np.inf,
 ) -> Weighed:
-    """Each name once, by its likeliest law, and none of them."""
+    """Each name once, by its likeliest law, and none of them. nameless: the score of a law that has no name."""
     ordered = sorted(trials, key=lambda each: (not each.own, -each.score))
     known: dict[tuple[str, Place], _Trial] = {}
     for each in ordered:
         if kind == "found" or each.score > model.fit.score:
             known.setdefault((each.effect, each.joint), each)
-    best = max((each.score for each in known.values()), default=0.0)
+    best = max((*(each.score for each in known.values()), nameless))
     names = [
         WeighedName(each.effect, each.joint, each.joints, _for_name(kind, each, best, model.fit.score))
         for each in known.values()
@@ -204,6 +209,33 @@ def _flexible_ratio(model: FittedModel, without: State, evidence: Evidence) -> f
     return max(float(np.log(ratio)), -2.0)
 
 
+def _bent_gain(model: FittedModel, without: State, group: int) -> float:
+    """By how much a law that bends raises the log likelihood more than one of the library does in whose place it is.
+
+    It is the square of the law's own torque, with its sign or without: what a scale that is not straight makes of it.
+    """
+    joint, law = model.solver.groups[group].candidate.rows[0], np.zeros(model.moments.size)
+    law[model.solver.groups[group].columns] = model.solver.values(model.fit, group)
+    torque = model.columns.torque_at(joint, law)
+    own, square, signed = _log_gains(model, without, joint, np.column_stack([torque, torque**2, torque * abs(torque)]))
+    return float(max(square - own, signed - own, 0.0))
+
+
+def _log_gains(model: FittedModel, state: State, joint: int, torques: Array) -> Array:
+    """How much each torque (rows, laws) at a joint (from 0) would raise the log likelihood beside a state, (laws,)."""
+    fit, observed = model.solver.fit(state), model.design.observed
+    design, left = rows_of_fit(model.columns, fit, model.moments.lengths, joint)
+    stacked = np.column_stack([torques, design, left])
+    white = model.noise.white(stacked, joint, observed, "identify")
+    count = torques.shape[1]
+    laws, rows, errors = white[:, :count], white[:, count:-1], white[:, -1]
+    lengths, shared = np.sum(laws**2, axis=0), rows.T @ laws
+    # what the state absorbs counts for nothing
+    alone = lengths - np.einsum("pl,pq,ql->l", shared, fit.inverse, shared)
+    least = model.design.settings.tuning.solver.min_unabsorbed_share * lengths
+    return np.asarray((laws.T @ errors) ** 2 / (2 * np.maximum(alone, least) + 1e-300))
+
+
 def _unusual_at(model: FittedModel, joint: Place, groups: Iterable[int]) -> int:
     """How many of these groups are at a joint and not its friction as every joint has it."""
     facts = [model.solver.groups[each].candidate for each in groups]
@@ -244,6 +276,17 @@ def _in_place(
             early = bool(solver.values(fit, number)[0] < 0)
             trial = replace(trial, early=early, in_motion=_gain_in_motion(model, without, fit, candidate.rows))
         yield trial
+
+
+def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[_Trial]:
+    """Other friction of a law's joint, beside the usual friction whose place the law took."""
+    groups = model.solver.groups
+    replaced = {each for each in contained_groups(groups, group) if groups[each].candidate.facts.usual}
+    if not replaced <= set(without.groups):
+        plain = State(tuple(sorted({*without.groups, *replaced})), without.widths)
+        for trial in _in_place(model, plain, group, beside=model.state):
+            if trial.joint == groups[group].candidate.joint and effect_named(trial.effect).dissipates:
+                yield trial
 
 
 def _sticks_where_it_acts(model: FittedModel, state: State, candidate: Candidate) -> bool:

@@ -1,0 +1,57 @@
+"""What is added to a model because its name is probable."""
+
+import engine_cases as cases
+import numpy as np
+import pytest
+
+from armlab.common.arrays import Array
+from armlab.diagnosis.design import DesignMatrix
+from armlab.diagnosis.diagnose import prepare
+from armlab.diagnosis.fitted_model import FittedModel, fit_background
+from armlab.diagnosis.naming.additions import Found, _added, _named
+from armlab.diagnosis.search import Search
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.solver import State
+from armlab.effects.library import library
+from problem.motion import Motion
+
+
+def spring(motion: Motion, time: Array) -> Array:
+    torque = np.zeros(motion.position.shape)
+    torque[:, 1] = 3.0 * motion.position[:, 1]
+    return torque
+
+
+@pytest.fixture(scope="module")
+def model() -> FittedModel:
+    """A model that holds nothing, beside a hidden spring at joint 2."""
+    design = prepare(cases.recording(spring, seconds=6.0), None, Settings(), lambda message: None)
+    assert isinstance(design, DesignMatrix)
+    fitted = fit_background(design, library(), 0, lambda message: None)
+    return FittedModel(fitted.design, fitted.noise, fitted.moments, fitted.solver, State((), (0.0,) * 3))
+
+
+def found_as(model: FittedModel, effect: str) -> Found:
+    """The first form of an effect at joint 2, added."""
+    search = Search(model.solver, model.design.settings, True, 0)
+    candidates = [each.candidate for each in model.solver.groups]
+    named = (at for at, each in enumerate(candidates) if (each.effect, each.joint) == (effect, 2))
+    found = next(each for each in (_added(model, search, at) for at in named) if each is not None)
+    assert found[2].score > 0
+    return found
+
+
+def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever raised the score: here weights that ask for nothing but the name."""
+    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda: {"is cable_stiffness": 9.0})
+    spring_found = found_as(model, "cable_stiffness")
+    for first in (found_as(model, "gravity_compensator"), spring_found):
+        (group, _, evidence), names = _named(model, first, ())
+        assert (group, evidence.score) == (spring_found[0], spring_found[2].score)
+        assert names[-1].is_none
+
+
+def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda: {"left none": 9.0})
+    first = found_as(model, "gravity_compensator")
+    assert _named(model, first, ())[0] is first
