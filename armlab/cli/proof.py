@@ -199,27 +199,41 @@ def score(folder: Path, verdicts: Path | None, manifest: str | None, out: Path |
     metavar="WORK",
     help="Folder of `armlab prove-motion --seed SEED`; may be given more than once.",
 )
+@click.option(
+    "--real",
+    "real_sets",
+    type=_FOLDER,
+    multiple=True,
+    metavar="TABLES",
+    help="Output folder of `armlab real-concealed --seed SEED`; may be given more than once.",
+)
 @click.option("--out", type=OutputPath(), required=True, help="Folder for calibration.json and calibration.md.")
 @prints_lines
-def calibrate_names(sets: tuple[tuple[Path, Path], ...], motion_sets: tuple[Path, ...], out: Path) -> Iterator[str]:
+def calibrate_names(
+    sets: tuple[tuple[Path, Path], ...], motion_sets: tuple[Path, ...], real_sets: tuple[Path, ...], out: Path
+) -> Iterator[str]:
     """Learn the probabilities of names from concealed sets.
 
-    Uses development sets alone, and checks the probabilities on cases that are left out in turn (extra `dev`).
+    Uses development sets alone, and checks the probabilities on cases that are left out in turn, of real recordings all
+    of one together (extra `dev`).
     """
+    from armlab.concealed.real.weighed import read_weighed_real
     from armlab.concealed.score.weighed import read_weighed
     from armlab.concealed.servo.score import read_weighed_motion
     from armlab.diagnosis.naming.calibrate import Finding, calibrate
     from armlab.diagnosis.naming.calibration_page import calibration_lines, write_calibration
     from armlab.diagnosis.naming.choice import Example
 
-    if not sets and not motion_sets:
-        raise click.UsageError("nothing to learn from: give --set SET VERDICTS or --motion WORK")
-    read = [*(read_weighed(*each) for each in sets), *(read_weighed_motion(each) for each in motion_sets)]
-    sources = [about for about, _ in read]
+    if not sets and not motion_sets and not real_sets:
+        raise click.UsageError("nothing to learn from: give --set SET VERDICTS, --motion WORK or --real TABLES")
+    simulated = [*(read_weighed(*each) for each in sets), *(read_weighed_motion(each) for each in motion_sets)]
+    real = [read_weighed_real(each) for each in real_sets]
+    sources = [about for about, _ in (*simulated, *real)]
+    weighed = [(each, "") for _, found in simulated for each in found]
+    weighed += [(each, recording) for _, found in real for recording, each in found]
     findings = [
-        Finding(each.case, each.tier, Example(each.names, each.right), each.background)
-        for _, weighed in read
-        for each in weighed
+        Finding(each.case, each.tier, Example(each.names, each.right), each.background, recording)
+        for each, recording in weighed
     ]
     found = calibrate(findings)
     yield from calibration_lines(found)

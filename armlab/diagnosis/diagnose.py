@@ -172,7 +172,7 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
     )
     claims += added.unnamed
     weighed = (*(claim.weighed for claim in claims), *added.nothing)
-    claims = named_claims(claims, tuning.naming)
+    claims = named_claims(claims, named.model.design.settings, named.model.design.simulation.joints_without_friction)
     return replace(with_story(_assemble(recording, model, prediction, claims, unknowns, remains)), weighed=weighed)
 
 

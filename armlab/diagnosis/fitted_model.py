@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from armlab.diagnosis.blocks import Folds, split_folds, whitened_rows
 from armlab.diagnosis.columns import Columns, Moments
 from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.noise import Noise, choose_noise, fit_noise
+from armlab.diagnosis.noise import Noise, choose_noise, error_colours, fit_noise
 from armlab.diagnosis.refine import prior_precision, refine_shapes
 from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import Fit, Solver, State
@@ -53,6 +54,11 @@ class FittedModel:
         rank, lengths = fit.links.shape[1], self.moments.lengths[:count]
         spread = fit.links @ fit.inverse[:rank, :rank] @ fit.links.T
         return self.coefficients(fit)[:count], np.asarray(spread / np.outer(lengths, lengths))
+
+    @cached_property
+    def colours(self) -> Array:
+        """`error_colours` of what the fit leaves, (joints,)."""
+        return error_colours(self.residual(self.fit), self.design.observed, self.design.settings.tuning.noise)
 
     def residual(self, fit: Fit) -> Array:
         """What a fit leaves, (rows, joints), N m."""

@@ -120,6 +120,18 @@ def fit_noise(residuals: Array, observed: Observed, fitted: float, tuning: Noise
     return Noise(tuple(taps), tuple(scales), tuple(resting), tuple(through))
 
 
+def error_colours(residuals: Array, observed: Observed, tuning: NoiseTuning) -> Array:
+    """How much larger errors (rows, joints) in motion are than what their past does not tell of them, (joints,).
+
+    A logarithm: 0 for white errors. What a sensor adds is forgotten soon; physics that a model lacks is not.
+    """
+    out = []
+    for joint in range(residuals.shape[1]):
+        parts = [residuals[each.start : each.stop, joint] for each in observed.used(joint)]
+        out.append(0.5 * float(np.log(_mean_square(parts) / _fit_autoregression(parts, tuning)[1])))
+    return np.maximum(out, 0.0)
+
+
 def _rest_scales(residual: Array, least: float, joint: int, observed: Observed) -> Array:
     """Of each row: the root mean square of the stretch at rest that it belongs to, no less than in motion."""
     out = np.full(len(residual), least)

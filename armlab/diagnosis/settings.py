@@ -47,10 +47,14 @@ def guards_without(names: Iterable[str]) -> Guards:
 
 @dataclass(frozen=True)
 class Settings:
-    """The guards, and the tuning numbers of each stage."""
+    """The guards, the tuning numbers of each stage, and what the weights of names may know.
+
+    left_out: a public recording from which the weights have learnt nothing, so that it can judge them; empty for none.
+    """
 
     guards: Guards = Guards()
     tuning: Tuning = field(default_factory=Tuning)
+    left_out: str = ""
 
 
 def vary(settings: Settings, name: str, value: object) -> Settings:

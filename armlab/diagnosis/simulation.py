@@ -30,6 +30,13 @@ class Simulation:
     inertial: Array | None
     model: TorqueModel | None = None
 
+    @property
+    def joints_without_friction(self) -> frozenset[int]:
+        """Joints, from 1, of whose friction it says nothing."""
+        parts = () if self.model is None else self.model.structure.components
+        known = {each.joints[0] for each in parts if each.is_friction}
+        return frozenset(range(1, len(self.arm) + 1)) - known
+
     def torque(self, scene: Scene) -> Array:
         """Simulated torque of the motion of a scene, (samples, joints); zeros where there is no simulation."""
         return self._rigid_torque(scene) if self.model is None else self.model.torque_in(scene)

@@ -561,6 +561,14 @@ class NamingTuning:
         least=0.5,
         most=1.0,
     )
+    least_names: float = tuned(
+        0.8,
+        unit="probability",
+        meaning="of the names of a class together, without `unknown`; with less a finding is unknown",
+        source="development sets: one name in twenty that is claimed is wrong",
+        least=0.5,
+        most=1.0,
+    )
     max_class: int = tuned(4, unit="names", meaning="of a class; where more are needed, a finding is unknown", least=1)
     shown: float = tuned(0.05, unit="probability", meaning="a less probable name is not listed", most=1.0)
     names: int = tuned(8, unit="names", meaning="the likeliest effects that are weighed for a finding", least=1)

@@ -43,7 +43,9 @@ def found_as(model: FittedModel, effect: str) -> Found:
 
 def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever raised the score: here weights that ask for nothing but the name."""
-    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda: {"is cable_stiffness": 9.0})
+    monkeypatch.setattr(
+        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"is cable_stiffness": 9.0}
+    )
     spring_found = found_as(model, "cable_stiffness")
     for first in (found_as(model, "gravity_compensator"), spring_found):
         (group, _, evidence), names = _named(model, first, ())
@@ -52,6 +54,6 @@ def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: p
 
 
 def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda: {"left none": 9.0})
+    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"left none": 9.0})
     first = found_as(model, "gravity_compensator")
     assert _named(model, first, ())[0] is first

@@ -95,7 +95,7 @@ def test_small_torques_that_are_lost_have_no_name_and_depend_on_the_torque() -> 
         )
     )
     unknown = [each for each in lost.claims if each.effect == "unknown"]
-    assert [(each.joint, each.depends_on) for each in unknown] == [(2, ("torque_2",))]
+    assert [(each.joint, each.depends_on[0]) for each in unknown] == [(2, "torque_2")]
 
 
 def test_the_gap_between_refitted_arm_and_noise_is_closed(viscous_found: Diagnosis) -> None:

@@ -10,16 +10,14 @@ from armlab.diagnosis.naming.calibrate import Finding, calibrate, judge_reliabil
 from armlab.diagnosis.naming.choice import Example, fit_weights, probabilities
 from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
-from armlab.diagnosis.tuning import NamingTuning
+from armlab.diagnosis.settings import Settings, vary
 from armlab.effects.friction import CoulombFriction
-
-TUNING = NamingTuning()
 
 
 @pytest.fixture(autouse=True)
 def plain_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     """One number, whose weight is one."""
-    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda: {"for it": 1.0})
+    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"for it": 1.0})
 
 
 def weighed(unknown: float, **names: float) -> Weighed:
@@ -70,7 +68,7 @@ def test_reliability_is_of_the_likeliest_answer() -> None:
 
 def test_a_probable_name_is_claimed_alone() -> None:
     names = weighed(0.03, coulomb_friction=0.95, viscous_friction=0.02)
-    (found,) = named_claims([claim("coulomb_friction", names)], TUNING)
+    (found,) = named_claims([claim("coulomb_friction", names)], Settings())
     assert (found.effect, found.probability, found.members, found.rivals) == (
         "coulomb_friction",
         pytest.approx(0.95),
@@ -80,49 +78,56 @@ def test_a_probable_name_is_claimed_alone() -> None:
 
 
 def test_else_a_class_whose_probabilities_add_up() -> None:
-    names = weighed(0.2, coulomb_friction=0.6, stribeck_friction=0.16, viscous_friction=0.04)
-    (found,) = named_claims([claim("coulomb_friction", names)], TUNING)
+    names = weighed(0.15, coulomb_friction=0.6, stribeck_friction=0.22, viscous_friction=0.03)
+    (found,) = named_claims([claim("coulomb_friction", names)], Settings())
     assert found.probability == pytest.approx(0.6)
     assert [(each.effect, round(each.probability, 2)) for each in found.members] == [
         ("coulomb_friction", 0.6),
-        ("unknown", 0.2),
-        ("stribeck_friction", 0.16),
+        ("stribeck_friction", 0.22),
+        ("unknown", 0.15),
     ]
     assert [each.effect for each in found.rivals] == ["stribeck_friction"]
 
 
 def test_else_it_is_unknown_with_a_probability_of_its_own() -> None:
     names = weighed(0.5, coulomb_friction=0.3, stribeck_friction=0.2)
-    (found,) = named_claims([claim("coulomb_friction", names)], TUNING)
+    (found,) = named_claims([claim("coulomb_friction", names)], Settings())
     assert (found.effect, found.joint, found.probability) == ("unknown", 2, pytest.approx(0.5))
     assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
     assert found.candidate is None
     assert found.equation == "tau_2 += f(the motion)"
 
 
-def test_friction_keeps_the_law_that_was_found_with_its_probability() -> None:
+def test_friction_keeps_its_law_at_a_joint_of_whose_friction_the_simulation_says_nothing() -> None:
     names = weighed(0.5, coulomb_friction=0.3, stribeck_friction=0.2)
     own = replace(claim("coulomb_friction", names), candidate=CoulombFriction(2, (2,), (1,)))
-    (found,) = named_claims([own], TUNING)
+    (found,) = named_claims([own], Settings(), plain={2})
     assert (found.effect, found.probability) == ("coulomb_friction", pytest.approx(0.3))
     assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
+    (nameless,) = named_claims([own], Settings(), plain={1})
+    assert (nameless.effect, nameless.probability) == ("unknown", pytest.approx(0.5))
 
 
 def test_more_than_four_names_are_no_class() -> None:
     names = weighed(0.05, **{f"law_{number}": 0.19 for number in range(5)})
-    assert naming_of(names, TUNING).is_unknown
-    assert naming_of(names, replace(TUNING, max_class=5)).open == 5
+    assert naming_of(names, Settings()).is_unknown
+    assert len(naming_of(names, vary(Settings(), "naming.max_class", 5)).claimed) == 5
+
+
+def test_a_class_that_may_be_none_of_its_names_is_unknown() -> None:
+    assert len(naming_of(weighed(0.15, payload=0.85), Settings()).claimed) == 2
+    assert naming_of(weighed(0.25, payload=0.75), Settings()).is_unknown
 
 
 def test_what_may_be_nothing_needs_names_that_are_probable_without_unknown() -> None:
-    assert not naming_of(weighed(0.2, coulomb_friction=0.8), TUNING).sure
-    assert naming_of(weighed(0.08, coulomb_friction=0.5, viscous_friction=0.42), TUNING).sure
+    assert not naming_of(weighed(0.2, coulomb_friction=0.8), Settings()).sure
+    assert naming_of(weighed(0.08, coulomb_friction=0.5, viscous_friction=0.42), Settings()).sure
 
 
 def test_two_unknowns_of_a_joint_are_one_finding() -> None:
     names = weighed(0.9, coulomb_friction=0.1)
     other = replace(claim("unknown", weighed(0.6, coulomb_friction=0.4)), depends_on=("position_2",))
-    (found,) = named_claims([claim("coulomb_friction", names), other], TUNING)
+    (found,) = named_claims([claim("coulomb_friction", names), other], Settings())
     assert found.probability == pytest.approx(0.9)
     assert np.array_equal(found.prediction, 2 * np.ones((3, 2)))
     assert found.depends_on == ("position_2",)
@@ -131,14 +136,14 @@ def test_two_unknowns_of_a_joint_are_one_finding() -> None:
 def test_what_no_motion_separates_stays_beside_a_probable_name() -> None:
     same = Rival("rotor_inertia", 2, (2,), identical=True)
     names = weighed(0.03, payload=0.97)
-    (found,) = named_claims([claim("payload", names, (same,))], TUNING)
+    (found,) = named_claims([claim("payload", names, (same,))], Settings())
     assert found.rivals == (same,)
     assert found.next_experiment
 
 
 def test_names_that_no_motion_separates_count_together() -> None:
     same = Rival("rotor_inertia", 2, (2,), identical=True)
-    (found,) = named_claims([claim("payload", weighed(0.03, payload=0.3, rotor_inertia=0.67), (same,))], TUNING)
+    (found,) = named_claims([claim("payload", weighed(0.03, payload=0.3, rotor_inertia=0.67), (same,))], Settings())
     assert (found.effect, found.members, found.rivals) == ("payload", (), (same,))
     assert found.probability == pytest.approx(0.97)
 
@@ -147,3 +152,21 @@ def test_the_weights_of_the_package_were_learnt_from_development_sets() -> None:
     weights = calibrated_weights()
     assert {"found none", "left none", "structure none"} <= set(weights)
     assert all(np.isfinite(list(weights.values())))
+
+
+@pytest.mark.parametrize("recording", ["emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300"])
+def test_a_real_recording_is_judged_by_weights_that_do_not_know_it(recording: str) -> None:
+    own, others = calibrated_weights(recording), calibrated_weights()
+    assert own.keys() == others.keys()
+    assert own != others
+    assert calibrated_weights("not in the calibration") == others
+
+
+def test_the_cases_of_a_real_recording_are_left_out_together() -> None:
+    speaks, against = Example(({"a": 1.0}, {}), (True, False)), Example(({"a": 1.0}, {}), (False, True))
+    simulated = [Finding(str(number), "clean", speaks, False) for number in range(20)]
+    real = [Finding(str(number), "real", against, False, "emps") for number in range(20)]
+    found = calibrate([*simulated, *real])
+    assert found.left_out["emps"]["a"] > found.weights["a"]
+    assert found.tiers["real"].bins[0].right == 0
+    assert found.tiers["real"].bins[0].mean > 0.8

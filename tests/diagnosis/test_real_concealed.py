@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from public_copies import needs_copies
 from told_recordings import ARM, COULOMB, PAYLOAD, VISCOUS, frame, motion_at, recording_in
+from told_reference import reference_in
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
@@ -22,12 +23,8 @@ from armlab.diagnosis.real_concealed.examine import open_outcomes
 from armlab.diagnosis.real_concealed.plan import INJECTED, WITHHELD, Case, Disturbance, Piece, cases_of
 from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_cases, study_recording
-from armlab.effects.friction import CoulombFriction, ViscousFriction
-from armlab.identification.components import every_joint
-from armlab.identification.identifier import Identifier
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.study import RECIPES
-from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Run
 from problem.regressor import rigid_body_torque
 
@@ -41,11 +38,7 @@ CASES = (
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
-    folder = recording_in(tmp_path_factory.mktemp("recordings") / "told", frame(0), frame(1))
-    recording = load_recording(folder)
-    friction = (*every_joint(recording.arm, CoulombFriction), *every_joint(recording.arm, ViscousFriction))
-    found = Identifier(recording.arm, friction, "physical", cutoff_hz=20.0).fit(recording.with_role("identify"))
-    return Reference(recording, found.model_, "as told")
+    return reference_in(tmp_path_factory.mktemp("recordings") / "told")
 
 
 @pytest.fixture(scope="module")

@@ -1,11 +1,15 @@
 """The judge of random cases, on findings that are made up."""
 
+from dataclasses import replace
+
 from armlab.diagnosis.real_concealed.at_random import RandomStudy, random_tables
 from armlab.diagnosis.real_concealed.claims import DrawnVerdict, judge_drawn
 from armlab.diagnosis.real_concealed.conceal import SoughtEffect
 from armlab.diagnosis.real_concealed.draw import DrawnCase
 from armlab.diagnosis.real_concealed.examine import Outcome, ParameterSize, PossibleName, ReportedFinding, Rival
+from armlab.diagnosis.real_concealed.labels import LabelledFinding, label_weighed
 from armlab.diagnosis.real_concealed.plan import Case, Disturbance
+from armlab.diagnosis.result import Weighed, WeighedName
 
 SPRING = SoughtEffect("spring at joint 2", ("cable_stiffness",), (2,), {}, ("gravity_compensator",))
 CASE = DrawnCase(Case("told", (), Disturbance("cable_stiffness", 2, 2.0, "N m/rad")), 3.5)
@@ -29,6 +33,15 @@ def _judged(
         return Outcome("told", findings, (1.0,), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1)
 
     return judge_drawn(CASE, outcome(said), (sought,), outcome(control), joints)
+
+
+def _weighed(*names: str) -> Weighed:
+    return tuple(WeighedName(each, 2, (2,), {f"is {each}": 1.0}) for each in (*names, "unknown"))
+
+
+def _labels(*weighed: Weighed, control: tuple[ReportedFinding, ...] = ()) -> list[LabelledFinding]:
+    outcome = Outcome("told", (), (1.0,), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1, weighed=weighed)
+    return list(label_weighed(outcome, (SPRING,), replace(outcome, findings=control), 3))
 
 
 def _verdicts(*said: ReportedFinding) -> list[str]:
@@ -99,10 +112,26 @@ def test_the_only_joint_cannot_tell_its_skew_from_a_delay_and_states_both_as_one
 
 def test_tables_have_a_row_for_each_thing_sought_and_each_new_claim() -> None:
     verdict = _judged(_said("torque_ripple", 2), _said("unknown", 1, chance=None))
-    texts = random_tables([RandomStudy("told", "as told", verdict.outcome, (verdict,))])
+    texts = random_tables([RandomStudy("told", "as told", verdict.outcome, (verdict,), ((),))])
     cases, claims = texts["cases.csv"], texts["claims.csv"]
     assert cases.splitlines()[1].startswith("told,1,injected,cable stiffness,spring of 2 N m/rad at joint 2,")
     assert "another name" in cases
     assert len(claims.splitlines()) == 3
     assert claims.splitlines()[1].endswith("wrong,1,0.9")
     assert claims.splitlines()[2].endswith("unknown,1,")
+
+
+def test_a_weighed_name_is_right_where_it_is_sought_and_none_is_where_it_is_not() -> None:
+    sought, other = _labels(_weighed("torque_ripple", "cable_stiffness"), _weighed("torque_ripple", "backlash"))
+    assert (sought.right, other.right) == ((False, True, False), (False, False, True))
+    assert sought.numbers[0] == {"is torque_ripple": 1.0}
+    assert not sought.background
+    assert not other.background
+
+
+def test_nobody_knows_whether_what_the_control_names_is_right() -> None:
+    (known,) = _labels(_weighed("torque_ripple", "backlash"), control=(_said("torque_ripple", 2),))
+    assert known.background
+    assert not any(known.right)
+    (sought,) = _labels(_weighed("cable_stiffness"), control=(_said("cable_stiffness", 2),))
+    assert sought.right == (True, False)

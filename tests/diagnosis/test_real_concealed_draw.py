@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from told_recordings import ARM, frame, motion_at, recording_in
+from told_recordings import ARM, motion_at
+from told_reference import reference_in
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.real_concealed.conceal import (
@@ -20,21 +21,13 @@ from armlab.diagnosis.real_concealed.draw import (
     make_gauge,
 )
 from armlab.diagnosis.real_concealed.plan import Case, Disturbance, Piece
-from armlab.effects.friction import CoulombFriction, ViscousFriction
-from armlab.identification.components import every_joint
-from armlab.identification.identifier import Identifier
-from armlab.recordings.load import load_recording
 
 SEED, CASES = 1001, 16
 
 
 @pytest.fixture(scope="module")
 def reference(tmp_path_factory: pytest.TempPathFactory) -> Reference:
-    folder = recording_in(tmp_path_factory.mktemp("recordings") / "emps", frame(0), frame(1))
-    recording = load_recording(folder)
-    friction = (*every_joint(recording.arm, CoulombFriction), *every_joint(recording.arm, ViscousFriction))
-    found = Identifier(recording.arm, friction, "physical", cutoff_hz=20.0).fit(recording.with_role("identify"))
-    return Reference(recording, found.model_, "as told")
+    return reference_in(tmp_path_factory.mktemp("recordings") / "emps")
 
 
 @pytest.fixture(scope="module")

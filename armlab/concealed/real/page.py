@@ -47,10 +47,10 @@ motion separates count as one. Another law of friction, where friction is withhe
 of the model are themselves a choice. What only takes away what the control names, or is held by a law that the control
 names there (friction that differs by direction holds Coulomb friction, viscous friction and an offset), needs no new
 name and is counted apart. What is `unknown` is no name. *Right among names*: new claims with a name, by the
-probability that they state. The weights of the probabilities are learnt on simulated sets alone, so that every real
-recording is left out. *Skill*: against a constant probability, the share of right names. Intervals are 95 %: Wilson's
-for shares, as if claims were independent, and bootstrap for skills. *Met*: the figure is as wanted; of a bin, its
-interval reaches it."""
+probability that they state. The weights of the probabilities are learnt on simulated sets and on development cases of
+the other real recordings: the one that is judged is left out. *Skill*: against a constant probability, the share of
+right names. Intervals are 95 %: Wilson's for shares, as if claims were independent, and bootstrap for skills. *Met*:
+the figure is as wanted; of a bin, its interval reaches it."""
 RELIABILITY_CAPTION = """\
 Share of new names that are right against the probability that they state. Bars: Wilson, 95 %; the number is that of the
 claims; on the line, probabilities hold."""

@@ -12,7 +12,7 @@ from armlab.diagnosis.motion.diagnose import ServoFinding
 from armlab.diagnosis.naming.decide import Naming, naming_of
 from armlab.diagnosis.naming.weighing import zeros_behind_point
 from armlab.diagnosis.result import Weighed, WeighedName
-from armlab.diagnosis.tuning import NamingTuning
+from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import UNKNOWN
 
 LAST_LINK_EFFECTS = ("payload",)  # rivals that are at the link of the tool
@@ -41,7 +41,7 @@ def weigh_servo(finding: ServoFinding, last: int) -> Weighed:
 
 def servo_naming(finding: ServoFinding, last: int) -> Naming:
     """The probabilities of the names of a finding."""
-    return naming_of(weigh_servo(finding, last), NamingTuning())
+    return naming_of(weigh_servo(finding, last), Settings())
 
 
 def _name(effect: str, joint: int, *, searched: bool) -> WeighedName:

@@ -33,6 +33,7 @@ from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.words import summary_of
 from armlab.diagnosis.naming.names_file import names_texts
+from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
@@ -46,7 +47,7 @@ def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
     """All files of the verdict but the report, as they are to stand in a folder."""
     last = len(diagnosis.chosen)
     texts = {"verdict.json": make_motion_verdict(diagnosis).to_json()}
-    texts |= names_texts([weigh_servo(each, last) for each in diagnosis.findings])
+    texts |= names_texts([weigh_servo(each, last) for each in diagnosis.findings], Settings())
     if diagnosis.servos is not None:
         simulation, servos = diagnosis.simulation, diagnosis.servos
         step = float(simulation.model().opt.timestep)

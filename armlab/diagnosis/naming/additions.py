@@ -54,7 +54,7 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
             break
         found, names = _named(out.model, first, left)
         group, state, evidence = found
-        naming = naming_of(names, tuning.naming)
+        naming = naming_of(names, model.design.settings)
         believed = not doubtful_names(replace(out.model, state=state), {group: evidence}, exact=exact)
         certain = (
             evidence.score >= tuning.pruning.least_evidence
@@ -112,7 +112,7 @@ def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
 def _named(model: FittedModel, found: Found, left: Sequence[Structure]) -> tuple[Found, Weighed]:
     """What raises the score most, or the effect with the likeliest name in its place, and its names."""
     names = weigh_addition(model, *found, left)
-    answer, own = naming_of(names, model.design.settings.tuning.naming).answers[0], _candidate(model, found[0])
+    answer, own = naming_of(names, model.design.settings).answers[0], _candidate(model, found[0])
     if answer.is_of(own.effect, own.joint):
         return found, names
     search = Search(model.solver, model.design.settings, True, 0)

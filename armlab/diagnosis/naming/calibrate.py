@@ -1,9 +1,10 @@
 """Probabilities calibrated: the weights of a conditional logit model from findings whose truth is known, and a check.
 
-The check leaves out cases in turn: the probabilities of a case are those of weights that were found without it.
+The check leaves out cases in turn: the probabilities of a case are those of weights that were found without it. Cases
+of one real recording are left out together, for they share the arm and what its model lacks.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -12,7 +13,7 @@ from sklearn.metrics import brier_score_loss, log_loss
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import wilson_interval
-from armlab.diagnosis.naming.choice import Example, fit_weights, probabilities
+from armlab.diagnosis.naming.choice import Example, Numbers, fit_weights, probabilities
 
 FOLDS = 5
 BINS = (0.0, 0.5, 0.7, 0.9, 1.0)
@@ -27,12 +28,16 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Finding:
-    """A finding whose truth is known. background: of what every case of its tier has, which is no discovery."""
+    """A finding whose truth is known. background: of what every case of its tier has, which is no discovery.
+
+    recording: the real one that it is from; empty for a simulated one.
+    """
 
     case: str
     tier: str
     example: Example
     background: bool
+    recording: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,22 +67,27 @@ class Reliability:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Weights, and how well they hold by tier: of findings beyond background, in cases that were left out in turn."""
+    """Weights, and how well they hold by tier: of findings beyond background, in cases that were left out in turn.
+
+    left_out: the weights without each real recording.
+    """
 
     weights: dict[str, float]
+    left_out: dict[str, dict[str, float]]
     findings: int
     tiers: dict[str, Reliability]
 
 
 def calibrate(findings: Sequence[Finding]) -> Calibration:
     """The weights of everything that speaks for a name, and their reliability."""
-    chances = left_out_probabilities([each.example for each in findings], [each.case for each in findings])
-    tiers = {}
+    recordings = sorted({each.recording for each in findings if each.recording})
+    left_out = {name: weights_of([each.example for each in findings if each.recording != name]) for name in recordings}
+    chances, tiers = left_out_probabilities(findings, left_out), {}
     for tier in sorted({each.tier for each in findings}):
         own = [at for at, each in enumerate(findings) if each.tier == tier and not each.background]
         if own:
             tiers[tier] = judge_reliability([chances[at] for at in own], [findings[at].example.right for at in own])
-    return Calibration(weights_of([each.example for each in findings]), len(findings), tiers)
+    return Calibration(weights_of([each.example for each in findings]), left_out, len(findings), tiers)
 
 
 def weights_of(examples: Sequence[Example]) -> dict[str, float]:
@@ -93,16 +103,21 @@ def stated_spread(key: str) -> float:
     return EFFECT_SPREAD if key.startswith(EFFECT_PREFIX) else SPREAD
 
 
-def left_out_probabilities(examples: Sequence[Example], cases: Sequence[str]) -> list[Array]:
-    """The probabilities of each finding by weights that were found without its case."""
-    folds = {case: number % FOLDS for number, case in enumerate(sorted(set(cases)))}
-    own = np.array([folds[case] for case in cases])
-    out: list[Array] = [np.empty(0)] * len(examples)
-    for fold in range(FOLDS):
-        weights = weights_of([each for each, at in zip(examples, own, strict=True) if at != fold])
-        for number in map(int, np.flatnonzero(own == fold)):
-            out[number] = probabilities(examples[number].names, weights)
-    return out
+def left_out_probabilities(findings: Sequence[Finding], known: Mapping[str, Numbers]) -> list[Array]:
+    """The probabilities of each finding by weights that were found without its case.
+
+    known: the weights without each real recording.
+    """
+    cases = sorted({each.case for each in findings if not each.recording})
+    folds = {case: number % FOLDS for number, case in enumerate(cases)}
+    weights = [
+        weights_of([each.example for each in findings if folds.get(each.case) != fold])
+        for fold in range(FOLDS if cases else 0)
+    ]
+    return [
+        probabilities(each.example.names, known[each.recording] if each.recording else weights[folds[each.case]])
+        for each in findings
+    ]
 
 
 def judge_reliability(chances: Sequence[Array], rights: Sequence[Sequence[bool]]) -> Reliability:

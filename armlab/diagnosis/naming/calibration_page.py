@@ -7,6 +7,7 @@ from pathlib import Path
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.diagnosis.naming.calibrate import Calibration, Reliability
+from armlab.diagnosis.naming.choice import Numbers
 from armlab.diagnosis.naming.decide import CALIBRATION_FILE
 
 CALIBRATION_SCHEMA = "calibration/1"
@@ -16,18 +17,29 @@ DIGITS = 4
 
 def write_calibration(found: Calibration, sources: Sequence[str], out: Path) -> tuple[Path, ...]:
     """Writes both files. sources: the sets from which the weights are."""
-    weights = {key: round(value, DIGITS) for key, value in sorted(found.weights.items())}
-    content = {"schema": CALIBRATION_SCHEMA, "sets": list(sources), "findings": found.findings, "weights": weights}
+    weights = _rounded(found.weights)
+    content = {
+        "schema": CALIBRATION_SCHEMA,
+        "sets": list(sources),
+        "findings": found.findings,
+        "weights": weights,
+        "left_out": {name: _rounded(each) for name, each in found.left_out.items()},
+    }
     page = markdown_page(
         "Probabilities of names: calibration",
         f"From {found.findings} findings and candidates of these sets: {'; '.join(sources)}.",
-        "## Reliability\n\nLikeliest answers beyond background, in cases that were left out in turn.",
+        "## Reliability",
+        "Likeliest answers beyond background, in cases that were left out in turn; of one real recording all together.",
         markdown_table(("tier", "probability", "answers", "mean probability", "right"), list(_rows(found))),
         markdown_table(("tier", "Brier score", "of the base rate", "log score", "of the base rate"), _scores(found)),
         "## Weights",
         markdown_table(("what speaks for a name", "weight"), [(key, f"{value:.2f}") for key, value in weights.items()]),
     )
     return write_texts({CALIBRATION_FILE: json.dumps(content, indent=1) + "\n", PAGE_FILE: page}, out)
+
+
+def _rounded(weights: Numbers) -> dict[str, float]:
+    return {key: round(value, DIGITS) for key, value in sorted(weights.items())}
 
 
 def calibration_lines(found: Calibration) -> Iterator[str]:

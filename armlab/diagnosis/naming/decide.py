@@ -1,7 +1,7 @@
 """From probabilities to what a finding is called: a name, a class of names, or `unknown`."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
@@ -12,6 +12,7 @@ import numpy as np
 from armlab.diagnosis.claims import next_experiment
 from armlab.diagnosis.naming.choice import Numbers, probabilities
 from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
+from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
@@ -21,28 +22,33 @@ MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 
 @cache
-def calibrated_weights() -> Numbers:
-    """The weights of what speaks for a name, as they were found on development sets (`armlab calibrate`)."""
+def calibrated_weights(left_out: str = "") -> Numbers:
+    """The weights of what speaks for a name, as they were found on development sets (`armlab calibrate`).
+
+    left_out: a public recording whose own cases they do not know.
+    """
     content = json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8"))
-    return {str(key): float(value) for key, value in content["weights"].items()}
+    weights = content["left_out"].get(left_out, content["weights"])
+    return {str(key): float(value) for key, value in weights.items()}
 
 
 @dataclass(frozen=True)
 class Naming:
     """What a finding may be called. answers: its names, and `unknown` for none of them, the likeliest first.
 
-    open: how many of the likeliest answers reach the level together; 0 where more are needed than a class may have.
-    sure: whether names alone reach it, without `unknown`.
+    claimed: the fewest of the likeliest answers that reach the level together, `unknown` perhaps among them; empty
+    where more are needed than a class may have, or their names alone are not probable enough. sure: whether names reach
+    the level without `unknown`.
     """
 
     answers: tuple[Member, ...]
-    open: int
+    claimed: tuple[Member, ...]
     sure: bool
 
     @property
     def is_unknown(self) -> bool:
-        """Whether no name can be claimed: too many are open, or none of them is likelier than that none is right."""
-        return self.open == 0 or self.answers[0].effect == UNKNOWN.id
+        """Whether no name and no class of names is probable enough."""
+        return not self.claimed
 
     def probability_of(self, effect: str, joint: int | None) -> float:
         """Of a name at a place, or of `unknown` at any."""
@@ -53,34 +59,39 @@ class Naming:
         """What is left open: the class, or what an unknown may be; empty for one name."""
         if self.is_unknown:
             return tuple(each for each in self.answers[: tuning.max_class] if each.probability >= tuning.shown)
-        return self.answers[: self.open] if self.open > 1 else ()
+        return self.claimed if len(self.claimed) > 1 else ()
 
 
-def with_probabilities(weighed: Weighed) -> list[tuple[WeighedName, float]]:
+def with_probabilities(weighed: Weighed, settings: Settings) -> list[tuple[WeighedName, float]]:
     """Each name of a finding, and none of them, with its probability."""
-    chances = probabilities([each.numbers for each in weighed], calibrated_weights())
+    chances = probabilities([each.numbers for each in weighed], calibrated_weights(settings.left_out))
     return [(each, float(chance)) for each, chance in zip(weighed, chances, strict=True)]
 
 
-def naming_of(weighed: Weighed, tuning: NamingTuning) -> Naming:
+def naming_of(weighed: Weighed, settings: Settings) -> Naming:
     """The probabilities of the names of a finding, and what of that is claimed."""
-    pairs = sorted(with_probabilities(weighed), key=lambda pair: -pair[1])
-    names = [chance for each, chance in pairs if not each.is_none]
-    enough = np.flatnonzero(np.cumsum([chance for _, chance in pairs])[: tuning.max_class] >= tuning.level)
+    tuning = settings.tuning.naming
+    pairs = sorted(with_probabilities(weighed, settings), key=lambda pair: -pair[1])
+    answers = tuple(Member(each.effect, each.joint, each.joints, chance) for each, chance in pairs)
+    enough = np.flatnonzero(np.cumsum([each.probability for each in answers])[: tuning.max_class] >= tuning.level)
+    together = answers[: enough[0] + 1] if len(enough) else ()
+    names = [each.probability for each in answers if each.effect != UNKNOWN.id]
+    named = sum(each.probability for each in together if each.effect != UNKNOWN.id)
     return Naming(
-        answers=tuple(Member(each.effect, each.joint, each.joints, chance) for each, chance in pairs),
-        open=int(enough[0]) + 1 if len(enough) else 0,
+        answers,
+        claimed=together if named >= tuning.least_names else (),
         sure=sum(names[: tuning.max_class]) >= tuning.level,
     )
 
 
-def named_claims(claims: Sequence[Claim], tuning: NamingTuning) -> tuple[Claim, ...]:
+def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[int] = ()) -> tuple[Claim, ...]:
     """Claims with their probabilities; names that no motion separates count together.
 
-    Those without a name are one finding a joint.
+    Those without a name are one finding a joint. plain: joints, from 1, of whose friction the simulation says nothing.
+    Every arm has friction and offsets: there they keep the law that was found, and only the law is in doubt.
     """
     out = list[Claim]()
-    for each in (_named(claim, tuning) for claim in claims):
+    for each in (_named(claim, settings, plain) for claim in claims):
         there = next((at for at, other in enumerate(out) if _are_one(each, other)), None)
         if there is None:
             out.append(each)
@@ -89,11 +100,10 @@ def named_claims(claims: Sequence[Claim], tuning: NamingTuning) -> tuple[Claim, 
     return tuple(out)
 
 
-def _named(claim: Claim, tuning: NamingTuning) -> Claim:
-    naming = naming_of(claim.weighed, tuning)
-    # friction and offsets are on every arm: the law may be another one, but something of the kind is there
-    expected = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
-    if claim.effect == UNKNOWN.id or (naming.is_unknown and not expected):
+def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
+    naming, tuning = naming_of(claim.weighed, settings), settings.tuning.naming
+    usual = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
+    if claim.effect == UNKNOWN.id or (naming.is_unknown and not (usual and claim.evidence.joint + 1 in plain)):
         return _without_name(claim, naming, tuning)
     identical = [each for each in claim.rivals if each.identical]
     known = {(each.effect, each.joint) for each in identical}
@@ -133,7 +143,7 @@ def _without_name(claim: Claim, naming: Naming, tuning: NamingTuning) -> Claim:
         in_links=False,
         group=None,
         probability=naming.probability_of(UNKNOWN.id, joint),
-        members=naming.members(tuning) if naming.is_unknown else naming.answers[: naming.open],
+        members=tuple(each for each in naming.answers[: tuning.max_class] if each.probability >= tuning.shown),
     )
 
 

@@ -7,15 +7,16 @@ from typing import Final
 
 from armlab.diagnosis.naming.decide import with_probabilities
 from armlab.diagnosis.result import Weighed
+from armlab.diagnosis.settings import Settings
 
 NAMES_SCHEMA: Final = "names/1"
 NAMES_FILE: Final = "names.json"
 
 
-def names_texts(findings: Sequence[Weighed]) -> dict[str, str]:
+def names_texts(findings: Sequence[Weighed], settings: Settings) -> dict[str, str]:
     """The file: of each finding its names, with what speaks for each and its probability; nothing without findings."""
     entries = [
-        {"names": [{**asdict(name), "probability": chance} for name, chance in with_probabilities(weighed)]}
+        {"names": [{**asdict(name), "probability": chance} for name, chance in with_probabilities(weighed, settings)]}
         for weighed in findings
     ]
     content = {"schema": NAMES_SCHEMA, "findings": entries}

@@ -3,8 +3,10 @@
 Every candidate of the library takes the place of the finding in turn, everything else fitted anew. What its law lacks
 of the best log evidence, and what it predicts worse, speaks against a name. That none is right is likelier the more
 structure is left beside the finding, the better a flexible law does in its place, and the more is unusual about its
-joint. Three kinds of findings are weighed, each with numbers of its own: what passed all tests (`found`), what would
-still raise the log evidence (`left`), and structure of which only a surrogate knows (`structure`).
+joint. It is likelier, too, where the errors of the model are coloured, for they are then more than noise, and where a
+finding explains less of the validation runs. Three kinds of findings are weighed, each with numbers of its own: what
+passed all tests (`found`), what would still raise the log evidence (`left`), and structure of which only a surrogate
+knows (`structure`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -31,6 +33,7 @@ from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
 Place = int | None  # a joint or link, from 1; None for the whole robot
 Kind = Literal["found", "left", "structure"]
 LEAST_GAIN = 0.02  # of the held-out error, where gains are compared as ratios
+MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
 
 
 @dataclass(frozen=True)
@@ -104,6 +107,7 @@ def weigh_addition(
         "left gain": float(np.log1p(10 * max(evidence.gain, 0.0))),
         "left validated": float(np.clip(5 * evidence.validation_gain, -1, 1)),
         "left worse": float(evidence.worse),
+        "left colour": _colour(model, evidence.joint),
         "left structure": _structured_share(model, left, candidate.rows[0]),
         "left structure chance": _structure_chance(left, candidate.rows[0]),
         "left flexible": _flexible_ratio(model, model.state, evidence),
@@ -118,6 +122,7 @@ def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[
     none = {
         "structure none": 1.0,
         "structure gain": float(np.log1p(structure.gain)),
+        "structure colour": _colour(model, structure.joint),
         "structure beside": float(_unusual_at(model, joint, claimed)),
     }
     trials = _in_place(model, model.state, None, structure.joint)
@@ -176,6 +181,9 @@ def _against_found(
         "found none": 1.0,
         "found score": float(np.log1p(max(evidence.score, 0.0))) / 5,
         "found gain": float(np.log1p(max(evidence.gain, 0.0))),
+        "found p": zeros_behind_point(evidence.corrected, 30) / 10,
+        "found validated": _validated(evidence),
+        "found colour": _colour(model, evidence.joint),
         "found structure": float(np.log1p(share / max(evidence.gain, 1e-3))),
         "found structure chance": _structure_chance(left, evidence.joint),
         "found structure elsewhere": float(any(is_structured(each, model.design.settings.tuning) for each in left)),
@@ -183,6 +191,17 @@ def _against_found(
         "found crowd": float(len(unusual)),
         "found links off": float(any(model.state.widths or ())),
     }
+
+
+def _validated(evidence: Evidence) -> float:
+    """The logarithm of how much more a finding explains of validation runs than of those it was found on."""
+    ratio = (1 + max(evidence.validation_gain, 0.0)) / (1 + max(evidence.gain, 0.0))
+    return float(np.clip(np.log(ratio), -2.0, 2.0))
+
+
+def _colour(model: FittedModel, joint: int) -> float:
+    """How coloured the errors of a joint (from 0) are; more than noise for certain is not told apart."""
+    return min(float(model.colours[joint]), MOST_COLOUR)
 
 
 def _structure_chance(left: Sequence[Structure], joint: int) -> float:

@@ -13,7 +13,7 @@ from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.found_model import model_found, named_model
 from armlab.diagnosis.real_arms.judged_run import JudgedRun, Percent, common_cutoff, judged_run
 from armlab.diagnosis.result import Diagnosis
-from armlab.diagnosis.settings import Baseline
+from armlab.diagnosis.settings import Baseline, Settings
 from armlab.effects.drive import RotorInertia
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.study import Recipe, Study
@@ -106,7 +106,10 @@ def study_arm(recipe: Recipe, recording: Recording, looks: Looks, progress: Prog
         for run in recording.with_role("validate"):
             looks.note(recipe.name, run.name, f"diagnose, {baseline}")
         diagnoses[baseline] = diagnose(
-            recording, baseline, progress=progress_under(f"{recipe.name}, {baseline}", progress)
+            recording,
+            baseline,
+            settings=Settings(left_out=recipe.name),
+            progress=progress_under(f"{recipe.name}, {baseline}", progress),
         )
     lines = tuple(_lines(recipe, identified, diagnoses, judged, cutoff, looks))
     alone = tuple(_alone_studies(recipe, recording, cutoff, looks, progress))
@@ -199,4 +202,5 @@ def _alone_studies(
 def _diagnose_alone(recipe: Recipe, recording: Recording, run: Run, progress: Progress) -> Diagnosis:
     heading = f"{recipe.name}, nominal, {run.name} alone"
     alone = replace(recording, runs=(replace(run, role="identify"),))
-    return diagnose(alone, "nominal", progress=progress_under(heading, progress))
+    settings = Settings(left_out=recipe.name)
+    return diagnose(alone, "nominal", settings=settings, progress=progress_under(heading, progress))

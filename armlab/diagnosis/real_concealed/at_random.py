@@ -1,10 +1,12 @@
 """Random cases of public recordings: identify, draw, conceal, diagnose and judge; the tables of what came out.
 
-`armlab prove --tier real` scores the tables. All outcomes are stored, so that an interrupted command continues.
+`armlab prove --tier real` scores the tables, and `armlab calibrate --real` learns from the names that were weighed. All
+outcomes are stored, so that an interrupted command continues.
 """
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ from armlab.diagnosis.real_concealed.examine import (
     open_outcomes,
     sought_in_case,
 )
+from armlab.diagnosis.real_concealed.labels import LabelledFinding, label_weighed
 from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.real_concealed.report import OUTCOMES_FOLDER, finding_in_words, list_findings
 from armlab.identification.real.looks import LOOKS_FILE, Looks
@@ -33,6 +36,7 @@ from armlab.recordings.public import open_public_recording
 
 REAL_ARMS = ("emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300")
 TABLES = ("cases.csv", "claims.csv", "recordings.csv")
+WEIGHED_FILE, WEIGHED_SCHEMA = "weighed.json", "weighed/1"
 CASE_COLUMNS = (
     "recording",
     "case",
@@ -67,12 +71,16 @@ class RandomCases:
 
 @dataclass(frozen=True, eq=False)
 class RandomStudy:
-    """A recording with its control and the verdicts on its random cases. description: of the reference model."""
+    """A recording with its control and the verdicts on its random cases. description: of the reference model.
+
+    labelled: the findings of each case that were weighed.
+    """
 
     name: str
     description: str
     control: Outcome
     verdicts: tuple[DrawnVerdict, ...]
+    labelled: tuple[tuple[LabelledFinding, ...], ...]
 
 
 def conceal_at_random(
@@ -111,7 +119,8 @@ def conceal_at_random(
             yield f"{name} is left out: with nothing concealed it is not diagnosed: {control.refused}"
         else:
             studies.append(_judge(reference, drawn[name], outcomes, control))
-    yield from (f"wrote {path}" for path in write_texts(random_tables(studies), out))
+    texts = random_tables(studies) | {WEIGHED_FILE: weighed_text(settings, studies)}
+    yield from (f"wrote {path}" for path in write_texts(texts, out))
 
 
 def _examine(reference: Reference, case: Case, stored: OutcomeStore, looks: Looks) -> tuple[Case, Outcome]:
@@ -122,10 +131,10 @@ def _judge(
     reference: Reference, drawn: Sequence[DrawnCase], outcomes: Mapping[Case, Outcome], control: Outcome
 ) -> RandomStudy:
     name, joints = reference.recording.name, len(reference.recording.arm)
-    verdicts = (
-        judge_drawn(each, outcomes[each.case], sought_in_case(reference, each.case), control, joints) for each in drawn
-    )
-    return RandomStudy(name, reference.description, control, tuple(verdicts))
+    cases = [(each, outcomes[each.case], sought_in_case(reference, each.case)) for each in drawn]
+    verdicts = (judge_drawn(*each, control, joints) for each in cases)
+    labelled = (tuple(label_weighed(outcome, wanted, control, joints)) for _, outcome, wanted in cases)
+    return RandomStudy(name, reference.description, control, tuple(verdicts), tuple(labelled))
 
 
 def random_tables(studies: Sequence[RandomStudy]) -> dict[str, str]:
@@ -143,6 +152,17 @@ def random_tables(studies: Sequence[RandomStudy]) -> dict[str, str]:
         name: frame.to_csv(index=False, float_format="%.4g", lineterminator="\n")
         for name, frame in zip(TABLES, frames, strict=True)
     }
+
+
+def weighed_text(settings: RandomCases, studies: Sequence[RandomStudy]) -> str:
+    """The names that were weighed for each finding of each case, and which of them are right."""
+    findings = [
+        {"recording": study.name, "case": number, **asdict(each)}
+        for study in studies
+        for number, labelled in enumerate(study.labelled, 1)
+        for each in labelled
+    ]
+    return json.dumps({"schema": WEIGHED_SCHEMA, "seed": settings.seed, "findings": findings}) + "\n"
 
 
 def _case_rows(number: int, verdict: DrawnVerdict) -> Iterator[tuple[Any, ...]]:

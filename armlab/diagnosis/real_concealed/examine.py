@@ -26,7 +26,8 @@ from armlab.diagnosis.real_concealed.conceal import (
     withhold_pieces,
 )
 from armlab.diagnosis.real_concealed.plan import Case
-from armlab.diagnosis.result import Claim, Diagnosis
+from armlab.diagnosis.result import Claim, Diagnosis, Weighed
+from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.stored import code_digest, recording_digest
 from armlab.effects.contract import UNKNOWN
 from armlab.identification.model_file import write_model
@@ -89,7 +90,8 @@ class Outcome:
     given: of the error of the simulation that was handed over. named: of the error with every named finding. found: of
     the error with the surrogates of unknown structure, too. hidden: of the torque that is concealed. torque: of the
     filtered torque as measured. recovered: share of the hidden torque that the findings sought explain; None in a
-    control. refused: why nothing was diagnosed, empty where something was; there are no errors then.
+    control. refused: why nothing was diagnosed, empty where something was; there are no errors then. weighed: the names
+    of each finding, and of what was not probable enough for one.
     """
 
     case: str
@@ -102,6 +104,7 @@ class Outcome:
     recovered: float | None
     seconds: float
     refused: str = ""
+    weighed: tuple[Weighed, ...] = ()
 
 
 def summarise_claim(claim: Claim) -> ReportedFinding:
@@ -113,11 +116,11 @@ def summarise_claim(claim: Claim) -> ReportedFinding:
         span = each.interval
         pair = (float(span[0]), float(span[1])) if span and not isinstance(span[0], tuple) else None
         sizes.append(ParameterSize(each.name, float(each.value), pair, each.unit))
-    rivals = tuple(Rival(each.effect, _joints_of(each.joint, each.joints)) for each in claim.rivals)
+    rivals = tuple(Rival(each.effect, joints_of(each.joint, each.joints)) for each in claim.rivals)
     members = tuple(
-        PossibleName(each.effect, _joints_of(each.joint, each.joints), each.probability) for each in claim.members
+        PossibleName(each.effect, joints_of(each.joint, each.joints), each.probability) for each in claim.members
     )
-    place = _joints_of(claim.joint, claim.joints)
+    place = joints_of(claim.joint, claim.joints)
     return ReportedFinding(claim.effect, place, claim.equation, tuple(sizes), rivals, claim.probability, members)
 
 
@@ -125,9 +128,9 @@ def summarise_mistake(found: SetupFinding) -> ReportedFinding:
     """A mistake of reading: a delay that is corrected there is no claim of physics any more."""
     own = found.mistake
     place = own.joints if own.joint is None else (own.joint,)
-    rivals = tuple(Rival(each.effect, _joints_of(each.joint, each.joints)) for each in found.rivals)
+    rivals = tuple(Rival(each.effect, joints_of(each.joint, each.joints)) for each in found.rivals)
     own_name = PossibleName(own.effect, place, found.probability)
-    others = (PossibleName(each.effect, _joints_of(each.joint, each.joints), each.probability) for each in found.rivals)
+    others = (PossibleName(each.effect, joints_of(each.joint, each.joints), each.probability) for each in found.rivals)
     sizes = tuple(
         ParameterSize(name, value, None, unit) for name, value, unit in own.parameters if isinstance(value, float)
     )
@@ -135,7 +138,8 @@ def summarise_mistake(found: SetupFinding) -> ReportedFinding:
     return ReportedFinding(own.effect, place, found.text, sizes, rivals, found.probability, members)
 
 
-def _joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
+def joints_of(joint: int | None, joints: tuple[int, ...]) -> tuple[int, ...]:
+    """The joints of a name, as `SoughtEffect` has them."""
     if joint is None:
         return ()
     return joints if len(joints) > 1 else (joint,)
@@ -164,7 +168,8 @@ def examine_case(reference: Reference, case: Case, path: Path, progress: Callabl
     if case.injected is not None:
         pairs = [add_disturbance(run, recording.arm, case.injected) for run in runs]
         runs, added = tuple(run for run, _ in pairs), {run.name: (run.time, torque) for run, torque in pairs}
-    diagnosis = diagnose(replace(recording, runs=runs, simulation=path), "nominal", progress=progress)
+    seen, settings = replace(recording, runs=runs, simulation=path), Settings(left_out=case.recording)
+    diagnosis = diagnose(seen, "nominal", settings=settings, progress=progress)
     findings = tuple(summarise_mistake(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     findings += tuple(summarise_claim(each) for each in diagnosis.claims)
     if diagnosis.observed is None or diagnosis.final is None:
@@ -227,6 +232,7 @@ def _measure_outcome(
         torque=_rms(diagnosis.observed.torque[rows]),
         recovered=1 - float(np.sum(left**2)) / power if power > 0 else None,
         seconds=diagnosis.seconds,
+        weighed=diagnosis.weighed,
     )
 
 

@@ -134,7 +134,7 @@ def diagnose_recording(
     options += [word for form in dict.fromkeys(tables) for word in ("--table", form)]
     command = shlex.join(["armlab", "diagnose", str(folder), "--out", str(out), *options])
     pages = verdict_texts(diagnosis, out) | report_texts(diagnosis, command)
-    texts: dict[str, str | bytes] = {**pages, **names_texts(diagnosis.weighed), **predicted_texts(diagnosis)}
+    texts: dict[str, str | bytes] = {**pages, **names_texts(diagnosis.weighed, settings), **predicted_texts(diagnosis)}
     if diagnosis.claims:
         texts |= table_files("joints", measured.joint_table(diagnosis), tables)
     moved = None
