@@ -9,7 +9,7 @@ from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gai
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.links import link_prior
-from armlab.diagnosis.noise import fit_noise
+from armlab.diagnosis.noise import error_colours, fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import read_simulation
 from armlab.diagnosis.solver import Solver, State
@@ -49,6 +49,13 @@ def test_whitened_autoregressive_noise_is_white_with_unit_variance(observed: Obs
     white = noise.whitened(coloured[:, :1], 0, observed.used(0))[:, 0]
     assert np.var(white) == pytest.approx(1, abs=0.05)
     assert abs(np.mean(white[1:] * white[:-1])) < 0.06
+
+
+def test_the_colour_of_errors_is_what_their_past_tells_of_them(observed: Observed) -> None:
+    white = np.random.default_rng(0).standard_normal((observed.rows, 3))
+    coloured = lfilter([0.3], [1, -0.9], white, axis=0)
+    assert error_colours(white, observed, TUNING.noise) == pytest.approx(0, abs=0.02)
+    assert error_colours(7 * coloured, observed, TUNING.noise) == pytest.approx(-0.5 * np.log(1 - 0.9**2), abs=0.1)
 
 
 def test_coloured_noise_is_whitened_through_rest_and_counts_less_where_it_is_larger(observed: Observed) -> None:

@@ -23,6 +23,7 @@ from armlab.diagnosis.real_concealed.examine import open_outcomes
 from armlab.diagnosis.real_concealed.plan import INJECTED, WITHHELD, Case, Disturbance, Piece, cases_of
 from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 from armlab.diagnosis.real_concealed.study import ConcealedStudy, study_cases, study_recording
+from armlab.diagnosis.simulation import Simulation
 from armlab.identification.real.looks import Looks
 from armlab.identification.real.study import RECIPES
 from armlab.recordings.recording import Run
@@ -204,3 +205,10 @@ def test_friction_that_is_withheld_from_the_emps_is_named(tmp_path: Path, monkey
     assert verdict.gap == pytest.approx(1, abs=0.1)
     recipe = next(each for each in RECIPES if each.name == "emps")
     assert identify_reference(found.reference.recording, recipe).model.inertial is not None
+
+
+def test_a_simulation_knows_of_which_joints_it_has_no_friction(reference: Reference) -> None:
+    arm, less = reference.recording.arm, withhold_pieces(reference.model, (Piece("friction", 2),))
+    assert Simulation("nominal", arm, None, reference.model).joints_without_friction == frozenset()
+    assert Simulation("nominal", arm, None, less).joints_without_friction == {2}
+    assert Simulation("refit", arm, None).joints_without_friction == {1, 2, 3}
