@@ -31,7 +31,7 @@ from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
-from armlab.diagnosis.naming.additions import Additions, add_probable
+from armlab.diagnosis.naming.additions import Additions, add_probable, with_likeliest_names
 from armlab.diagnosis.naming.decide import named_claims
 from armlab.diagnosis.naming.weighing import weigh_effect, weigh_link, weigh_structure
 from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
@@ -177,7 +177,9 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
 
 
 def _with_probable(named: "NamedEffects") -> tuple["NamedEffects", Additions]:
-    """Names that hold with what is probable beside them, and what was weighed for that."""
+    """Names that hold, the likeliest in each place, what is probable beside them, and what was weighed for that."""
+    model, effects = with_likeliest_names(named.model, named.effects, named.left)
+    named = replace(named, model=model, effects=effects)
     added = add_probable(named.model, named.left)
     if added.model is named.model or not named.model.design.settings.guards.unknown:
         return replace(named, model=added.model, effects=named.effects | added.effects), added

@@ -1,7 +1,11 @@
-"""Repair of time stamps that jitter.
+"""Repair of time stamps that jitter, and of rows that were written again before the next one was read.
 
 Either the samples were taken at uneven times, or even samples were stamped late. The data decide: in a sample that was
 taken late, the position is ahead by velocity times lateness.
+
+A log that is written at its own rate repeats the row that was read last. Then no stamp says when a row was read: it is
+late by anything up to a step, and grows later until a row is missing or repeated. Rows that were read evenly are put
+back on an even grid where the motion becomes smooth by that.
 """
 
 from dataclasses import dataclass
@@ -16,6 +20,7 @@ from armlab.recordings.recording import AnyRun, Finding, MotionRun
 MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
 MIN_WARNED_LATENESS = 0.1  # of a step: less is lost in what the splines do well
 MAX_GAP_SCATTER_RATIO = 0.9  # times the scatter: samples are missing only where that explains the stamps better
+MAX_HELD_ROUGHNESS = 0.5  # times that of the rows as they stand: the motion becomes so much smoother without repeats
 MAX_GRID_LATENESS = 1.5  # steps: stamps further from any even grid cannot be counted
 
 
@@ -70,6 +75,51 @@ def repair_stamps(run: AnyRun) -> AnyRun:
         text = f"{grid.missing} single samples are missing; bridged by splines where the run is filtered"
         run = run.with_findings(Finding("time_gap", "repaired", text))
     return run.with_signals(grid.time, {})
+
+
+def take_back_repeated_rows(run: AnyRun) -> AnyRun:
+    """The run without rows that repeat the row before, on the even times at which the others were read.
+
+    The run as it is where it repeats none, where the others do not come evenly, or where the motion does not become
+    smoother by that: a joint at rest may read the same twice.
+    """
+    if run.samples <= 2 * len(NEIGHBOURS) or np.any(np.diff(run.time) <= 0):
+        return run
+    values = np.column_stack([*run.signals.values()])
+    again = np.append(False, np.all((values[1:] == values[:-1]) | np.isnan(values[1:]), axis=1))
+    fresh = run.rows(~again)
+    if not again.any() or fresh.samples <= 2 * len(NEIGHBOURS):
+        return run
+    grid = _fit_grid(fresh.time, np.arange(fresh.samples))
+    even = fresh.with_signals(grid.time, {})
+    late = np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step
+    if late or not _roughness(even) < MAX_HELD_ROUGHNESS * _roughness(run):
+        return run
+    text = (
+        f"{again.sum()} rows repeat the row before while the arm moves: the log was written at {run.rate_hz:.4g} Hz, "
+        f"the joints were read at {1 / grid.step:.4g} Hz; repeats left out, the others put on the times of reading"
+    )
+    return even.with_findings(Finding("repeated_row", "repaired", text))
+
+
+NEIGHBOURS = (-2, -1, 1, 2)  # rows that tell where a row between them is
+
+
+def _roughness(run: MotionRun) -> float:
+    """How far positions are from the cubic through their neighbours, RMS over the travel of each joint."""
+    middle = np.arange(2, run.samples - 2)
+    guess = np.zeros((len(middle), run.joints))
+    for own in NEIGHBOURS:
+        weight = np.ones(len(middle))
+        for other in NEIGHBOURS:
+            if other != own:
+                weight *= (run.time[middle] - run.time[middle + other]) / (
+                    run.time[middle + own] - run.time[middle + other]
+                )
+        guess += weight[:, None] * run.position[middle + own]
+    travel = np.ptp(run.position, axis=0)
+    off = (run.position[middle] - guess)[:, travel > 0] / travel[travel > 0]
+    return float(np.sqrt(np.mean(off**2))) if off.size else 0.0
 
 
 def fit_even_grid(time: Array) -> Grid:

@@ -1,5 +1,7 @@
 """What is added to a model because its name is probable."""
 
+from dataclasses import replace
+
 import engine_cases as cases
 import numpy as np
 import pytest
@@ -7,8 +9,9 @@ import pytest
 from armlab.common.arrays import Array
 from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.diagnose import prepare
+from armlab.diagnosis.evidence import Judge
 from armlab.diagnosis.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.naming.additions import Found, _added, _named
+from armlab.diagnosis.naming.additions import Found, _added, _named, with_likeliest_names
 from armlab.diagnosis.search import Search
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.solver import State
@@ -36,7 +39,7 @@ def found_as(model: FittedModel, effect: str) -> Found:
     search = Search(model.solver, model.design.settings, True, 0)
     candidates = [each.candidate for each in model.solver.groups]
     named = (at for at, each in enumerate(candidates) if (each.effect, each.joint) == (effect, 2))
-    found = next(each for each in (_added(model, search, at) for at in named) if each is not None)
+    found = next(each for each in (_added(model, search, at, 0.0) for at in named) if each is not None)
     assert found[2].score > 0
     return found
 
@@ -57,3 +60,33 @@ def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pyte
     monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"left none": 9.0})
     first = found_as(model, "gravity_compensator")
     assert _named(model, first, ())[0] is first
+
+
+def holding(model: FittedModel, effect: str) -> FittedModel:
+    """The model with an effect at joint 2."""
+    return replace(model, state=found_as(model, effect)[1])
+
+
+@pytest.mark.parametrize("effect", ["gravity_compensator", "cable_stiffness"])
+def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch, effect: str) -> None:
+    monkeypatch.setattr(
+        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"is cable_stiffness": 9.0}
+    )
+    held = holding(model, effect)
+    named, effects = with_likeliest_names(held, Judge(held, held.state).effects(), ())
+    (group,) = effects
+    assert named.state.groups == (group,)
+    assert named.solver.groups[group].candidate.effect == "cable_stiffness"
+    assert len(named.steps) == (effect != "cable_stiffness")
+
+
+def test_what_passed_keeps_a_name_of_its_class_and_what_is_unknown(
+    model: FittedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = holding(model, "gravity_compensator")
+    known = Judge(held, held.state).effects()
+    for weights in ({"is cable_stiffness": 9.0, "is gravity_compensator": 8.5}, {"found none": 9.0}):
+        monkeypatch.setattr(
+            "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out, weights=weights: weights
+        )
+        assert with_likeliest_names(held, known, ()) == (held, known)

@@ -98,6 +98,12 @@ def test_else_it_is_unknown_with_a_probability_of_its_own() -> None:
     assert found.equation == "tau_2 += f(the motion)"
 
 
+def test_a_name_that_is_not_of_the_class_of_its_finding_is_none() -> None:
+    (found,) = named_claims([claim("channel_skew", weighed(0.04, early_friction=0.94, channel_skew=0.02))], Settings())
+    assert (found.effect, found.probability) == ("unknown", pytest.approx(0.04))
+    assert [each.effect for each in found.members] == ["early_friction"]
+
+
 def test_friction_keeps_its_law_at_a_joint_of_whose_friction_the_simulation_says_nothing() -> None:
     names = weighed(0.5, coulomb_friction=0.3, stribeck_friction=0.2)
     own = replace(claim("coulomb_friction", names), candidate=CoulombFriction(2, (2,), (1,)))

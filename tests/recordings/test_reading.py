@@ -19,6 +19,7 @@ from armlab.recordings.reading.corrected import correct_recording, corrected_tex
 from armlab.recordings.reading.fit import Fitter
 from armlab.recordings.reading.judge import Judge, is_accepted
 from armlab.recordings.reading.mistakes import encoder_offset, late_torque, signs, take_back
+from armlab.recordings.reading.mistakes import spring as with_spring
 from armlab.recordings.reading.reading import Mistake, read_as_is
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
@@ -173,13 +174,50 @@ def test_the_corrected_folder_holds_the_recording_read_rightly(tmp_path: Path) -
 def test_a_mistake_is_the_same_when_it_is_taken_back_by_its_name(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig")
     reading = read_as_is(recording, ARM.parameters)
-    for made in (next(iter(signs(reading))), encoder_offset(reading, 1, 0.5), late_torque(reading, None, 0.1)):
+    for made in (
+        next(iter(signs(reading))),
+        encoder_offset(reading, 1, 0.5),
+        late_torque(reading, None, 0.1),
+        with_spring(reading, 2),
+    ):
         again = take_back(reading, made.mistakes[-1], recording)
         assert np.array_equal(again.torque, made.torque)
         assert np.array_equal(again.offset, made.offset)
         assert np.array_equal(again.delay, made.delay)
+        assert again.springs == made.springs
     with pytest.raises(ValueError, match="no such mistake"):
         take_back(reading, Mistake("magic"), recording)
+
+
+def spring(joint: int, stiffness: float) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        table[TORQUE[joint - 1]] += stiffness * table[POSITION[joint - 1]]
+
+    return change
+
+
+def both(first: Change, second: Change) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        first(table)
+        second(table)
+
+    return change
+
+
+@pytest.mark.parametrize(("joint", "stiffness"), [(1, 30.0), (2, 30.0), (3, 100.0)])
+def test_a_spring_is_no_mistake(tmp_path: Path, joint: int, stiffness: float) -> None:
+    """An arm with a spring fits better under a wrong sign, late torque or other links, too."""
+    answer = answer_to(recording_with(tmp_path / "rig", spring(joint, stiffness)))
+    assert names_of(answer) == []
+    assert answer.share < 0.1
+
+
+def test_a_mistake_is_found_beside_a_spring(tmp_path: Path) -> None:
+    change = both(spring(1, 30.0), scale(["tau2"], -1.0))
+    answer = answer_to(recording_with(tmp_path / "rig", change))
+    assert names_of(answer) == ["torque_sign@2"]
+    assert answer.reading is not None
+    assert np.array_equal(answer.reading.torque, np.diag([1.0, -1.0, 1.0]))
 
 
 def test_fitted_bodies_can_exist_and_friction_takes_energy(tmp_path: Path) -> None:

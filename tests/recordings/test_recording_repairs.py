@@ -114,6 +114,36 @@ def test_samples_that_were_really_taken_at_uneven_times_keep_their_stamps(tmp_pa
     assert kinds(run) == [("time_jitter", "warning")]
 
 
+@pytest.mark.parametrize("read_hz", [0.97 * RATE_HZ, 0.3 * RATE_HZ])
+def test_rows_that_were_written_again_before_the_next_was_read_are_put_on_the_times_of_reading(
+    tmp_path: Path, read_hz: float
+) -> None:
+    """The log is written evenly: no stamp says when a row was read."""
+    table = frame()
+    last_read = np.floor(table["t"].to_numpy() * read_hz) / read_hz
+    torque = [name for name in table if name not in ("t", *POSITION)]
+    table[POSITION] = motion_at(last_read).position
+    table[torque] = motion_at(last_read).velocity
+    (run,) = loaded(tmp_path, table)
+    repeated = int(np.sum(np.diff(last_read) == 0))
+    assert kinds(run) == [("repeated_row", "repaired")]
+    assert f"{repeated} rows" in run.findings[0].text
+    assert run.even
+    assert run.samples == len(table) - repeated
+    assert run.rate_hz == pytest.approx(read_hz, rel=2e-3)
+    off = run.time - np.unique(last_read)
+    assert np.abs(off - off.mean()).max() < 0.2 / RATE_HZ
+
+
+def test_a_joint_that_rests_may_read_the_same_twice(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[600:700] = table.loc[600].to_numpy()
+    table["t"] = frame()["t"]
+    (run,) = loaded(tmp_path, table)
+    assert run.samples == len(table)
+    assert kinds(run) == []
+
+
 def test_stamps_of_a_clock_that_is_coarser_than_the_sampling_are_made_even(tmp_path: Path) -> None:
     table = frame()
     table["t"] = np.floor(table["t"] * 100) / 100

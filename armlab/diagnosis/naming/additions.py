@@ -5,7 +5,7 @@ for one law alone. An effect that fails one of them may still be far likelier th
 weighs all of that together, as it was found to be worth on recordings whose truth is known.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,9 +13,9 @@ import numpy as np
 from armlab.diagnosis.evidence import Evidence, Judge
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.naming.decide import MOTION_AXES, naming_of
-from armlab.diagnosis.naming.weighing import weigh_addition
+from armlab.diagnosis.naming.weighing import weigh_addition, weigh_effect
 from armlab.diagnosis.plausibility import doubtful_names
-from armlab.diagnosis.result import Claim, Weighed
+from armlab.diagnosis.result import Claim, Member, Weighed
 from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
@@ -63,7 +63,7 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
         )
         what = _candidate(out.model, group)
         likeliest = naming.answers[0].is_of(what.effect, what.joint)
-        if believed and (naming.sure or (certain and likeliest and not naming.is_unknown)):
+        if believed and naming.may_be(what.effect, what.joint) and (naming.sure or (certain and likeliest)):
             step = Step(f"+ {what.effect} {what.joint}, which is probable", out.model.solver.fit(state).score)
             added = replace(out.model, state=state, steps=(*out.model.steps, step))
             effects = {each: known for each, known in out.effects.items() if each in state.groups}
@@ -103,27 +103,57 @@ def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
         if group in banned or not _may_be_added(model, search, group):
             continue
         asked += 1
-        found = _added(model, search, group)
+        found = _added(model, search, group, tuning.least_addition)
         if found is not None:
             return found
     return None
+
+
+def with_likeliest_names(
+    model: FittedModel, effects: Mapping[int, Evidence], left: Sequence[Structure]
+) -> tuple[FittedModel, dict[int, Evidence]]:
+    """Effects that passed, with the likeliest name in the place of one that is not in the class of its finding.
+
+    A search takes what raises the score most, and what fits best need not be likeliest. left: structure of the joints.
+    """
+    out = dict(effects)
+    for group in effects:
+        if group not in out:
+            continue
+        naming, own = naming_of(weigh_effect(model, group, out, left), model.design.settings), _candidate(model, group)
+        if naming.is_unknown or naming.may_be(own.effect, own.joint):
+            continue
+        without = replace(model, state=model.state.minus(group))
+        likelier = _with_name(without, naming.answers[0], least=0.0)
+        if likelier is not None:
+            other, state, evidence = likelier
+            what = _candidate(model, other)
+            text = f"{own.effect} {own.joint} -> {what.effect} {what.joint}, which is likelier"
+            step = Step(text, model.solver.fit(state).score)
+            model = replace(model, state=state, steps=(*model.steps, step))
+            out = {each: known for each, known in out.items() if each in state.groups} | {other: evidence}
+    return model, out
 
 
 def _named(model: FittedModel, found: Found, left: Sequence[Structure]) -> tuple[Found, Weighed]:
     """What raises the score most, or the effect with the likeliest name in its place, and its names."""
     names = weigh_addition(model, *found, left)
     answer, own = naming_of(names, model.design.settings).answers[0], _candidate(model, found[0])
-    if answer.is_of(own.effect, own.joint):
-        return found, names
+    least = model.design.settings.tuning.naming.least_addition
+    likelier = None if answer.is_of(own.effect, own.joint) else _with_name(model, answer, least)
+    return (found, names) if likelier is None else (likelier, weigh_addition(model, *likelier, left))
+
+
+def _with_name(model: FittedModel, answer: Member, least: float) -> Found | None:
+    """The model with the effect of a name that raises the score most; None where none raises it by the least, nats."""
     search = Search(model.solver, model.design.settings, True, 0)
-    gains = search.gains(model.state)
-    for group in map(int, np.argsort(-gains)):
+    for group in map(int, np.argsort(-search.gains(model.state))):
         each = _candidate(model, group)
         if answer.is_of(each.effect, each.joint) and _may_be_added(model, search, group):
-            likelier = _added(model, search, group)
-            if likelier is not None:
-                return likelier, weigh_addition(model, *likelier, left)
-    return found, names
+            added = _added(model, search, group, least)
+            if added is not None:
+                return added
+    return None
 
 
 def _candidate(model: FittedModel, group: int) -> Candidate:
@@ -131,15 +161,22 @@ def _candidate(model: FittedModel, group: int) -> Candidate:
 
 
 def _may_be_added(model: FittedModel, search: Search, group: int) -> bool:
-    """Whether a group is nothing that every arm has, and has room beside a model."""
-    return not _candidate(model, group).facts.usual and not search.excluded(model.state, group)
+    """Whether a group is nothing that every arm has, and has room beside a model: a link that is off has none."""
+    what = _candidate(model, group)
+    held = what.facts.where == "link" and what.joint is not None and _is_off(model, what.joint)
+    return not (what.facts.usual or held or search.excluded(model.state, group))
 
 
-def _added(model: FittedModel, search: Search, group: int) -> Found | None:
+def _is_off(model: FittedModel, link: int) -> bool:
+    """Whether a model holds a link, from 1, that is not as simulated."""
+    widths = model.state.widths
+    return widths is not None and widths[link - 1] > 0
+
+
+def _added(model: FittedModel, search: Search, group: int, least: float) -> Found | None:
     """A model with one more group, and its evidence; None where that breaks a law of physics or is too little."""
     state = search.with_group(model.state, group)
     if search.objection(state, group) is not None:
         return None
     evidence = Judge(replace(model, state=state), state).effects()[group]
-    enough = evidence.score >= model.design.settings.tuning.naming.least_addition
-    return (group, state, evidence) if enough and evidence.objection is None else None
+    return (group, state, evidence) if evidence.score >= least and evidence.objection is None else None

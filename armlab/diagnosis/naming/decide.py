@@ -50,6 +50,10 @@ class Naming:
         """Whether no name and no class of names is probable enough."""
         return not self.claimed
 
+    def may_be(self, effect: str, joint: int | None) -> bool:
+        """Whether a name is the one, or of the class, that is claimed."""
+        return any(each.is_of(effect, joint) for each in self.claimed)
+
     def probability_of(self, effect: str, joint: int | None) -> float:
         """Of a name at a place, or of `unknown` at any."""
         named = (each for each in self.answers if each.is_of(effect, joint) or effect == each.effect == UNKNOWN.id)
@@ -103,11 +107,13 @@ def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[
 def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     naming, tuning = naming_of(claim.weighed, settings), settings.tuning.naming
     usual = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
-    if claim.effect == UNKNOWN.id or (naming.is_unknown and not (usual and claim.evidence.joint + 1 in plain)):
-        return _without_name(claim, naming, tuning)
     identical = [each for each in claim.rivals if each.identical]
     known = {(each.effect, each.joint) for each in identical}
-    chance = sum(naming.probability_of(*each) for each in {(claim.effect, claim.joint), *known})
+    own = {(claim.effect, claim.joint), *known}
+    nameless = not any(naming.may_be(*each) for each in own)
+    if claim.effect == UNKNOWN.id or (nameless and not (usual and claim.evidence.joint + 1 in plain)):
+        return _without_name(claim, naming, tuning)
+    chance = sum(naming.probability_of(*each) for each in own)
     members = naming.members(tuning) if chance < tuning.level else ()
     others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     rivals = [*identical, *(each.as_rival for each in others if (each.effect, each.joint) not in known)]

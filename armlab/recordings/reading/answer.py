@@ -8,7 +8,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.reading.corrected import correct_recording
 from armlab.recordings.reading.fit import Fitter
 from armlab.recordings.reading.judge import Gain, Judge
-from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
+from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
 from armlab.recordings.reading.search import Found, find_mistakes
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
@@ -21,7 +21,7 @@ from problem.pseudo_inertia import are_bodies
 
 @dataclass(frozen=True)
 class Rival:
-    """Another mistake in the place of one, or links that are off: it fits these data alike."""
+    """What fits these data alike in the place of a mistake: another one, a spring of a joint, or links that are off."""
 
     effect: str
     joint: int | None
@@ -141,7 +141,11 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
         nearest = found.tried if found.best is found.start else (found.best,)
         tried = tuple(describe(mistake, recording.arm) for each in nearest for mistake in each.reading.mistakes)
         return Answer((), recording, None, share, tried=tried, looks=found.looks)
-    findings = tuple(_finding(judge, found, place) for place in range(len(found.best.reading.mistakes)))
+    findings = tuple(
+        _finding(judge, found, place) for place, each in enumerate(found.best.reading.mistakes) if each.effect != SPRING
+    )
+    if not findings:  # springs alone: the recording is read rightly
+        return Answer((), recording, None, overall_error(judge, found.best.reading, near=False), looks=found.looks)
     open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
     if open_ones:
         return Answer((), recording, None, share, open=open_ones, looks=found.looks)

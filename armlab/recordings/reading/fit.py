@@ -1,11 +1,11 @@
 """Rigid links with usual friction, fitted to a reading: errors on blocks of time that are held out.
 
-    tau_j = Y_j(q, qd, qdd) phi + v_j qd_j + c_j sign(qd_j) + I_j qdd_j + o_j,    v, c, I >= 0
+    tau_j = Y_j(q, qd, qdd) phi + v_j qd_j + c_j sign(qd_j) + I_j qdd_j + o_j + s_j q_j,    v, c, I >= 0
 
-The links phi are drawn to those of the simulation by a normal prior in the metric of pseudo-inertias (Lee and Park
-2018): `near` where they may be as far off as simulations usually are, `free` where the data decide. Links that are
-physically consistent are fitted with the entropic divergence to the same bodies (Lee, Wensing and Park 2020), whose
-barrier keeps every pseudo-inertia positive definite.
+A joint has a spring s_j only where the reading says so. The links phi are drawn to those of the simulation by a normal
+prior in the metric of pseudo-inertias (Lee and Park 2018): `near` where they may be as far off as simulations usually
+are, `free` where the data decide. Links that are physically consistent are fitted with the entropic divergence to the
+same bodies (Lee, Wensing and Park 2020), whose barrier keeps every pseudo-inertia positive definite.
 """
 
 from collections.abc import Sequence
@@ -32,13 +32,14 @@ from problem.pseudo_inertia import (
 from problem.regressor import observation_matrix, rigid_body_torque
 
 FOLDS = 2  # even and odd blocks are held out in turn
-OWN = 4  # columns of a joint: viscous and Coulomb friction, rotor inertia, offset
+OWN = 5  # columns of a joint: viscous and Coulomb friction, rotor inertia, offset, spring
+SPRING = 4  # which of them is the spring
 SIGNED = 3  # of them the first ones, which are not negative
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 4), and their products on each fold.
+    """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 5), and their products on each fold.
 
     grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones.
     """
@@ -55,7 +56,7 @@ def make_columns(arm: Arm, motion: Motion, fold: NDArray[np.intp], sign_width: f
     rigid = observation_matrix(arm, motion).reshape(motion.samples, joints, 10 * joints)
     speed = np.abs(motion.velocity).max(axis=0)
     sign = np.tanh(motion.velocity / (sign_width * np.where(speed > 0, speed, 1.0)))
-    own = np.stack([motion.velocity, sign, motion.acceleration, np.ones_like(sign)], axis=2)
+    own = np.stack([motion.velocity, sign, motion.acceleration, np.ones_like(sign), motion.position], axis=2)
     grams = np.zeros((FOLDS, joints, 10 * joints + OWN, 10 * joints + OWN))
     for number in range(FOLDS):
         rows = fold == number
@@ -91,7 +92,7 @@ def _prior(arm: Arm) -> Prior:
 class Score:
     """Held-out errors of a reading. shares: (blocks, joints), mean squares over the scatter of the joint's torque.
 
-    values: (folds, 10 * joints) of the links, own: (folds, joints, 4) of the joints. distance: of the links from those
+    values: (folds, 10 * joints) of the links, own: (folds, joints, 5) of the joints. distance: of the links from those
     of the simulation, minus the logarithm of their prior over the number of independent rows.
     """
 
@@ -165,7 +166,8 @@ class Fitter:
         scatter = np.std(torque, axis=0)
         weight = np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
         prior = self.prior(reading, torque)
-        normal = [self._normal_equations(columns, torque, weight, 1 - number) for number in range(FOLDS)]
+        without = [joint for joint in range(reading.joints) if joint not in reading.springs]
+        normal = [self._normal_equations(columns, torque, weight, 1 - number, without) for number in range(FOLDS)]
         count = np.bincount(self.channels.block, minlength=self.channels.blocks)
         out = []
         for width in widths:
@@ -187,8 +189,13 @@ class Fitter:
             out.append(Score(shares / count[:, None], values, owns, distance))
         return out
 
-    def _normal_equations(self, columns: Columns, torque: Array, weight: Array, fold: int) -> tuple[Array, Array]:
-        """Gram matrix and product with the torque, in nats, of the rows of a fold."""
+    def _normal_equations(
+        self, columns: Columns, torque: Array, weight: Array, fold: int, without: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Gram matrix and product with the torque, in nats, of the rows of a fold.
+
+        without: joints (from 0) that have no spring.
+        """
         joints, rows = torque.shape[1], self.fold == fold
         blocks = len(np.unique(self.channels.block[rows]))
         scale = blocks * self.tuning.independent_rows / (max(rows.sum(), 1) * self.tuning.model_error**2) * weight**2
@@ -204,6 +211,8 @@ class Fitter:
             gram[places, :links] = gram[:links, places].T
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
             product[places] = own[joint]
+        absent = [links + OWN * joint + SPRING for joint in without]
+        gram[absent], gram[:, absent], product[absent] = 0.0, 0.0, 0.0
         return gram, product
 
     def beyond_limits(self, reading: Reading) -> int:
@@ -240,7 +249,7 @@ class Fitter:
         given = rigid_body_torque(reading.arm, columns.motion, reading.inertial)
         out = []
         for joint in range(reading.joints):
-            own = columns.own[:, joint]
+            own = columns.own[:, joint, :SPRING]
             model, measured = (
                 each[:, joint] - own @ np.linalg.lstsq(own, each[:, joint])[0] for each in (given, torque)
             )

@@ -9,6 +9,8 @@
 | base_tilt, gravity_compensated_torque | gravity along the axes and diagonals, then refined; no gravity |
 | dh_convention, inertia_reference, link_data_error | other meanings of the numbers of the robot file |
 | clock_error, time_delay, channel_skew | factors of time and shifts of torque, then refined |
+
+Springs of joints stand beside them: they are physics, but an arm with one fits better under some mistake, too.
 """
 
 from collections.abc import Iterator
@@ -19,7 +21,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, validate
-from armlab.recordings.reading.reading import Mistake, Reading
+from armlab.recordings.reading.reading import SPRING, Mistake, Reading
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.pseudo_inertia import link_from_centre_of_mass, links_of
@@ -200,6 +202,16 @@ def read_robot_file(recording: Recording) -> RobotFile | None:
     return validate(RobotFile, read_yaml(path), str(path)) if path.suffix in (".yaml", ".yml") else None
 
 
+def spring(reading: Reading, joint: int) -> Reading:
+    """The reading of a joint (from 0) that has a spring or a gravity compensator."""
+    return reading.with_spring(joint).with_mistake(Mistake(SPRING, joint + 1))
+
+
+def springs(reading: Reading) -> Iterator[Reading]:
+    """Springs of joints that have none yet."""
+    return (spring(reading, joint) for joint in range(reading.joints) if joint not in reading.springs)
+
+
 def joint_names(arm: Arm) -> tuple[str, ...]:
     """Names of the joints in the order of the robot file."""
     return tuple(joint.name for joint in arm.joints)
@@ -219,6 +231,8 @@ def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Readi
     Raises ValueError for a mistake that is not of this table.
     """
     joint = None if mistake.joint is None else mistake.joint - 1
+    if mistake.effect == SPRING:
+        return spring(reading, joint or 0)
     if mistake.effect == "encoder_offset":
         return encoder_offset(reading, joint or 0, mistake.value("offset"))
     if mistake.effect == "unit_error":

@@ -14,13 +14,16 @@ from armlab.common.arrays import Array
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
+SPRING = "cable_stiffness"  # physics that a joint may have in the place of a mistake
+
 
 @dataclass(frozen=True)
 class Mistake:
-    """One way in which a recording or a robot file is read wrongly.
+    """One way in which a recording or a robot file is read wrongly, or a spring of a joint, which looks like some.
 
-    effect: an id of the setup effects. joint: from 1, the link of `link_data_error`, None for the whole robot. joints:
-    the exchanged pair, or an order of all channels. form: which quantity. parameters: (name, value, unit).
+    effect: an id of the setup effects, or `SPRING`. joint: from 1, the link of `link_data_error`, None for the whole
+    robot. joints: the exchanged pair, or an order of all channels. form: which quantity. parameters: (name, value,
+    unit).
     """
 
     effect: str
@@ -47,7 +50,7 @@ class Reading:
     position: (joints, channels); offset: (joints,); torque: (joints, channels), gains included. position_order,
     torque_order: which recorded channel stands at each place. clock: recorded time over true time. delay: (joints,), s,
     by which torque is late. arm, inertial: the robot, and (10 * joints,) of the links of the simulation if there is
-    one. mistakes: what was taken back.
+    one. mistakes: what was taken back. springs: joints (from 0) that have one beside links and friction.
     """
 
     position: Array
@@ -60,6 +63,7 @@ class Reading:
     arm: Arm
     inertial: Array | None
     mistakes: tuple[Mistake, ...] = ()
+    springs: tuple[int, ...] = ()
 
     @property
     def joints(self) -> int:
@@ -99,6 +103,10 @@ class Reading:
         """Another gravity (3,) in the base frame."""
         x, y, z = (float(value) for value in gravity)
         return replace(self, arm=replace(self.arm, gravity=(x, y, z)))
+
+    def with_spring(self, joint: int) -> "Reading":
+        """The torque of a joint (from 0) may hold a spring."""
+        return replace(self, springs=(*self.springs, joint))
 
     def late_by(self, seconds: float, joint: int | None = None) -> "Reading":
         """Torque (of one joint, from 0) that is read so much later."""

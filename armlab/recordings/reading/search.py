@@ -11,7 +11,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.reading import mistakes as table
 from armlab.recordings.reading.judge import Gain, Judge, Trial, is_accepted
 from armlab.recordings.reading.reading import Mistake, Reading
-from armlab.recordings.reading.singles import search_singles
+from armlab.recordings.reading.singles import search_singles, with_springs
 from armlab.recordings.reading.tuning import ReadingTuning
 
 
@@ -55,7 +55,8 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
     best = _merge_same(judge, start, best)
     for _ in range(tuning.max_mistakes):
         without = _without_each(judge, start, best)
-        lists = [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
+        alone = [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
+        lists = [with_springs(judge, *each) for each in zip(without, alone, strict=True)]
         better = _better_in_place(judge, without, lists, best)
         if better is None:
             break
@@ -134,8 +135,10 @@ def _merge_same(judge: Judge, start: Trial, best: Trial) -> Trial:
 
 
 def _better_in_place(judge: Judge, without: tuple[Trial, ...], lists: list[list[Trial]], best: Trial) -> Trial | None:
-    """A reading that is better with another mistake in the place of one; a first step may have been a wrong one."""
+    """A reading that is better without a mistake, or with another in its place; a first step may have been wrong."""
     for parent, singles in zip(without, lists, strict=True):
+        if parent.loss < best.loss:
+            return parent
         other = next((each for each in singles[: judge.tuning.beam] if is_accepted(judge, parent, each)), None)
         if other is not None and other.loss < best.loss - judge.tuning.rival_gain:
             return other

@@ -27,7 +27,16 @@ def search_singles(judge: Judge, start: Trial) -> list[Trial]:
     found += _delays(judge, start)
     found += _clocks(judge, start)
     found += _gears(judge, start)
-    return sorted(found, key=lambda each: each.loss + judge.tuning.rare_loss * table.is_rare(each.reading.mistakes[-1]))
+    return sorted(found, key=partial(_rank, judge))
+
+
+def with_springs(judge: Judge, start: Trial, singles: list[Trial]) -> list[Trial]:
+    """Mistakes on top of a reading, and springs of its joints in their place, the best first."""
+    return sorted([*singles, *(judge.trial(each) for each in table.springs(start.reading))], key=partial(_rank, judge))
+
+
+def _rank(judge: Judge, trial: Trial) -> float:
+    return trial.loss + judge.tuning.rare_loss * table.is_rare(trial.reading.mistakes[-1])
 
 
 def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:

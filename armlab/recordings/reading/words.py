@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from armlab.recordings.reading.reading import Mistake
+from armlab.recordings.reading.reading import SPRING, Mistake
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
@@ -25,8 +25,9 @@ NAMES = {
     "time_delay": "late torque",
     "channel_skew": "late torque of one joint",
     INERTIAL_ERROR: "links that are not as simulated",
+    SPRING: "a spring or a gravity compensator",
 }
-SETUP_EFFECTS = tuple(name for name in NAMES if name != INERTIAL_ERROR)
+SETUP_EFFECTS = tuple(name for name in NAMES if name not in (INERTIAL_ERROR, SPRING))
 
 MEASUREMENTS = {
     "torque_sign": "push {joint} by hand in the direction in which its position grows: the drive's torque has to "
@@ -47,6 +48,7 @@ MEASUREMENTS = {
     "time_delay": "step one joint and compare when torque and position begin to move",
     "channel_skew": "step {joint} alone and compare when torque and position begin to move",
     INERTIAL_ERROR: "weigh the link, or the tool, and measure its centre",
+    SPRING: "hold {joint} still in three poses and compare its torque with that of the links",
 }
 
 
@@ -59,6 +61,7 @@ def describe(mistake: Mistake, arm: Arm) -> str:
     form = mistake.form
     columns = POSITION_AND_TORQUE if form == "both" else form
     texts = {
+        SPRING: f"{place} has a spring or a gravity compensator",
         "torque_sign": f"the torque of {place} has the other sign",
         "joint_direction": f"{place} counts the other way round ({form})",
         "channel_swap": f"the {columns} columns of {pair} are exchanged",
