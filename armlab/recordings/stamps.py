@@ -3,9 +3,9 @@
 Either the samples were taken at uneven times, or even samples were stamped late. The data decide: in a sample that was
 taken late, the position is ahead by velocity times lateness.
 
-A log that is written at its own rate repeats the row that was read last. Then no stamp says when a row was read: it is
-late by anything up to a step, and grows later until a row is missing or repeated. Rows that were read evenly are put
-back on an even grid where the motion becomes smooth by that.
+A log that is written faster than the joints are read repeats the row that was read last. Its stamps say when a row was
+written, and a row is written up to a step after it was read. Rows that were read evenly are put on an even grid where
+the motion becomes smooth by that.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,9 @@ from armlab.recordings.recording import AnyRun, Finding, MotionRun
 MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
 MIN_WARNED_LATENESS = 0.1  # of a step: less is lost in what the splines do well
 MAX_GAP_SCATTER_RATIO = 0.9  # times the scatter: samples are missing only where that explains the stamps better
-MAX_HELD_ROUGHNESS = 0.5  # times that of the rows as they stand: the motion becomes so much smoother without repeats
+MAX_ROUGHNESS_RATIO = 0.5  # repeated rows are left out where the motion becomes at least so much smoother
 MAX_GRID_LATENESS = 1.5  # steps: stamps further from any even grid cannot be counted
+NEIGHBOURS = (-2, -1, 1, 2)  # rows that tell where a row between them is
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,11 +78,11 @@ def repair_stamps(run: AnyRun) -> AnyRun:
     return run.with_signals(grid.time, {})
 
 
-def take_back_repeated_rows(run: AnyRun) -> AnyRun:
-    """The run without rows that repeat the row before, on the even times at which the others were read.
+def drop_repeated_rows(run: AnyRun) -> AnyRun:
+    """The run without rows that repeat the row before; the others on the even times at which they were read.
 
-    The run as it is where it repeats none, where the others do not come evenly, or where the motion does not become
-    smoother by that: a joint at rest may read the same twice.
+    The run stays as it is if no row repeats, if the other rows did not come evenly, or if the motion does not become
+    smoother: a joint at rest may read the same twice.
     """
     if run.samples <= 2 * len(NEIGHBOURS) or np.any(np.diff(run.time) <= 0):
         return run
@@ -93,16 +94,13 @@ def take_back_repeated_rows(run: AnyRun) -> AnyRun:
     grid = _fit_grid(fresh.time, np.arange(fresh.samples))
     even = fresh.with_signals(grid.time, {})
     late = np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step
-    if late or not _roughness(even) < MAX_HELD_ROUGHNESS * _roughness(run):
+    if late or not _roughness(even) < MAX_ROUGHNESS_RATIO * _roughness(run):
         return run
     text = (
         f"{again.sum()} rows repeat the row before while the arm moves: the log was written at {run.rate_hz:.4g} Hz, "
         f"the joints were read at {1 / grid.step:.4g} Hz; repeats left out, the others put on the times of reading"
     )
     return even.with_findings(Finding("repeated_row", "repaired", text))
-
-
-NEIGHBOURS = (-2, -1, 1, 2)  # rows that tell where a row between them is
 
 
 def _roughness(run: MotionRun) -> float:

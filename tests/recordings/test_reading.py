@@ -14,6 +14,7 @@ from recording_folders import ARM, POSITION, TORQUE, folder_with, frame
 from armlab.common.errors import InputError
 from armlab.recordings.check import check_recording
 from armlab.recordings.load import load_recording
+from armlab.recordings.reading import search
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
@@ -70,6 +71,21 @@ def exchange(first: str, second: str) -> Change:
 def shift(column: str, angle_deg: float) -> Change:
     def change(table: pd.DataFrame) -> None:
         table[column] += np.deg2rad(angle_deg)
+
+    return change
+
+
+def spring(joint: int, stiffness: float) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        table[TORQUE[joint - 1]] += stiffness * table[POSITION[joint - 1]]
+
+    return change
+
+
+def both(first: Change, second: Change) -> Change:
+    def change(table: pd.DataFrame) -> None:
+        first(table)
+        second(table)
 
     return change
 
@@ -139,11 +155,28 @@ def _gravity_torque(position: np.ndarray) -> np.ndarray:
 
 
 def test_two_mistakes_are_found_together(tmp_path: Path) -> None:
-    def change(table: pd.DataFrame) -> None:
-        scale(["tau2"], -1.0)(table)
-        shift("q3", -90.0)(table)
-
+    change = both(scale(["tau2"], -1.0), shift("q3", -90.0))
     assert set(names_of(answer_to(recording_with(tmp_path / "rig", change)))) == {"torque_sign@2", "encoder_offset@3"}
+
+
+def test_parts_of_one_mistake_become_one(tmp_path: Path) -> None:
+    """Beside another unit of joint 1, joint 2 was first found with a wrong torque, then with a wrong direction."""
+    change = both(scale(["q1"], 180 / np.pi), scale(["q2"], -1.0))
+    assert set(names_of(answer_to(recording_with(tmp_path / "rig", change)))) == {"unit_error@1", "joint_direction@2"}
+
+
+def test_each_mistake_has_its_rivals_where_the_last_step_leaves_one_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The steps are counted: there may be no other one that finds nothing better."""
+    steps = iter([lambda without, best: best, lambda without, best: without[0]])
+    monkeypatch.setattr(search, "_better_in_place", lambda judge, without, lists, best: next(steps)(without, best))
+    recording = recording_with(tmp_path / "rig", both(scale(["tau2"], -1.0), shift("q3", -90.0)))
+    channels = thin_channels(recording, TUNING)
+    assert channels is not None
+    judge = Judge(Fitter(channels, replace(TUNING, max_mistakes=2)), recording)
+    found = search.find_mistakes(judge, judge.trial(read_as_is(recording, ARM.parameters)))
+    assert len(found.best.reading.mistakes) == len(found.without) == len(found.rivals) == 1
 
 
 def test_the_corrected_folder_holds_the_recording_read_rightly(tmp_path: Path) -> None:
@@ -189,24 +222,9 @@ def test_a_mistake_is_the_same_when_it_is_taken_back_by_its_name(tmp_path: Path)
         take_back(reading, Mistake("magic"), recording)
 
 
-def spring(joint: int, stiffness: float) -> Change:
-    def change(table: pd.DataFrame) -> None:
-        table[TORQUE[joint - 1]] += stiffness * table[POSITION[joint - 1]]
-
-    return change
-
-
-def both(first: Change, second: Change) -> Change:
-    def change(table: pd.DataFrame) -> None:
-        first(table)
-        second(table)
-
-    return change
-
-
 @pytest.mark.parametrize(("joint", "stiffness"), [(1, 30.0), (2, 30.0), (3, 100.0)])
 def test_a_spring_is_no_mistake(tmp_path: Path, joint: int, stiffness: float) -> None:
-    """An arm with a spring fits better under a wrong sign, late torque or other links, too."""
+    """Wrong signs, late torque or other links may fit an arm with a spring better."""
     answer = answer_to(recording_with(tmp_path / "rig", spring(joint, stiffness)))
     assert names_of(answer) == []
     assert answer.share < 0.1

@@ -166,8 +166,8 @@ class Fitter:
         scatter = np.std(torque, axis=0)
         weight = np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
         prior = self.prior(reading, torque)
-        without = [joint for joint in range(reading.joints) if joint not in reading.springs]
-        normal = [self._normal_equations(columns, torque, weight, 1 - number, without) for number in range(FOLDS)]
+        springless = [joint for joint in range(reading.joints) if joint not in reading.springs]
+        normal = [self._normal_equations(columns, torque, weight, 1 - number, springless) for number in range(FOLDS)]
         count = np.bincount(self.channels.block, minlength=self.channels.blocks)
         out = []
         for width in widths:
@@ -190,11 +190,11 @@ class Fitter:
         return out
 
     def _normal_equations(
-        self, columns: Columns, torque: Array, weight: Array, fold: int, without: Sequence[int]
+        self, columns: Columns, torque: Array, weight: Array, fold: int, springless: Sequence[int]
     ) -> tuple[Array, Array]:
         """Gram matrix and product with the torque, in nats, of the rows of a fold.
 
-        without: joints (from 0) that have no spring.
+        springless: joints (from 0) that have no spring.
         """
         joints, rows = torque.shape[1], self.fold == fold
         blocks = len(np.unique(self.channels.block[rows]))
@@ -211,7 +211,7 @@ class Fitter:
             gram[places, :links] = gram[:links, places].T
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
             product[places] = own[joint]
-        absent = [links + OWN * joint + SPRING for joint in without]
+        absent = [links + OWN * joint + SPRING for joint in springless]
         gram[absent], gram[:, absent], product[absent] = 0.0, 0.0, 0.0
         return gram, product
 

@@ -10,7 +10,7 @@
 | dh_convention, inertia_reference, link_data_error | other meanings of the numbers of the robot file |
 | clock_error, time_delay, channel_skew | factors of time and shifts of torque, then refined |
 
-Springs of joints stand beside them: they are physics, but an arm with one fits better under some mistake, too.
+Springs of joints stand beside them. They are physics, but a wrong reading may fit an arm that has one better.
 """
 
 from collections.abc import Iterator

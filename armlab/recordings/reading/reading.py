@@ -19,7 +19,7 @@ SPRING = "cable_stiffness"  # physics that a joint may have in the place of a mi
 
 @dataclass(frozen=True)
 class Mistake:
-    """One way in which a recording or a robot file is read wrongly, or a spring of a joint, which looks like some.
+    """One way in which a recording or a robot file is read wrongly; or a spring of a joint, which may look like one.
 
     effect: an id of the setup effects, or `SPRING`. joint: from 1, the link of `link_data_error`, None for the whole
     robot. joints: the exchanged pair, or an order of all channels. form: which quantity. parameters: (name, value,

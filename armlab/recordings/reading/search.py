@@ -52,15 +52,14 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
             best, beside = other, more
     if best is start:
         return Found(start, start, tried=tuple(singles[: tuning.beam]), looks=judge.looks[0])
-    best = _merge_same(judge, start, best)
+    best = _merge_at_joints(judge, start, best)
+    without, lists = _in_each_place(judge, start, best, singles)
     for _ in range(tuning.max_mistakes):
-        without = _without_each(judge, start, best)
-        alone = [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
-        lists = [with_springs(judge, *each) for each in zip(without, alone, strict=True)]
         better = _better_in_place(judge, without, lists, best)
         if better is None:
             break
         best = better
+        without, lists = _in_each_place(judge, start, best, singles)
     rivals = tuple(_rivals(judge, without[place], best, place, each) for place, each in enumerate(lists))
     return Found(start, best, without, rivals, _undecided(beside, best, tuning), looks=judge.looks[0])
 
@@ -113,6 +112,18 @@ def _distinct(singles: list[Trial], count: int) -> list[Trial]:
     return list(out.values())[:count]
 
 
+def _in_each_place(
+    judge: Judge, start: Trial, best: Trial, singles: list[Trial]
+) -> tuple[tuple[Trial, ...], list[list[Trial]]]:
+    """The readings that leave out one mistake of the best one, in their order, and what may stand in its place.
+
+    singles: mistakes on top of the start.
+    """
+    without = _without_each(judge, start, best)
+    alone = [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
+    return without, [with_springs(judge, *each) for each in zip(without, alone, strict=True)]
+
+
 def _without_each(judge: Judge, start: Trial, best: Trial) -> tuple[Trial, ...]:
     """The readings that leave out one mistake of the best one, in their order."""
     own = best.reading.mistakes
@@ -122,16 +133,24 @@ def _without_each(judge: Judge, start: Trial, best: Trial) -> tuple[Trial, ...]:
     return tuple(judge.trial(rebuild(judge, start.reading, each)) for each in others)
 
 
-def _merge_same(judge: Judge, start: Trial, best: Trial) -> Trial:
-    """The reading with one mistake where it has two of one kind at one place: the first was only a part."""
-    labels = [each.label for each in best.reading.mistakes]
-    twice = next((label for label in labels if labels.count(label) > 1), None)
-    if twice is None:
-        return best
-    others = [each for each in best.reading.mistakes if each.label != twice]
-    singles = search_singles(judge, judge.trial(rebuild(judge, start.reading, others)))
-    merged = next((each for each in singles if each.reading.mistakes[-1].label == twice), None)
-    return best if merged is None or merged.loss > best.loss + judge.tuning.rival_gain else merged
+def _merge_at_joints(judge: Judge, start: Trial, best: Trial) -> Trial:
+    """The reading with one mistake of a joint where it has several and one explains as much: the first was a part."""
+    own = best.reading.mistakes
+    places = [_place(each) for each in own]
+    for place in dict.fromkeys(places):
+        if places.count(place) == 1:
+            continue
+        others = [mistake for mistake in own if _place(mistake) != place]
+        singles = search_singles(judge, judge.trial(rebuild(judge, start.reading, others)))
+        merged = next((each for each in singles if _place(each.reading.mistakes[-1]) == place), None)
+        if merged is not None and merged.loss <= best.loss + judge.tuning.rival_gain:
+            return _merge_at_joints(judge, start, merged)
+    return best
+
+
+def _place(mistake: Mistake) -> str:
+    """Of a joint, its number; else the name of the mistake."""
+    return mistake.label if mistake.joint is None else str(mistake.joint)
 
 
 def _better_in_place(judge: Judge, without: tuple[Trial, ...], lists: list[list[Trial]], best: Trial) -> Trial | None:
