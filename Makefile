@@ -76,12 +76,12 @@ real-conditioning: .venv/dev ## does a small condition number help on real arms:
 real-motion: .venv/dev ## diagnose the public recordings of position servos: results/real/motion.md
 	$(BIN)/armlab real-motion --peer sysid
 
-relations: .venv/dev ## relations that need no truth, on real and simulated recordings: results/relations/
+relations: .venv/dev ## relations that need no truth, on real recordings and a few simulated ones: results/relations/
 	$(BIN)/armlab conceal --cases 8 --seed 1800 --out .armlab/relations-set
 	$(BIN)/armlab relations .armlab/relations-set/observations/*
 
-prove-changes: .venv/dev ## the comparison judged on pairs with nothing or one thing changed: results/changes/
-	$(BIN)/armlab prove-changes --results results/changes
+prove-changes: .venv/dev ## the comparison judged on pairs with nothing or one thing changed: results/proof/changes/
+	$(BIN)/armlab prove-changes --results results/proof/changes
 
 prove: .venv/dev ## hide effects, diagnose blindly, score, all judged and logged: results/proof/
 	$(BIN)/armlab prove

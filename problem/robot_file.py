@@ -120,7 +120,7 @@ def load_arm(robot: str, beside: Path | None = None) -> Arm:
     if path.suffix in (".yaml", ".yml"):
         return check_arm(_read_yaml_arm(path, str(path)), str(path))
     raise InputError(
-        f"unknown robot '{robot}', neither a .yaml, .urdf or .xml (MJCF) file nor a built-in arm: "
+        f"unknown robot {robot!r}, neither a .yaml, .urdf or .xml (MJCF) file nor a built-in arm: "
         f"{suggest_name(robot, built_in_arms())}"
     )
 

@@ -109,8 +109,7 @@ def diagnose(
     """Find the physics that the simulation of RECORDING lacks.
 
     Says whether the recording is read wrongly, where the simulation is wrong, which effects are missing, and how much
-    better it predicts with them. With
-    --compare OLD: what changed from OLD to RECORDING, and to each further one.
+    better it predicts with them. With --compare OLD: what changed from OLD to RECORDING, and to each further one.
     """
     from armlab.common.errors import InputError
     from armlab.diagnosis.compare.report import compare_recordings

@@ -21,6 +21,7 @@ from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
 from armlab.concealed.formats import SetKind
+from armlab.concealed.log_page import LOG_FILE, write_log_page
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
 from armlab.concealed.score.cases import FAILURE_FILE, TIME_FILE
 from armlab.concealed.score.scoring import format_lines, score_set
@@ -28,7 +29,6 @@ from armlab.concealed.sets import SetSettings, conceal_cases, seal_set
 
 QUICK_NAME, QUICK_SEED, QUICK_CASES = "quick", 1900, 24
 TIMEOUT_S = 900.0
-LOG_FILE = "log.jsonl"
 FINISHED_MARK = "finished"
 
 
@@ -176,7 +176,7 @@ def _source_root() -> Path:
 
 
 def append_to_log(path: Path, commit: str, name: str, score: dict[str, Any]) -> None:
-    """Adds a line to the log of judged runs: commit, seed, seal, and each measure by its id."""
+    """Adds a line to the log of judged runs (commit, seed, seal, each measure by its id), and writes its page."""
     entry = {
         "time": datetime.now(UTC).isoformat(timespec="seconds"),
         "commit": commit,
@@ -191,6 +191,7 @@ def append_to_log(path: Path, commit: str, name: str, score: dict[str, Any]) -> 
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(entry) + "\n")
+    write_log_page(path)
 
 
 def report_progress(what: str, done: Iterator[str], total: int) -> Iterator[str]:

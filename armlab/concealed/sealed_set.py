@@ -16,10 +16,10 @@ from joblib import Parallel, delayed
 from armlab.common.errors import InputError
 from armlab.common.statistics import wilson_interval
 from armlab.concealed.folders import claim_folder
+from armlab.concealed.log_page import LOG_FILE
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
 from armlab.concealed.prove import (
     FINISHED_MARK,
-    LOG_FILE,
     answer,
     append_to_log,
     code_commit,

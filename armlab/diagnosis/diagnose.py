@@ -93,8 +93,7 @@ def diagnose(
             found = Diagnosis(recording, simulation, "inconclusive", reason, signs=signs, setup=setup)
             return replace(found, setup_seconds=read_after)
     if only_setup:
-        asked = Diagnosis(recording, read_simulation(recording, baseline), "none", READ_RIGHTLY, signs=signs)
-        return with_setup(asked, setup, read_after)
+        return with_setup(replace(_reading_alone(recording, baseline, settings, setup), signs=signs), setup, read_after)
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
         return with_setup(replace(design, signs=signs), setup, read_after)
@@ -103,7 +102,24 @@ def diagnose(
     return with_setup(found, setup, read_after)
 
 
-READ_RIGHTLY = "Nothing else is wrong with the reading; physics was not asked."
+def _reading_alone(
+    recording: Recording, baseline: Baseline | None, settings: Settings, setup: Answer | None
+) -> Diagnosis:
+    """What is said where physics is not asked. setup: how the recording is to be read, if that was asked."""
+    simulation = read_simulation(recording, baseline)
+    reason = reason_unusable(recording, settings.tuning.soundness)
+    if reason is None and setup is not None and setup.looks == 0:
+        reason = TOO_SHORT_TO_READ
+    if reason is not None:
+        return Diagnosis(recording, simulation, "inconclusive", reason)
+    right = "Nothing else is wrong" if setup is not None and setup.sentence else "Nothing is wrong"
+    return Diagnosis(recording, simulation, "none", f"{right} with the reading; physics was not asked.")
+
+
+TOO_SHORT_TO_READ = (
+    "The runs are too short, or the transmission cannot be undone, to tell how the recording is to be read: "
+    "record longer runs."
+)
 
 
 def find_setup(
@@ -119,10 +135,11 @@ def find_setup(
 
 def with_setup(diagnosis: Diagnosis, setup: Answer | None, seconds: float) -> Diagnosis:
     """The diagnosis of a recording read rightly, with the mistakes of its reading."""
-    if setup is None or not setup.findings:
+    if setup is None or not setup.sentence:
         return replace(diagnosis, setup=setup, setup_seconds=seconds)
+    status = "mismatch" if setup.findings else diagnosis.status
     summary = f"{setup.sentence} {diagnosis.summary}"
-    return replace(diagnosis, status="mismatch", summary=summary, setup=setup, setup_seconds=seconds)
+    return replace(diagnosis, status=status, summary=summary, setup=setup, setup_seconds=seconds)
 
 
 def prepare(
@@ -170,10 +187,16 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
     claims += tuple(
         make_unknown_claim(model, each, residual, weigh_structure(model, each, effects)) for each in unknowns
     )
-    claims += added.unnamed
+    claims += tuple(_without_prediction_of(each, unknowns) for each in added.unnamed)
     weighed = (*(claim.weighed for claim in claims), *added.nothing)
     claims = named_claims(claims, named.model.design.settings, named.model.design.simulation.joints_without_friction)
     return replace(with_story(_assemble(recording, model, prediction, claims, unknowns, remains)), weighed=weighed)
+
+
+def _without_prediction_of(claim: Claim, unknowns: Sequence[Structure]) -> Claim:
+    """An unnamed claim beside structure that is a finding, too: at one joint, the structure holds what it predicts."""
+    same = any(each.joint + 1 == claim.joint for each in unknowns)
+    return replace(claim, prediction=np.zeros_like(claim.prediction)) if same else claim
 
 
 def _with_probable(named: "NamedEffects") -> tuple["NamedEffects", Additions]:
@@ -181,11 +204,11 @@ def _with_probable(named: "NamedEffects") -> tuple["NamedEffects", Additions]:
     model, effects = with_likeliest_names(named.model, named.effects, named.left)
     named = replace(named, model=model, effects=effects)
     added = add_probable(named.model, named.left)
-    if added.model is named.model or not named.model.design.settings.guards.unknown:
-        return replace(named, model=added.model, effects=named.effects | added.effects), added
-    left = predict_residual_structure(added.model, fit_coloured_noise(added.model))
     effects = {each: evidence for each, evidence in named.effects.items() if each in added.model.state.groups}
-    return NamedEffects(added.model, effects | added.effects, named.links, left), added
+    named = replace(named, model=added.model, effects=effects | added.effects)
+    if added.effects and named.model.design.settings.guards.unknown:
+        named = replace(named, left=predict_residual_structure(named.model, fit_coloured_noise(named.model)))
+    return named, added
 
 
 def find_names(design: DesignMatrix, seed: int, progress: Progress) -> "NamedEffects":

@@ -139,7 +139,7 @@ def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array
 class Evidence:
     """p_value: of the effect being zero, robust; corrected: after everything that was looked at. gain: share by
     which the whitened held-out error of the joint that profits most falls, held_p: one-sided, of that fall; the better
-    of validation runs and of identification stretches held out in turn. validated: the share on validation runs.
+    of validation runs and of identification stretches held out in turn. validation_gain: the share on validation runs.
     rms_before, rms_after: N m, of that joint on validation rows without and with it. score: what it adds to the score
     of the model. objection: of physics. worse: whether validation runs are surely predicted worse. repeatable: False
     for what happened once, in one stretch of one run: no other data can tell of it. usual: what every arm has.

@@ -7,7 +7,13 @@ from armlab.diagnosis.pruning import Pruned, withdraw
 from armlab.diagnosis.search import Search, Step, rival_formulas
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
-from armlab.diagnosis.unknown import is_form_error, is_structured, predict_residual_structure, unknown_evidence
+from armlab.diagnosis.unknown import (
+    is_form_error,
+    is_structured,
+    predict_residual_structure,
+    predicted_share,
+    unknown_evidence,
+)
 
 
 def find_friction_curves(pruned: Pruned) -> Pruned:
@@ -33,14 +39,17 @@ def find_friction_curves(pruned: Pruned) -> Pruned:
 def name_friction_curves(pruned: Pruned, left: tuple[Structure, ...]) -> tuple[Pruned, tuple[Structure, ...]]:
     """The effects and the structure that is left, with friction curves where that is friction.
 
-    A curve takes the place of all friction of its joint, and has to explain most of what a surrogate does.
+    A curve takes the place of all friction of its joint, and has to explain most of what a surrogate does. What a
+    formula leaves is no fault of its form where it is most of all that is left.
     """
     model, effects, links = pruned
     tuning = model.design.settings.tuning
     named = False
     for each in left:
         own = (f"velocity_{each.joint + 1}",)
-        if each.depends_on != own or not is_structured(each, tuning) or is_form_error(each, effects, tuning.unknown):
+        if each.depends_on != own or not is_structured(each, tuning):
+            continue
+        if is_form_error(each, effects, tuning.unknown) and predicted_share(each) < tuning.unknown.min_curve_error:
             continue
         state = _likeliest_curve(model, each.joint + 1)
         if state is None:

@@ -265,8 +265,8 @@ class Structure:
     """What a surrogate predicts of a joint's residual.
 
     gain: share by which the whitened held-out error falls, p_value: of chance making that (see `Gain`); the surer of
-    validation rows and of identification stretches held out in turn. validated: on validation rows alone. share: of
-    the validation variance as it is. prediction: (rows,), N m. depends_on: variables, most important first.
+    validation rows and of identification stretches held out in turn. validation_gain: on validation rows alone. share:
+    of the validation variance as it is. prediction: (rows,), N m. depends_on: variables, most important first.
     """
 
     joint: int

@@ -519,6 +519,12 @@ class UnknownTuning:
         meaning="what a friction curve has to explain of structure that depends on the joint's own velocity alone",
         most=1.0,
     )
+    min_curve_error: float = tuned(
+        0.5,
+        unit="of what is left at a joint",
+        meaning="structure of the velocity alone that is more asks for a friction curve, whatever formula stands there",
+        source="set after a look at the UR10",
+    )
 
 
 @dataclass(frozen=True)

@@ -266,12 +266,15 @@ class LinearSpring(Term):
 
 @dataclass(frozen=True)
 class HardeningSpring(Term):
-    """stiffness x + cubic x^3, x = q - rest; shape: the rest position."""
+    """stiffness x + cubic x^3 + offset, x = q - rest; shape: the rest position.
+
+    The offset is that of the torque: a linear spring hides it in its rest position, here the bend tells that.
+    """
 
     facts = CABLE_STIFFNESS_FACTS
     form = "cubic"
-    names = ("stiffness", "rest", "cubic")
-    size = 2
+    names = ("stiffness", "rest", "cubic", "offset")
+    size = 3
 
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
@@ -282,33 +285,35 @@ class HardeningSpring(Term):
         return [cls.at(arm, joint, shape=(low + share * (high - low),), bounds=bounds) for share in REST_POSITIONS]
 
     def columns(self, scene: Scene) -> Array:
-        """The bend and its cube."""
+        """The bend, its cube, and a constant."""
         bend = scene.motion.position[:, self.own] - self.shape[0]
-        return self._stacked(bend, bend**3)
+        return self._stacked(bend, bend**3, np.ones_like(bend))
 
     def parameters(self, coefficients: Array) -> dict[str, Value]:
-        """Stiffness at rest, rest position, and what the cube adds."""
-        return {"stiffness": float(coefficients[0]), "rest": self.shape[0], "cubic": float(coefficients[1])}
+        """Stiffness at rest, rest position, what the cube adds, and the torque at rest."""
+        stiffness, cubic, offset = (float(value) for value in coefficients)
+        return {"stiffness": stiffness, "rest": self.shape[0], "cubic": cubic, "offset": offset}
 
     def unit(self, name: str) -> str:
-        if name == "cubic":
-            return f"{'N.m' if self.kind == 'revolute' else 'N'}/{'rad' if self.kind == 'revolute' else 'm'}3"
-        return super().unit(name)
+        torque, angle = ("N.m", "rad") if self.kind == "revolute" else ("N", "m")
+        own = {"cubic": f"{torque}/{angle}3", "offset": torque}
+        return own.get(name) or super().unit(name)
 
     def equation(self, coefficients: Array) -> str:
-        linear, cubic = (format_number(value) for value in coefficients)
-        return f"tau_{self.joint} += {linear} x + {cubic} x^3, x = q_{self.joint} - ({format_number(self.shape[0])})"
+        terms = format_sum(*zip(coefficients, ("x", "x^3", ""), strict=True))
+        return f"tau_{self.joint} += {terms}, x = q_{self.joint} - ({format_number(self.shape[0])})"
 
     def objection(self, coefficients: Array, covariance: Array | None = None) -> str | None:
         """A cable that pushes, or gets softer."""
-        spread = np.zeros(2) if covariance is None else SIGN_SIGMAS * np.sqrt(np.maximum(np.diag(covariance), 0))
-        return "a stiffness below zero" if np.any(coefficients + spread < 0) else None
+        spread = np.zeros(3) if covariance is None else SIGN_SIGMAS * np.sqrt(np.maximum(np.diag(covariance), 0))
+        return "a stiffness below zero" if np.any((coefficients + spread)[:2] < 0) else None
 
     @classmethod
     def from_parameters(cls, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Any]) -> tuple[Self, Array]:
         rest = float(parameters["rest"])
         spring = cls.at(arm, joints[0], shape=(rest,), bounds=((rest - 1, rest + 1),))
-        return spring, np.array([parameters["stiffness"], parameters["cubic"]], dtype=float)
+        values = [parameters["stiffness"], parameters["cubic"], parameters.get("offset", 0.0)]
+        return spring, np.array(values, dtype=float)
 
 
 CABLE_STIFFNESS = EveryJoint(CABLE_STIFFNESS_FACTS, (LinearSpring, HardeningSpring))

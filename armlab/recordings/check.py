@@ -238,7 +238,7 @@ def _check_reading(recording: Recording, inertial: Array | None, tuning: Reading
     reason = answer.reason_inconclusive(tuning)
     if reason is not None:
         return (Finding("setup", "warning", reason),)
-    findings = []
+    findings = [Finding("setup", "warning", answer.sentence)] if answer.doubted else []
     for each in answer.findings:
         rivals = "".join(f"; or {rival.text}" for rival in each.rivals)
         worst = joint_in_words(recording.arm, each.worst_joint)

@@ -21,6 +21,7 @@ MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
 MIN_WARNED_LATENESS = 0.1  # of a step: less is lost in what the splines do well
 MAX_GAP_SCATTER_RATIO = 0.9  # times the scatter: samples are missing only where that explains the stamps better
 MAX_ROUGHNESS_RATIO = 0.5  # repeated rows are left out where the motion becomes at least so much smoother
+MAX_ODD_SHARE = 0.01  # of rows, that are no measure of how smooth a motion is
 MAX_GRID_LATENESS = 1.5  # steps: stamps further from any even grid cannot be counted
 NEIGHBOURS = (-2, -1, 1, 2)  # rows that tell where a row between them is
 
@@ -81,8 +82,8 @@ def repair_stamps(run: AnyRun) -> AnyRun:
 def drop_repeated_rows(run: AnyRun) -> AnyRun:
     """The run without rows that repeat the row before; the others on the even times at which they were read.
 
-    The run stays as it is if no row repeats, if the other rows did not come evenly, or if the motion does not become
-    smoother: a joint at rest may read the same twice.
+    The run stays as it is if no row repeats, if the other rows did not come evenly, or if that does not make most of
+    the motion smoother than even stamps do: a joint at rest may read the same twice.
     """
     if run.samples <= 2 * len(NEIGHBOURS) or np.any(np.diff(run.time) <= 0):
         return run
@@ -94,7 +95,7 @@ def drop_repeated_rows(run: AnyRun) -> AnyRun:
     grid = _fit_grid(fresh.time, np.arange(fresh.samples))
     even = fresh.with_signals(grid.time, {})
     late = np.abs(grid.lateness).max() > MAX_GRID_LATENESS * grid.step
-    if late or not _roughness(even) < MAX_ROUGHNESS_RATIO * _roughness(run):
+    if late or not _roughness(even) < MAX_ROUGHNESS_RATIO * _roughness(repair_stamps(run)):
         return run
     text = (
         f"{again.sum()} rows repeat the row before while the arm moves: the log was written at {run.rate_hz:.4g} Hz, "
@@ -104,7 +105,10 @@ def drop_repeated_rows(run: AnyRun) -> AnyRun:
 
 
 def _roughness(run: MotionRun) -> float:
-    """How far positions are from the cubic through their neighbours, RMS over the travel of each joint."""
+    """How far positions are from the cubic through their neighbours, RMS over the travel of each joint.
+
+    Few rows that are far off do not count: where an encoder wraps, or a single row was lost.
+    """
     middle = np.arange(2, run.samples - 2)
     guess = np.zeros((len(middle), run.joints))
     for own in NEIGHBOURS:
@@ -116,8 +120,9 @@ def _roughness(run: MotionRun) -> float:
                 )
         guess += weight[:, None] * run.position[middle + own]
     travel = np.ptp(run.position, axis=0)
-    off = (run.position[middle] - guess)[:, travel > 0] / travel[travel > 0]
-    return float(np.sqrt(np.mean(off**2))) if off.size else 0.0
+    off = np.sum(((run.position[middle] - guess)[:, travel > 0] / travel[travel > 0]) ** 2, axis=1)
+    usual = off[off <= np.quantile(off, 1 - MAX_ODD_SHARE)]
+    return float(np.sqrt(np.mean(usual)))
 
 
 def fit_even_grid(time: Array) -> Grid:
@@ -141,12 +146,12 @@ def is_sampled_unevenly(run: MotionRun, grid: Grid) -> bool:
     """True if the motion follows the lateness of the stamps: q(stamp) = q(grid) + velocity * lateness.
 
     Fourth differences take the smooth motion out of both sides; the slope between them is one for samples
-    that were taken when their stamps say, zero for even samples with late stamps.
+    that were taken when their stamps say, zero for even samples with late stamps. What stands still says nothing.
     """
     velocity = np.gradient(run.position, grid.time, axis=0)
     moved = _fourth_difference(velocity * grid.lateness[:, None])
     seen = _fourth_difference(run.position)
-    scale = np.median(np.abs(seen), axis=0)
+    scale = np.array([np.median(own[own > 0]) if np.any(own > 0) else 0.0 for own in np.abs(seen).T])
     weight = np.where(scale > 0, 1 / np.where(scale > 0, scale, 1.0), 0.0)
     moved, seen = moved * weight, seen * weight
     length = float(np.sum(moved**2))

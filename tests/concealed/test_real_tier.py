@@ -144,6 +144,7 @@ def test_a_judged_score_is_logged_once_and_others_never(
     for _ in range(2):
         list(prove_real(SET, work, tmp_path / "results", 1, "a" * 40))
         (work / FINISHED_MARK).touch()
+    assert "| wrong names among claims beyond background | 0.25 of 4 |" in (tmp_path / "log.md").read_text()
     (entry,) = (json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines())
     assert (entry["set"], entry["seed"], entry["cases"]) == ("real", 1001, 4)
     assert entry["score"]["real"]["wrong_names_beyond_background"][0] == 0.25

@@ -8,12 +8,14 @@ import pytest
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.design import DesignMatrix
-from armlab.diagnosis.diagnose import prepare
+from armlab.diagnosis.diagnose import NamedEffects, _with_probable, prepare
 from armlab.diagnosis.evidence import Judge
 from armlab.diagnosis.fitted_model import FittedModel, fit_background
-from armlab.diagnosis.naming.additions import Found, _added, _named, with_likeliest_names
+from armlab.diagnosis.naming.additions import Additions, Found, _acting_where, _added, _named, with_likeliest_names
+from armlab.diagnosis.naming.choice import Weights
+from armlab.diagnosis.naming.weighing import weigh_effect
 from armlab.diagnosis.search import Search
-from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.settings import Settings, vary
 from armlab.diagnosis.solver import State
 from armlab.effects.library import library
 from problem.motion import Motion
@@ -47,7 +49,7 @@ def found_as(model: FittedModel, effect: str) -> Found:
 def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever raised the score: here weights that ask for nothing but the name."""
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"is cable_stiffness": 9.0}
+        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
     )
     spring_found = found_as(model, "cable_stiffness")
     for first in (found_as(model, "gravity_compensator"), spring_found):
@@ -57,7 +59,9 @@ def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: p
 
 
 def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"left none": 9.0})
+    monkeypatch.setattr(
+        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"left none": 9.0})
+    )
     first = found_as(model, "gravity_compensator")
     assert _named(model, first, ())[0] is first
 
@@ -70,7 +74,7 @@ def holding(model: FittedModel, effect: str) -> FittedModel:
 @pytest.mark.parametrize("effect", ["gravity_compensator", "cable_stiffness"])
 def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: pytest.MonkeyPatch, effect: str) -> None:
     monkeypatch.setattr(
-        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"is cable_stiffness": 9.0}
+        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
     )
     held = holding(model, effect)
     named, effects = with_likeliest_names(held, Judge(held, held.state).effects(), ())
@@ -80,13 +84,49 @@ def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: p
     assert len(named.steps) == (effect != "cable_stiffness")
 
 
-def test_what_passed_keeps_a_name_of_its_class_and_what_is_unknown(
-    model: FittedModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     held = holding(model, "gravity_compensator")
     known = Judge(held, held.state).effects()
-    for weights in ({"is cable_stiffness": 9.0, "is gravity_compensator": 8.5}, {"found none": 9.0}):
+    for weights in ({"is cable_stiffness": 8.5, "is gravity_compensator": 9.0}, {"found none": 9.0}):
         monkeypatch.setattr(
-            "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out, weights=weights: weights
+            "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out, weights=weights: Weights(weights)
         )
         assert with_likeliest_names(held, known, ()) == (held, known)
+
+
+def test_what_is_added_in_the_place_of_an_effect_leaves_no_trace_of_it(
+    model: FittedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without the guard that asks what is left: one law replaces another."""
+    settings = model.design.settings
+    plain = replace(settings, guards=replace(settings.guards, unknown=False))
+    held = holding(replace(model, design=replace(model.design, settings=plain)), "gravity_compensator")
+    (old,) = held.state.groups
+    evidence = Judge(held, held.state).effects()[old]
+    found = found_as(model, "cable_stiffness")
+    added = Additions(replace(held, state=found[1]), {found[0]: found[2]}, {})
+    monkeypatch.setattr("armlab.diagnosis.diagnose.add_probable", lambda model, left: added)
+    monkeypatch.setattr("armlab.diagnosis.diagnose.with_likeliest_names", lambda *given: given[:2])
+    named, _ = _with_probable(NamedEffects(held, {old: evidence}, {}, ()))
+    assert set(named.effects) == {found[0]} == set(named.model.state.groups)
+
+
+def test_what_is_refused_bans_what_acts_at_the_joint_that_shows_it(model: FittedModel) -> None:
+    rows = [each.candidate.rows for each in model.solver.groups]
+    whole = next(at for at, own in enumerate(rows) if len(own) == 3)
+    evidence = found_as(model, "cable_stiffness")[2]
+    banned = _acting_where(model, (whole, model.state, evidence))
+    assert whole in banned
+    assert all(evidence.joint in rows[each] for each in banned)
+    single = _acting_where(model, found_as(model, "cable_stiffness"))
+    assert single < banned
+    assert {rows[each] for each in single} == {(1,)}
+
+
+@pytest.mark.parametrize("effect", ["gravity_compensator", "cable_stiffness"])
+def test_the_law_that_was_found_is_always_among_its_names(model: FittedModel, effect: str) -> None:
+    settings = vary(model.design.settings, "naming.names", 1)
+    held = holding(replace(model, design=replace(model.design, settings=settings)), effect)
+    (group,) = held.state.groups
+    names = weigh_effect(held, group, Judge(held, held.state).effects(), ())
+    assert (effect, 2) in {(each.effect, each.joint) for each in names}

@@ -29,6 +29,7 @@ BEYOND = {
     "positive_slope",
     "negative_slope",
     "cubic",
+    "offset",
     "force",
     "ratio",
     "exponent",
@@ -134,10 +135,28 @@ def test_equations_say_the_joint_and_the_number() -> None:
         assert "2.346" in text or effect == "torque_ripple"
 
 
+def spring_of(form: str, where: Scene) -> Term:
+    """The first spring of a form at joint 2."""
+    places = family("cable_stiffness").candidates(where.arm, [where])
+    return next(each for place in places for each in place if (each.joint, each.form) == (2, form))
+
+
+@pytest.mark.parametrize("form", ["linear", "cubic"])
+def test_a_spring_holds_an_offset_of_the_torque(form: str) -> None:
+    """So that no offset is found beside a spring that rests far from its travel."""
+    where = scenes_of("RRR")[0]
+    columns = spring_of(form, where).columns(where)[:, 0]
+    left = np.linalg.lstsq(columns, np.ones(len(columns)), rcond=None)[1]
+    assert float(np.sum(left)) < 1e-20
+
+
 def test_equation_of_a_spring_reads_as_a_law() -> None:
-    scenes = scenes_of("RRR")
-    spring = family("cable_stiffness").candidates(scenes[0].arm, scenes)[1][0]
-    assert spring.equation(np.array([2.0, -1.0])) == "tau_2 += 2 (q_2 - 0.5)"
+    where = scenes_of("RRR")[0]
+    assert spring_of("linear", where).equation(np.array([2.0, -1.0])) == "tau_2 += 2 (q_2 - 0.5)"
+    hardens, values = spring_of("cubic", where), np.array([2.0, 1.0, -0.5])
+    assert hardens.equation(values).startswith("tau_2 += 2 x + 1 x^3 - 0.5, x = q_2 - (")
+    rest = hardens.parameters(values)["rest"]
+    assert hardens.parameters(values) == {"stiffness": 2, "rest": rest, "cubic": 1, "offset": -0.5}
 
 
 def test_a_joint_that_never_moves_has_no_friction() -> None:

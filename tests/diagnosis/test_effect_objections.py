@@ -27,7 +27,7 @@ WRONG: list[tuple[str, str, int | None, list[float], str]] = [
     ("joint_elasticity", "", 1, [-1e-4], "stiffness"),
     ("backlash", "", 1, [-1e-3], "gap"),
     ("cable_stiffness", "linear", 1, [-2.0, 1.0], "stiffness"),
-    ("cable_stiffness", "cubic", 1, [2.0, -1.0], "stiffness below zero"),
+    ("cable_stiffness", "cubic", 1, [2.0, -1.0, 0.0], "stiffness below zero"),
     ("payload", "point", 3, [-1.0], "negative mass"),
     ("torque_saturation", "", 1, [0.2], "takes away 0.20"),
     ("torque_saturation", "soft", 1, [-0.2], "reads more"),

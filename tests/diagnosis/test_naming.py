@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from armlab.common.errors import InputError
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.naming.calibrate import Finding, calibrate, judge_reliability
-from armlab.diagnosis.naming.choice import Example, fit_weights, probabilities
+from armlab.diagnosis.naming.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings, vary
@@ -17,7 +18,7 @@ from armlab.effects.friction import CoulombFriction
 @pytest.fixture(autouse=True)
 def plain_weights(monkeypatch: pytest.MonkeyPatch) -> None:
     """One number, whose weight is one."""
-    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: {"for it": 1.0})
+    monkeypatch.setattr("armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"for it": 1.0}))
 
 
 def weighed(unknown: float, **names: float) -> Weighed:
@@ -32,7 +33,7 @@ def claim(effect: str, names: Weighed, rivals: tuple[Rival, ...] = ()) -> Claim:
 
 
 def test_probabilities_sum_to_one_and_follow_what_speaks_for_a_name() -> None:
-    found = probabilities([{"for it": 2.0}, {"for it": 0.0, "not asked": 9.0}, {}], {"for it": 1.0})
+    found = probabilities([{"for it": 2.0}, {"for it": 0.0, "not asked": 9.0}, {}], Weights({"for it": 1.0}))
     assert found.sum() == pytest.approx(1)
     assert found[0] / found[1] == pytest.approx(np.exp(2))
     assert found[1] == found[2]
@@ -43,7 +44,7 @@ def test_weights_are_found_that_made_the_choices() -> None:
     examples = []
     for _ in range(3000):
         names = tuple(dict(zip(true, rng.normal(size=2), strict=True)) for _ in range(3))
-        chosen = rng.choice(3, p=probabilities(names, true))
+        chosen = rng.choice(3, p=probabilities(names, Weights(true)))
         examples.append(Example(names, tuple(at == chosen for at in range(3))))
     found = fit_weights(examples, dict.fromkeys(true, 0.0), dict.fromkeys(true, 2.0))
     assert found["one"] == pytest.approx(2.0, abs=0.15)
@@ -110,6 +111,9 @@ def test_friction_keeps_its_law_at_a_joint_of_whose_friction_the_simulation_says
     (found,) = named_claims([own], Settings(), plain={2})
     assert (found.effect, found.probability) == ("coulomb_friction", pytest.approx(0.3))
     assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
+    likelier = replace(own, weighed=weighed(0.02, coulomb_friction=0.03, viscous_friction=0.95))
+    (found,) = named_claims([likelier], Settings(), plain={2})
+    assert (found.effect, [each.effect for each in found.members]) == ("coulomb_friction", ["viscous_friction"])
     (nameless,) = named_claims([own], Settings(), plain={1})
     assert (nameless.effect, nameless.probability) == ("unknown", pytest.approx(0.5))
 
@@ -156,14 +160,15 @@ def test_names_that_no_motion_separates_count_together() -> None:
 
 def test_the_weights_of_the_package_were_learnt_from_development_sets() -> None:
     weights = calibrated_weights()
-    assert {"found none", "left none", "structure none"} <= set(weights)
-    assert all(np.isfinite(list(weights.values())))
+    assert {"found none", "left none", "structure none"} <= set(weights.numbers)
+    assert all(np.isfinite(list(weights.numbers.values())))
+    assert 0 < weights.lapse < 0.1
 
 
 @pytest.mark.parametrize("recording", ["emps", "staubli-tx40", "unisa-ur10", "unisa-panda", "kuka-kr300"])
 def test_a_real_recording_is_judged_by_weights_that_do_not_know_it(recording: str) -> None:
     own, others = calibrated_weights(recording), calibrated_weights()
-    assert own.keys() == others.keys()
+    assert own.numbers.keys() == others.numbers.keys()
     assert own != others
     assert calibrated_weights("not in the calibration") == others
 
@@ -173,6 +178,21 @@ def test_the_cases_of_a_real_recording_are_left_out_together() -> None:
     simulated = [Finding(str(number), "clean", speaks, False) for number in range(20)]
     real = [Finding(str(number), "real", against, False, "emps") for number in range(20)]
     found = calibrate([*simulated, *real])
-    assert found.left_out["emps"]["a"] > found.weights["a"]
+    assert found.left_out["emps"].numbers["a"] > found.weights.numbers["a"]
     assert found.tiers["real"].bins[0].right == 0
-    assert found.tiers["real"].bins[0].mean > 0.8
+    assert found.tiers["real"].bins[0].mean > 0.6
+
+
+def test_findings_of_one_recording_cannot_be_left_out() -> None:
+    finding = Finding("1", "real", Example(({"a": 1.0}, {}), (True, False)), False, "emps")
+    with pytest.raises(InputError, match="give more"):
+        calibrate([finding] * 3)
+
+
+def test_a_lapse_bounds_how_sure_a_name_can_be() -> None:
+    """One in ten is wrong where the weights say that one in a thousand is: there one of two names is drawn evenly."""
+    sure = np.array([0.999, 0.001])
+    lapse = fit_lapse([sure] * 100, [(True, False)] * 90 + [(False, True)] * 10)
+    assert with_lapse(sure, lapse)[0] == pytest.approx(0.9, abs=0.01)
+    assert fit_lapse([sure] * 1000, [(True, False)] * 999 + [(False, True)]) == pytest.approx(0, abs=1e-3)
+    assert fit_lapse([sure], [(False, False)]) == 0

@@ -7,6 +7,7 @@ import pytest
 from told_recordings import ARM, POSITION, frame, recording_in
 
 from armlab.concealed.setup.mistakes import Injected, inject
+from armlab.diagnosis.diagnose import diagnose
 from armlab.recordings.load import load_recording
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
@@ -32,3 +33,19 @@ def test_gravity_comes_off_at_the_joints_of_motor_channels(tmp_path: Path, other
     still = np.zeros_like(right.position)
     expected = right.torque - rigid_body_torque(ARM, Motion(right.position, still, still))
     np.testing.assert_allclose(load_recording(folder).runs[0].torque, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("seconds", "still", "why"), [(8, ["tau2"], "joint 2"), (1.5, [], "short")])
+def test_a_reading_that_cannot_be_asked_is_not_called_right(
+    tmp_path: Path, seconds: float, still: list[str], why: str
+) -> None:
+    run = frame(0, seconds)
+    run[still] = 0.0
+    found = diagnose(load_recording(recording_in(tmp_path / "rig", run)), only_setup=True)
+    assert found.status == "inconclusive"
+    assert why in found.summary
+
+
+def test_a_reading_that_is_right_is_called_right(tmp_path: Path) -> None:
+    found = diagnose(load_recording(recording_in(tmp_path / "rig", frame(0, 8))), only_setup=True)
+    assert (found.status, found.summary) == ("none", "Nothing is wrong with the reading; physics was not asked.")

@@ -19,9 +19,9 @@ from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
 from armlab.recordings.reading.judge import Judge, is_accepted
-from armlab.recordings.reading.mistakes import encoder_offset, late_torque, signs, take_back
+from armlab.recordings.reading.mistakes import clock_error, encoder_offset, late_torque, signs, take_back, units
 from armlab.recordings.reading.mistakes import spring as with_spring
-from armlab.recordings.reading.reading import Mistake, read_as_is
+from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
 from armlab.recordings.reading.singles import search_singles
@@ -179,11 +179,31 @@ def test_each_mistake_has_its_rivals_where_the_last_step_leaves_one_out(
     assert len(found.best.reading.mistakes) == len(found.without) == len(found.rivals) == 1
 
 
+OTHER_SIGNALS = ("velocity", "link_position", "reference_position", "reference_velocity")
+
+
+def add_other_signals(table: pd.DataFrame) -> None:
+    """Further signals of each joint, all different; torque becomes a current."""
+    for number, signal in enumerate(OTHER_SIGNALS):
+        for joint in (1, 2, 3):
+            table[f"{signal}{joint}"] = np.sin(table["t"] + number + 0.3 * joint)
+
+
 def test_the_corrected_folder_holds_the_recording_read_rightly(tmp_path: Path) -> None:
-    recording = recording_with(tmp_path / "wrong")
+    """Gains and a clock that the recording states already are kept."""
+    columns = {signal: [f"{signal}{joint}" for joint in (1, 2, 3)] for signal in OTHER_SIGNALS}
+    settings = {
+        "columns": {"time": "t", "position": POSITION, "current": TORQUE} | columns,
+        "units": {"time": "s", "position": "rad", "current": "A"}
+        | {signal: "rad/s" if "velocity" in signal else "rad" for signal in OTHER_SIGNALS},
+        "gains": [1.0, 2.0, 4.0],
+        "timing": {"clock_factor": 1.1},
+    }
+    recording = recording_with(tmp_path / "wrong", add_other_signals, settings)
     reading = read_as_is(recording, ARM.parameters)
     mistakes = (
         Mistake("channel_swap", joints=(1, 3), form="torque"),
+        Mistake("channel_swap", joints=(1, 2), form="position"),
         Mistake("joint_direction", 2, form="position"),
         Mistake("encoder_offset", 3, parameters=(("offset", 0.5, "rad"),)),
         Mistake("time_delay", parameters=(("seconds", 0.1, "s"),)),
@@ -201,7 +221,20 @@ def test_the_corrected_folder_holds_the_recording_read_rightly(tmp_path: Path) -
     for one, other in zip(again.runs, wanted.runs, strict=True):
         assert one.time == pytest.approx(other.time, abs=1e-9)
         assert one.torque == pytest.approx(other.torque, abs=1e-9)
-        assert one.position == pytest.approx(other.position, abs=1e-9)
+        for signal in ("position", *OTHER_SIGNALS):
+            assert getattr(one, signal) == pytest.approx(getattr(other, signal), abs=1e-9), signal
+    for what in ("position", "offset", "torque", "gains"):
+        stated, kept = getattr(again.transmission, what), getattr(wanted.transmission, what)
+        assert stated.shape == kept.shape
+
+
+def test_delays_that_were_stated_are_those_of_the_new_clock(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig", settings={"timing": {"clock_factor": 1.1, "torque_delay": 0.2}})
+    reading = read_as_is(recording, ARM.parameters)
+    reading = clock_error(late_torque(reading, 0, 0.1), 1.25)
+    timing = yaml.safe_load(corrected_texts(recording.folder, reading, tmp_path)["recording.yaml"])["timing"]
+    assert timing["clock_factor"] == pytest.approx(1.375)
+    assert timing["torque_delay"] == pytest.approx([0.26, 0.16, 0.16])
 
 
 def test_a_mistake_is_the_same_when_it_is_taken_back_by_its_name(tmp_path: Path) -> None:
@@ -254,6 +287,81 @@ def test_what_frees_the_joints_of_their_links_is_no_unit(tmp_path: Path) -> None
     judge = Judge(Fitter(channels, TUNING), recording)
     start = judge.trial(read_as_is(recording, ARM.parameters))
     assert not any(is_accepted(judge, start, each) for each in search_singles(judge, start))
+
+
+def test_a_short_run_beside_a_long_one_hides_no_mistake(tmp_path: Path) -> None:
+    """Blocks follow the length of the runs: none is empty."""
+    folder = folder_with(tmp_path / "rig", frame(seconds=60.0))
+    frame(1, seconds=2.5).to_csv(folder / "check.csv", index=False)
+    settings = yaml.safe_load((folder / "recording.yaml").read_text())
+    for run in settings["runs"]:
+        run["role"] = "identify"
+    (folder / "recording.yaml").write_text(yaml.safe_dump(settings))
+    for file in ("run.csv", "check.csv"):
+        table = pd.read_csv(folder / file)
+        table["tau2"] *= -1
+        table.to_csv(folder / file, index=False)
+    recording = load_recording(folder)
+    channels = thin_channels(recording, TUNING)
+    assert channels is not None
+    assert np.bincount(channels.block).min() > 0
+    assert names_of(answer_to(recording)) == ["torque_sign@2"]
+
+
+@pytest.mark.parametrize("angle", [178.0, -178.0])
+def test_a_zero_that_is_nearly_half_a_turn_off_is_half_a_turn(tmp_path: Path, angle: float) -> None:
+    recording = recording_with(tmp_path / "rig", shift("q2", angle))
+    channels = thin_channels(recording, TUNING)
+    assert channels is not None
+    judge = Judge(Fitter(channels, TUNING), recording)
+    found = search_singles(judge, judge.trial(read_as_is(recording, ARM.parameters)))
+    zeros = [each.reading.mistakes[-1] for each in found if each.reading.mistakes[-1].label == "encoder_offset@2"]
+    degrees = [abs(np.rad2deg(each.value("offset"))) for each in zeros]
+    assert max(degrees) == 180
+    assert not [each for each in degrees if 170 < each < 180]
+
+
+def test_degrees_are_those_of_joints_that_turn() -> None:
+    """An arm with a slide between two joints that turn."""
+    joints = tuple(replace(each, kind="prismatic" if at == 1 else each.kind) for at, each in enumerate(ARM.joints))
+    eye = np.eye(3)
+    order = (0, 1, 2)
+    arm = replace(ARM, joints=joints)
+    reading = Reading(eye, np.zeros(3), eye, order, order, 1.0, np.zeros(3), arm, None)
+    positions = [each for each in units(reading) if each.mistakes[-1].form == "position"]
+    scaled = {
+        (each.mistakes[-1].label, each.mistakes[-1].value("factor")): np.diag(each.position) for each in positions
+    }
+    assert scaled["unit_error", 180 / np.pi] == pytest.approx([np.pi / 180, 1, np.pi / 180])
+    assert scaled["unit_error@2", 1000.0] == pytest.approx([1, 1e-3, 1])
+    assert ("unit_error@2", 180 / np.pi) not in scaled
+
+
+def test_all_questions_that_the_data_leave_open_are_told(tmp_path: Path) -> None:
+    answer = answer_to(recording_with(tmp_path / "rig", both(scale(["tau2"], -1.0), shift("q3", -90.0))))
+    first, second = answer.findings
+    asked = replace(answer, findings=(), reading=None, open=(first, second))
+    text = str(asked.reason_inconclusive(TUNING))
+    assert first.description in text
+    assert second.description in text
+    certain = replace(asked, open=(first,), beside_open=(second,))
+    assert f"Certain is: {second.description}." in str(certain.reason_inconclusive(TUNING))
+
+
+def test_a_mistake_that_leaves_too_much_is_told_and_not_corrected(tmp_path: Path) -> None:
+    def change(table: pd.DataFrame) -> None:
+        scale(["tau2"], -1.0)(table)
+        rng = np.random.default_rng(0)
+        for name in TORQUE:
+            slow = np.interp(table["t"], np.arange(0, 9, 0.1), rng.normal(size=90))
+            table[name] += 0.4 * table[name].std() * slow
+
+    recording = recording_with(tmp_path / "rig", change)
+    answer = answer_to(recording)
+    assert not answer.findings
+    assert answer.doubted == ("the torque of joint 2 has the other sign",)
+    assert "too much to correct it" in answer.sentence
+    assert answer.sentence in [each.text for _, each in check_recording(tmp_path / "rig").findings]
 
 
 def test_columns_that_bear_the_names_of_other_joints_are_named() -> None:

@@ -135,6 +135,37 @@ def test_rows_that_were_written_again_before_the_next_was_read_are_put_on_the_ti
     assert np.abs(off - off.mean()).max() < 0.2 / RATE_HZ
 
 
+def test_repeated_rows_are_found_where_an_encoder_wraps(tmp_path: Path) -> None:
+    table = frame()
+    last_read = np.floor(table["t"].to_numpy() * 0.97 * RATE_HZ) / (0.97 * RATE_HZ)
+    torque = [name for name in table if name not in ("t", *POSITION)]
+    table[POSITION] = motion_at(last_read).position
+    table[POSITION[0]] = (3 * table[POSITION[0]] + np.pi) % (2 * np.pi) - np.pi
+    table[torque] = motion_at(last_read).velocity
+    (run,) = loaded(tmp_path, table)
+    assert ("repeated_row", "repaired") in kinds(run)
+
+
+def test_a_single_repeated_row_leaves_stamps_that_are_late(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[800, table.columns != "t"] = table.loc[799, table.columns != "t"]
+    table["t"] += np.random.default_rng(2).uniform(0, 0.6, len(table)) / RATE_HZ
+    (run,) = loaded(tmp_path, table)
+    assert kinds(run) == [("time_jitter", "repaired")]
+    off = run.time - frame()["t"]
+    assert np.abs(off - off.mean()).max() < 0.05 / RATE_HZ
+
+
+def test_samples_at_uneven_times_keep_their_stamps_though_the_arm_rests_most_of_the_time(tmp_path: Path) -> None:
+    time = frame()["t"].to_numpy() + np.random.default_rng(2).uniform(-0.3, 0.3, len(frame())) / RATE_HZ
+    table = frame()
+    table["t"], table[POSITION] = time, motion_at(time).position
+    rests = table.index > 0.4 * len(table)
+    table.loc[rests, POSITION] = table.loc[rests, POSITION].iloc[0].to_numpy()
+    (run,) = loaded(tmp_path, table)
+    assert_array_equal(run.time, time)
+
+
 def test_a_joint_that_rests_may_read_the_same_twice(tmp_path: Path) -> None:
     table = frame()
     table.loc[600:700] = table.loc[600].to_numpy()

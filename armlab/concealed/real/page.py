@@ -82,8 +82,10 @@ def write_score(seed: int, tables: RealTables, folder: Path) -> tuple[Path, ...]
 
 def render_page(seed: int, tables: RealTables) -> str:
     """The page."""
-    kind = "Development set, not judged." if seed in DEVELOPMENT_SEEDS else "Judged set."
+    judged = seed not in DEVELOPMENT_SEEDS
+    kind = "Judged set." if judged else "Development set, not judged."
     about = f"{kind} {count_of(tables.number, 'case')} of {count_of(len(tables.recordings), 'recording')}, seed {seed}."
+    about += " All judged runs: [log](../log.md)." if judged else ""
     measured = [
         (
             each.title,

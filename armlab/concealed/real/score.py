@@ -13,6 +13,7 @@ from armlab.common.errors import InputError
 from armlab.concealed.score.measures import (
     MEASURE_TEXTS,
     Measure,
+    is_wrong_first_name,
     is_wrong_name,
     reliability_measures,
     reliability_table,
@@ -44,6 +45,7 @@ TITLES = {  # of measures that mean something else here than in a simulated tier
     "right_name": f"named first, strength {MIN_STRENGTH:g} and more",
     "right_name_all_sizes": "named first, all strengths",
     "wrong_names_beyond_background": "wrong names among new claims",
+    "wrong_first_names": "wrong first names, a class or not, among new names",
     "missing_verdicts": "cases without a diagnosis",
 }
 
@@ -124,6 +126,7 @@ def real_measures(tables: RealTables) -> list[TitledMeasure]:
         _unwanted(share_measure("right_name", named[0])),
         _unwanted(share_measure("right_name_all_sizes", named[1])),
         share_measure("wrong_names_beyond_background", is_wrong_name(claims)),
+        share_measure("wrong_first_names", is_wrong_first_name(tables.named_claims)),
         *_reliability(tables.named_claims),
         share_measure("missing_verdicts", cases["refused"].notna()),
     ]

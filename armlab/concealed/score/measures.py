@@ -96,9 +96,13 @@ MEASURE_TEXTS = {
     "false_unknown": MeasureText("unknown said on nulls and decoys"),
     "wrong_names": MeasureText("wrong names among claims"),
     "wrong_names_beyond_background": MeasureText("wrong names among claims beyond background", "at most 5 %"),
+    "wrong_first_names": MeasureText("wrong first names, a class or not, among claims beyond background"),
+    "false_of_any_kind": MeasureText("the same with `unknown` where everything has a name"),
+    "parts_of_laws": MeasureText("names of a part of what is hidden, or of what no motion separates from it"),
     "right_when_doubtful": MeasureText("right among names of probability 0.5-0.7", "within 50-70 %"),
     "right_when_likely": MeasureText("right among names of probability 0.7-0.9", "within 70-90 %"),
     "right_when_sure": MeasureText("right among names of probability 0.9-1", "within 90-100 %"),
+    "stated_when_sure": MeasureText("probability stated of these (mean)"),
     "brier_skill": MeasureText("Brier score of probabilities: share below that of the base rate", "above 0"),
     "log_skill": MeasureText("log score of probabilities: share below that of the base rate", "above 0"),
     "misplaced": MeasureText("misplaced among claims"),
@@ -111,6 +115,7 @@ MEASURE_TEXTS = {
     "gap_closed_beyond_friction": MeasureText("gap closed beyond plain friction (median)"),
     "unknown_outside": MeasureText(f"unknown on effects outside, {ABOVE}", "at least 80 %"),
     "interval_coverage": MeasureText("95 % intervals that hold the truth", "90-98 %"),
+    "interval_coverage_hidden": MeasureText("the same of hidden effects alone", "90-98 %"),
     "parameter_error": MeasureText("relative parameter error (median)"),
     "seconds_median": MeasureText("seconds a case (median)"),
     "seconds_longest": MeasureText("seconds a case (longest)"),
@@ -130,12 +135,17 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
     named = inside[inside["named_first"].astype(bool)]
     classed = inside[inside["named_class"].astype(bool)]
     wrong, beyond = is_wrong_name(claims), claims["category"] != "background"
+    false_first, unneeded = is_wrong_first_name(claims), claims["category"] == "unknown"
+    hidden = parameters[parameters["hidden_as"] == "injected"]
     return [
         share_measure("false_claims_on_nulls", nulls["false_claims"] > 0),
         share_measure("false_claims_on_decoys", decoys["false_claims"] > 0),
         share_measure("false_unknown", pd.concat([nulls, decoys])["false_unknown"]),
         share_measure("wrong_names", wrong),
         share_measure("wrong_names_beyond_background", wrong[beyond]),
+        share_measure("wrong_first_names", false_first[beyond]),
+        share_measure("false_of_any_kind", (false_first | unneeded)[beyond]),
+        share_measure("parts_of_laws", (claims["category"] == "identical")[beyond]),
         *reliability_measures(claims[beyond]),
         share_measure("misplaced", claims["category"] == "misplaced"),
         replace(share_measure("right_name_or_class", large["named_class"]), wanted=NAMES_WANTED[tier]),
@@ -147,6 +157,7 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
         middle_measure("gap_closed_beyond_friction", cases["gap_closed_beyond_friction"]),
         share_measure("unknown_outside", large_outside["named_first"]),
         share_measure("interval_coverage", parameters["covered"].dropna()),
+        share_measure("interval_coverage_hidden", hidden["covered"].dropna()),
         middle_measure("parameter_error", parameters["relative_error"]),
         replace(middle_measure("seconds_median", cases["seconds"]), unit="s"),
         longest_measure("seconds_longest", cases["seconds"]),
@@ -157,6 +168,11 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
 def is_wrong_name(claims: pd.DataFrame) -> "pd.Series[bool]":
     """Which claims are names, or classes of names, none of which is there."""
     return (claims["category"] == "wrong") & ~claims["class_right"].astype(bool)
+
+
+def is_wrong_first_name(claims: pd.DataFrame) -> "pd.Series[bool]":
+    """Which claims have a first name that is not there, or not at its place, though another one of the class may be."""
+    return claims["category"].isin(["wrong", "misplaced"])
 
 
 def is_right_name(claims: pd.DataFrame) -> "pd.Series[bool]":
@@ -175,6 +191,8 @@ def reliability_measures(claims: pd.DataFrame) -> list[Measure]:
     out = [share_measure(id, right[(chances >= low) & (chances < high)]) for id, (low, high) in bins]
     hits = np.asarray(right, dtype=np.float64)
     base = np.full(len(hits), np.mean(hits)) if len(hits) else hits
+    sure = pd.Series(chances[chances >= RELIABILITY_BINS["right_when_sure"][0]])
+    out.append(middle_measure("stated_when_sure", sure, np.mean))
     brier = skill_measure("brier_skill", (chances - hits) ** 2, (base - hits) ** 2)
     return [*out, brier, skill_measure("log_skill", log_scores(chances, hits), log_scores(base, hits))]
 

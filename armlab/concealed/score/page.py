@@ -23,15 +23,16 @@ STRICTER_MEASURES = {  # shown below the measure that is wanted: the same, count
 MAX_SHOWN_MISSES = 30
 SHOWN_MISS_COLUMNS = ["miss", "case", "tier", "arm", "effect", "law", "joint", "limits", "hidden", "said"]
 HOW_TO_READ = f"""\
-A *detection limit* is the size at which an oracle that knows the true law and the true noise finds the effect with 90
-% power, at a level of 1 % over all effects and places. A diagnosis that does not know the law needs more: names are
+A *detection limit* is the size at which an oracle that knows the true law and the true noise finds the effect with 90 %
+power, at a level of 1 % over all effects and places. A diagnosis that does not know the law needs more: names are
 expected above {MIN_NAMED_MULTIPLE:g} limits. *Clean*: only the hidden effects differ from the simulation. *Realistic*:
 every link is 3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden. *Decoy*: only
 links are wrong. A *claim* is a finding. A claim of something that is there is right, friction of the background
-included. A class is wrong where none of its answers is right. Intervals are 95 %: Wilson's for shares (as if the
-effects of a case were independent), bootstrap for medians. *Met*: the figure is as wanted; of a bin of probabilities,
-its interval reaches the bin. *Surely*: so is its whole interval (or, if not met, none of it). *Perhaps*: the interval
-crosses the bound."""
+included, and so is one of a part of what is there or of what no motion separates from it (`docs/proof.md`). A class is
+wrong where none of its answers is right; a first name is wrong whatever the rest of its class is. Intervals are 95 %:
+Wilson's for shares (as if the effects of a case were independent), bootstrap for medians. *Met*: the figure is as
+wanted; of a bin of probabilities, its interval reaches the bin. *Surely*: so is its whole interval (or, if not met,
+none of it). *Perhaps*: the interval crosses the bound."""
 HOW_ENGINES_ARE_COMPARED = (
     "Cases of the engine whose joints stick beside those of MuJoCo, without effects that have parts of their own: the "
     "second engine has none. *By chance*: probability of such a difference where both are alike (Fisher 1935)."
@@ -66,6 +67,7 @@ def render_page(table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, 
     tiers = {tier: [Measure(**each) for each in found] for tier, found in result["tiers"].items()}
     kind = "Development set, not judged." if result["development"] else "Judged set."
     seal = f"{kind} {result['cases']} cases, seed {result['seed']}, manifest SHA-256 `{result['manifest']}`."
+    seal += "" if result["development"] else " All judged runs: [log](../log.md)."
     parts = [seal, "## Wanted and found", _wanted_table(tiers), HOW_TO_READ]
     parts += [
         "## What became of each",

@@ -63,7 +63,7 @@ def draw_mistake(rng: np.random.Generator, effect: str, arm: Arm) -> Injected | 
         return Injected(effect, joint, form=str(rng.choice(["position", "position and torque"])))
     if effect == "channel_swap":
         pair = sorted(int(each) + 1 for each in rng.choice(joints, 2, replace=False))
-        return Injected(effect, joints=tuple(pair), form=str(rng.choice(["torque", "position", "both"])))
+        return Injected(effect, joints=tuple(pair), form=str(rng.choice(["torque", "position", "position and torque"])))
     if effect == "unit_error":
         form = str(rng.choice(["position", "torque"]))
         whole = bool(rng.random() < 0.5) and (form == "position" or arm.links is not None)

@@ -10,7 +10,7 @@ import numpy as np
 
 from armlab.diagnosis.motion.diagnose import ServoFinding
 from armlab.diagnosis.naming.decide import Naming, naming_of
-from armlab.diagnosis.naming.weighing import zeros_behind_point
+from armlab.diagnosis.naming.weighing import negative_logarithm
 from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import UNKNOWN
@@ -27,7 +27,7 @@ def weigh_servo(finding: ServoFinding, last: int) -> Weighed:
     distance = abs(finding.value - finding.nominal) / half if stated else LARGEST_DISTANCE
     none = {
         "servo none": 1.0,
-        "servo p": zeros_behind_point(finding.p_value, LARGEST_P_DIGITS) / 10,
+        "servo p": negative_logarithm(finding.p_value, LARGEST_P_DIGITS) / 10,
         "servo gain": float(np.log(max(finding.before / max(finding.after, 1e-300), 1.0))),
         "servo distance": float(np.log1p(min(distance, LARGEST_DISTANCE))),
         "servo not stated": float(not stated),

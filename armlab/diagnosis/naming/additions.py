@@ -20,7 +20,7 @@ from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import is_structured, unknown_claim
-from armlab.effects.contract import Candidate
+from armlab.effects.contract import UNKNOWN, Candidate
 
 Found = tuple[int, State, Evidence]  # a group beside a model, the state with it, and what speaks for it
 
@@ -69,7 +69,7 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
             effects = {each: known for each, known in out.effects.items() if each in state.groups}
             out = replace(out, model=added, effects=effects | {group: evidence}, names=out.names | {group: names})
             continue
-        banned |= _acting_where(out.model, first[0]) | _acting_where(out.model, group)
+        banned |= _acting_where(out.model, first) | _acting_where(out.model, found)
         if believed and certain:
             out = replace(out, unnamed=(*out.unnamed, _unnamed(out.model, group, state, evidence, names)))
         else:
@@ -86,10 +86,11 @@ def _unnamed(model: FittedModel, group: int, state: State, evidence: Evidence, n
     return unknown_claim(joint, evidence, model.columns.torque_of(own), depends_on, names)
 
 
-def _acting_where(model: FittedModel, group: int) -> frozenset[int]:
-    """Groups whose torque acts at the same joint as that of a group first."""
-    joints = [each.candidate.rows[0] for each in model.solver.groups]
-    return frozenset(number for number, joint in enumerate(joints) if joint == joints[group])
+def _acting_where(model: FittedModel, found: Found) -> frozenset[int]:
+    """Groups that act at the joint that shows a group best, and at no more joints than it does."""
+    group, _, evidence = found
+    rows, most = [each.candidate.rows for each in model.solver.groups], len(_candidate(model, group).rows)
+    return frozenset(number for number, own in enumerate(rows) if evidence.joint in own and len(own) <= most)
 
 
 def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
@@ -112,7 +113,7 @@ def _likeliest(model: FittedModel, banned: frozenset[int]) -> Found | None:
 def with_likeliest_names(
     model: FittedModel, effects: Mapping[int, Evidence], left: Sequence[Structure]
 ) -> tuple[FittedModel, dict[int, Evidence]]:
-    """Effects that passed, with the likeliest name in the place of one that is not in the class of its finding.
+    """Effects that passed, each with the likeliest name of its finding where that has a name or a class of names.
 
     A search takes what raises the score most, and what fits best need not be likeliest. left: structure of the joints.
     """
@@ -121,10 +122,11 @@ def with_likeliest_names(
         if group not in out:
             continue
         naming, own = naming_of(weigh_effect(model, group, out, left), model.design.settings), _candidate(model, group)
-        if naming.is_unknown or naming.may_be(own.effect, own.joint):
+        first = naming.answers[0]
+        if naming.is_unknown or first.effect == UNKNOWN.id or first.is_of(own.effect, own.joint):
             continue
         without = replace(model, state=model.state.minus(group))
-        likelier = _with_name(without, naming.answers[0], least=0.0)
+        likelier = _with_name(without, first, least=0.0)
         if likelier is not None:
             other, state, evidence = likelier
             what = _candidate(model, other)

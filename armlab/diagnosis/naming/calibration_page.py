@@ -7,22 +7,22 @@ from pathlib import Path
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.diagnosis.naming.calibrate import Calibration, Reliability
-from armlab.diagnosis.naming.choice import Numbers
+from armlab.diagnosis.naming.choice import Weights
 from armlab.diagnosis.naming.decide import CALIBRATION_FILE
 
-CALIBRATION_SCHEMA = "calibration/1"
+CALIBRATION_SCHEMA = "calibration/2"
 PAGE_FILE = "calibration.md"
 DIGITS = 4
 
 
 def write_calibration(found: Calibration, sources: Sequence[str], out: Path) -> tuple[Path, ...]:
     """Writes both files. sources: the sets from which the weights are."""
-    weights = _rounded(found.weights)
     content = {
         "schema": CALIBRATION_SCHEMA,
         "sets": list(sources),
         "findings": found.findings,
-        "weights": weights,
+        "spreads_times": found.narrower,
+        "all": _rounded(found.weights),
         "left_out": {name: _rounded(each) for name, each in found.left_out.items()},
     }
     page = markdown_page(
@@ -33,13 +33,19 @@ def write_calibration(found: Calibration, sources: Sequence[str], out: Path) -> 
         markdown_table(("tier", "probability", "answers", "mean probability", "right"), list(_rows(found))),
         markdown_table(("tier", "Brier score", "of the base rate", "log score", "of the base rate"), _scores(found)),
         "## Weights",
-        markdown_table(("what speaks for a name", "weight"), [(key, f"{value:.2f}") for key, value in weights.items()]),
+        f"Lapse: {100 * found.weights.lapse:.1f} % of findings. Spreads: {found.narrower:g} times the stated ones.",
+        markdown_table(("what speaks for a name", "weight"), _weight_rows(found.weights)),
     )
     return write_texts({CALIBRATION_FILE: json.dumps(content, indent=1) + "\n", PAGE_FILE: page}, out)
 
 
-def _rounded(weights: Numbers) -> dict[str, float]:
-    return {key: round(value, DIGITS) for key, value in sorted(weights.items())}
+def _rounded(weights: Weights) -> dict[str, object]:
+    numbers = {key: round(value, DIGITS) for key, value in sorted(weights.numbers.items())}
+    return {"lapse": round(weights.lapse, DIGITS), "weights": numbers}
+
+
+def _weight_rows(weights: Weights) -> list[tuple[str, str]]:
+    return [(key, f"{value:.2f}") for key, value in sorted(weights.numbers.items())]
 
 
 def calibration_lines(found: Calibration) -> Iterator[str]:

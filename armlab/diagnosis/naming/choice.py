@@ -3,22 +3,27 @@
 A finding leaves some names open, and that none of them is right. With x the numbers that speak for one of them and w
 the weights that all findings share,
 
-    P(name) = exp(w . x) / sum over names of exp(w . x)
+    P(name) = (1 - lapse) exp(w . x) / sum over names of exp(w . x)  +  lapse / names
 
-The weights are found on recordings whose truth is known, by the most likely ones less half their squared distance from
-stated ones. A finding that more than one name describes rightly counts with the sum of their probabilities.
+In a share of findings, the lapse, the numbers mislead: there each name is as likely as another. So no name is more
+certain than names were right on recordings that the weights do not know.
+
+The weights are found on recordings whose truth is known: they maximise the log likelihood less half their squared
+distance from stated ones, in standard deviations. A finding that more than one name describes rightly counts with the
+sum of their probabilities.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 from scipy.special import logsumexp
 
 from armlab.common.arrays import Array
 
 Numbers = Mapping[str, float]  # of one name, by what they say
+MAX_LAPSE = 0.3
 
 
 @dataclass(frozen=True)
@@ -29,10 +34,41 @@ class Example:
     right: tuple[bool, ...]
 
 
-def probabilities(names: Sequence[Numbers], weights: Numbers) -> Array:
+@dataclass(frozen=True)
+class Weights:
+    """What probabilities of names are computed from. numbers: the weight of each; lapse: a share of findings."""
+
+    numbers: Numbers
+    lapse: float = 0.0
+
+
+def probabilities(names: Sequence[Numbers], weights: Weights) -> Array:
     """The probability of each name, (names,); numbers without a weight do not count."""
-    utilities = np.array([sum(weights.get(key, 0.0) * value for key, value in each.items()) for each in names])
-    return np.asarray(np.exp(utilities - logsumexp(utilities)))
+    known = weights.numbers
+    utilities = np.array([sum(known.get(key, 0.0) * value for key, value in each.items()) for each in names])
+    return with_lapse(np.exp(utilities - logsumexp(utilities)), weights.lapse)
+
+
+def with_lapse(chances: Array, lapse: float) -> Array:
+    """Probabilities (names,) where each name is as likely as another in a share of findings."""
+    return np.asarray((1 - lapse) * chances + lapse / len(chances))
+
+
+def fit_lapse(chances: Sequence[Array], rights: Sequence[Sequence[bool]]) -> float:
+    """The likeliest lapse for probabilities of findings that their weights do not know.
+
+    chances, rights: of each finding, (names,). Findings in which no name is right do not count; 0 without any other.
+    """
+    used = [(each, np.array(right)) for each, right in zip(chances, rights, strict=True) if any(right)]
+    own = np.array([each[right].sum() for each, right in used])
+    even = np.array([right.mean() for _, right in used])
+    if not len(used):
+        return 0.0
+
+    def loss(lapse: float) -> float:
+        return -float(np.sum(np.log((1 - lapse) * own + lapse * even)))
+
+    return float(minimize_scalar(loss, bounds=(0.0, MAX_LAPSE), method="bounded").x)
 
 
 def fit_weights(examples: Sequence[Example], stated: Numbers, spread: Numbers) -> dict[str, float]:

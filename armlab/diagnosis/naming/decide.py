@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from armlab.diagnosis.claims import next_experiment
-from armlab.diagnosis.naming.choice import Numbers, probabilities
+from armlab.diagnosis.naming.choice import Weights, probabilities
 from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import NamingTuning
@@ -22,14 +22,14 @@ MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 
 @cache
-def calibrated_weights(left_out: str = "") -> Numbers:
+def calibrated_weights(left_out: str = "") -> Weights:
     """The weights of what speaks for a name, as they were found on development sets (`armlab calibrate`).
 
     left_out: a public recording whose own cases they do not know.
     """
     content = json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8"))
-    weights = content["left_out"].get(left_out, content["weights"])
-    return {str(key): float(value) for key, value in weights.items()}
+    known = content["left_out"].get(left_out, content["all"])
+    return Weights({str(key): float(value) for key, value in known["weights"].items()}, float(known["lapse"]))
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     if claim.effect == UNKNOWN.id or (nameless and not (usual and claim.evidence.joint + 1 in plain)):
         return _without_name(claim, naming, tuning)
     chance = sum(naming.probability_of(*each) for each in own)
-    members = naming.members(tuning) if chance < tuning.level else ()
+    members = (naming.members(tuning) or naming.claimed) if chance < tuning.level else ()
     others = [each for each in members if each.effect != UNKNOWN.id and not each.is_of(claim.effect, claim.joint)]
     rivals = [*identical, *(each.as_rival for each in others if (each.effect, each.joint) not in known)]
     return replace(

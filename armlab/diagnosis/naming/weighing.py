@@ -101,15 +101,15 @@ def weigh_addition(
     candidate = model.solver.groups[group].candidate
     none = {
         "left none": 1.0,
-        "left p": zeros_behind_point(evidence.corrected, 30) / 10,
-        "left chance": zeros_behind_point(evidence.corrected, 6) / 6,
-        "left held-out chance": zeros_behind_point(evidence.held_p, 6) / 6,
+        "left p": negative_logarithm(evidence.corrected, 30) / 10,
+        "left chance": negative_logarithm(evidence.corrected, 6) / 6,
+        "left held-out chance": negative_logarithm(evidence.held_p, 6) / 6,
         "left gain": float(np.log1p(10 * max(evidence.gain, 0.0))),
         "left validated": float(np.clip(5 * evidence.validation_gain, -1, 1)),
         "left worse": float(evidence.worse),
         "left colour": _colour(model, evidence.joint),
-        "left structure": _structured_share(model, left, candidate.rows[0]),
-        "left structure chance": _structure_chance(left, candidate.rows[0]),
+        "left structure": _structured_share(model, left, evidence.joint),
+        "left structure chance": _structure_chance(left, evidence.joint),
         "left flexible": _flexible_ratio(model, model.state, evidence),
     }
     trials = _in_place(model, model.state, group, beside=added)
@@ -160,7 +160,8 @@ def _for_name(kind: Kind, trial: _Trial, best: float, without: float) -> dict[st
         f"{kind} deficit": float(np.log1p(deficit)),
         f"{kind} near deficit": min(deficit, 30.0) / 10,
     }
-    out[f"{kind} searched"] = float(trial.own)
+    if kind != "structure":
+        out[f"{kind} searched"] = float(trial.own)
     if trial.in_motion is not None:
         out |= {
             "shifts where a joint sticks": 1.0,
@@ -181,7 +182,7 @@ def _against_found(
         "found none": 1.0,
         "found score": float(np.log1p(max(evidence.score, 0.0))) / 5,
         "found gain": float(np.log1p(max(evidence.gain, 0.0))),
-        "found p": zeros_behind_point(evidence.corrected, 30) / 10,
+        "found p": negative_logarithm(evidence.corrected, 30) / 10,
         "found validated": _validated(evidence),
         "found colour": _colour(model, evidence.joint),
         "found structure": float(np.log1p(share / max(evidence.gain, 1e-3))),
@@ -206,11 +207,11 @@ def _colour(model: FittedModel, joint: int) -> float:
 
 def _structure_chance(left: Sequence[Structure], joint: int) -> float:
     """How clear it is that a joint (from 0) has structure left, significant or not."""
-    return max((zeros_behind_point(each.p_value, 4) / 4 for each in left if each.joint == joint), default=0.0)
+    return max((negative_logarithm(each.p_value, 4) / 4 for each in left if each.joint == joint), default=0.0)
 
 
-def zeros_behind_point(p_value: float, most: int) -> float:
-    """How many zeros a p-value has behind the point, at most so many."""
+def negative_logarithm(p_value: float, most: int) -> float:
+    """-log10 of a p-value, at most so many."""
     return float(-np.log10(max(p_value, 10.0**-most)))
 
 
@@ -266,8 +267,8 @@ def _in_place(
 ) -> Iterator[_Trial]:
     """The likeliest law of each effect at each place beside a state, the likeliest first.
 
-    own: the group that stands there. joint: from 0, where the torque has to act. beside: the state with what is
-    weighed; what it would still raise as much is another effect, and no rival.
+    own: the group that stands there; its effect is always among them. joint: from 0, where the torque has to act.
+    beside: the state with what is weighed; what it would still raise as much is another effect, and no rival.
     """
     solver, tuning = model.solver, model.design.settings.tuning.naming
     search, known = Search(solver, model.design.settings, True, 0), _held_out(model)
@@ -277,9 +278,10 @@ def _in_place(
     for number in map(int, np.argsort(-scores)):
         candidate = solver.groups[number].candidate
         key = candidate.effect, candidate.joint
-        if len(seen) >= tuning.names:
+        full = len(seen) >= tuning.names
+        if full and (taken is None or taken in seen):
             break
-        if key in seen or (joint is not None and joint not in candidate.rows):
+        if key in seen or (full and key != taken) or (joint is not None and joint not in candidate.rows):
             continue
         if number != own and (number in others or search.has_no_room(without, number)):
             continue
@@ -337,9 +339,10 @@ def _independent(search: Search, scores: Array, beside: State, share: float) -> 
 def _bodies(model: FittedModel, without: State, placed: Sequence[PlacedBody], own: int | None) -> Iterator[_Trial]:
     """A body that can exist at each link. own: the link whose body is known already."""
     solver, known = model.solver, _held_out(model)
+    crowd = solver.tuning.crowd_penalty * solver.crowd(without.groups)
     for each in placed:
         if each.link != own:
-            score = solver.fit(without).score + each.gain - float(solver.prices[each.group])
+            score = solver.fit(without).score + each.gain - float(solver.prices[each.group]) - crowd
             yield _Trial(PAYLOAD_FACTS.id, each.link, (), score, _growth(each.error, known))
 
 

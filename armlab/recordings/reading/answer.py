@@ -71,10 +71,11 @@ class Answer:
 
     findings: in the order in which they were found, none where it is read rightly. recording: as it should be read.
     share: held-out error of all joints as it is read, of the torque's scatter; near the simulation's links where there
-    are findings. undecided: joints whose zero the data do
-    not tell by quarters of a turn, where a zero is a finding. open: mistakes of which too many fit alike to correct
-    one. tried: what was tried where the recording fits badly. looks: how many readings were compared.
-    share_after: of the recording as it should be read.
+    are findings. undecided: joints whose zero the data do not tell by quarters of a turn, where a zero is a finding.
+    open: mistakes of which too many fit alike to correct one. beside_open: mistakes that are certain, beside them.
+    doubted: mistakes that pass all tests, but leave too much of the torque to be corrected. tried: what was tried where
+    the recording fits badly. looks: how many readings were compared, 0 where it is too short. share_after: of the
+    recording as it should be read, or of the reading that is doubted.
     """
 
     findings: tuple[SetupFinding, ...]
@@ -83,45 +84,57 @@ class Answer:
     share: float = 0.0
     undecided: tuple[int, ...] = ()
     open: tuple[SetupFinding, ...] = ()
+    beside_open: tuple[SetupFinding, ...] = ()
+    doubted: tuple[str, ...] = ()
     tried: tuple[str, ...] = ()
     looks: int = 0
     share_after: float = 0.0
 
     @property
     def sentence(self) -> str:
-        """The findings in a sentence, empty where there are none."""
+        """The findings, or what is doubted, in a sentence; empty where there is neither."""
+        if self.doubted:
+            return (
+                f"The recording may be read wrongly: {'; '.join(self.doubted)}. Read so, links and usual friction "
+                f"leave {self.share_after:.0%} of the torque, not {self.share:.0%}: too much to correct it."
+            )
         if not self.findings:
             return ""
         mistakes = "; ".join(each.description for each in self.findings)
         zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
-        told = f" These data do not tell the zero of {zeros} by quarters of a turn." if zeros else ""
+        open_zeros = f" These data do not tell the zero of {zeros} by quarters of a turn." if zeros else ""
         return (
             f"The recording is read wrongly: {mistakes}. Read rightly, links and usual friction fit with an error of "
-            f"{100 * self.share_after:.1f} % of the torque, not {100 * self.share:.1f} %.{told}"
+            f"{100 * self.share_after:.1f} % of the torque, not {100 * self.share:.1f} %.{open_zeros}"
         )
 
     def reason_inconclusive(self, tuning: ReadingTuning) -> str | None:
         """Why nothing can be said of the physics: readings that fit alike, or none that fits."""
         if self.open:
-            names = "; or ".join(
-                [self.open[0].description, *(rival.text for each in self.open for rival in each.rivals)]
+            questions = ". And: ".join(
+                "; or ".join([each.description, *(rival.text for rival in each.rivals)]) for each in self.open
             )
-            told = f"The recording is read wrongly, and these data do not tell how: {names}."
-            return f"{told} To decide, {_decide(self.open)}."
-        if not self.findings and self.share > tuning.max_unexplained:
+            certain = "".join(f" Certain is: {each.description}." for each in self.beside_open)
+            steps = list(dict.fromkeys(_measurement_for(each) for each in self.open))
+            return (
+                f"The recording is read wrongly, and these data do not tell how: {questions}.{certain} "
+                f"To decide, {'; '.join(steps)}."
+            )
+        least = min(self.share, self.share_after) if self.doubted else self.share
+        if not self.findings and least > tuning.max_unexplained:
             nearest = (
                 f", however it is read (tried {self.looks} readings, nearest: {'; '.join(self.tried)})"
                 if self.tried
                 else ""
             )
-            left = f"Rigid links with friction leave {self.share:.0%} of the recorded torque{nearest}"
+            left = f"Rigid links with friction leave {least:.0%} of the recorded torque{nearest}"
             return f"{left}: another robot, or torque that is none? Move one joint alone and see which columns change."
         return None
 
 
-def _decide(findings: tuple[SetupFinding, ...]) -> str:
-    first = findings[0]
-    return first.next_experiment or measurement(first.mistake.effect, first.mistake.joint, first.arm)
+def _measurement_for(finding: SetupFinding) -> str:
+    """What decides between a mistake and its rivals."""
+    return finding.next_experiment or measurement(finding.mistake.effect, finding.mistake.joint, finding.arm)
 
 
 def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:
@@ -137,10 +150,15 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     start = judge.trial(read_as_is(recording, inertial))
     found = find_mistakes(judge, start)
     share = overall_error(judge, start.reading, near=False)
-    if found.best is found.start or overall_error(judge, found.best.reading, near=True) > tuning.max_read_error:
-        nearest = found.tried if found.best is found.start else (found.best,)
-        tried = tuple(describe(mistake, recording.arm) for each in nearest for mistake in each.reading.mistakes)
+    if found.best is found.start:
+        tried = tuple(describe(mistake, recording.arm) for each in found.tried for mistake in each.reading.mistakes)
         return Answer((), recording, None, share, tried=tried, looks=found.looks)
+    after = overall_error(judge, found.best.reading, near=True)
+    if after > tuning.max_read_error:
+        own = (each for each in found.best.reading.mistakes if each.effect != SPRING)
+        doubted = tuple(describe(each, recording.arm) for each in own)
+        free = overall_error(judge, found.best.reading, near=False)
+        return Answer((), recording, None, share, doubted=doubted, tried=doubted, looks=found.looks, share_after=free)
     findings = tuple(
         _finding(judge, found, place) for place, each in enumerate(found.best.reading.mistakes) if each.effect != SPRING
     )
@@ -148,10 +166,11 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
         return Answer((), recording, None, overall_error(judge, found.best.reading, near=False), looks=found.looks)
     open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
     if open_ones:
-        return Answer((), recording, None, share, open=open_ones, looks=found.looks)
+        beside = tuple(each for each in findings if each not in open_ones)
+        return Answer((), recording, None, share, open=open_ones, beside_open=beside, looks=found.looks)
     zeros = found.undecided if any(each.mistake.effect == "encoder_offset" for each in findings) else ()
     corrected = correct_recording(recording, found.best.reading)
-    before, after = (overall_error(judge, each.reading, near=True) for each in (start, found.best))
+    before = overall_error(judge, start.reading, near=True)
     return Answer(findings, corrected, found.best.reading, before, zeros, looks=found.looks, share_after=after)
 
 
@@ -171,14 +190,14 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     (before, rms_before), (after, rms_after) = (judge.errors(each.reading, near=True) for each in (without, best))
     before, after = np.maximum(before, SMALLEST_SHARE), np.maximum(after, SMALLEST_SHARE)
     worst = int(np.argmax(np.log(before) - np.log(after)))
-    if mistake.joint is not None and mistake.effect not in ("link_data_error",):
+    if mistake.joint is not None and mistake.effect != "link_data_error":
         worst = mistake.joint - 1 if after[mistake.joint - 1] < before[mistake.joint - 1] else worst
     gain, arm = Gain.between(without, best), best.reading.arm
     rivals = [(each.reading.mistakes[-1], each.loss) for each in found.rivals[place]]
     weights = np.array([best.loss, *(loss for _, loss in rivals)])
     chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
     by_links = best.near is not None and not is_told_by_geometry(gain, judge.tuning)
-    chances = np.append(chances, np.mean(chances) * judge.tuning.other_links_chance if by_links else 0.0)
+    chances = np.append(chances, chances.max() * judge.tuning.other_links_chance if by_links else 0.0)
     chances = chances / chances.sum()
     listed = [
         Rival(each.effect, each.joint, each.joints, describe(each, arm), float(chance))
@@ -209,4 +228,4 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
 
 def is_told_by_geometry(gain: Gain, tuning: ReadingTuning) -> bool:
     """Whether no other links would explain what was recorded as well."""
-    return gain.free >= tuning.min_free_gain and gain.free_sigmas >= tuning.min_body_sigmas
+    return gain.free >= tuning.min_free_gain and gain.free_sigmas >= tuning.min_sigmas

@@ -20,12 +20,16 @@ from problem.pseudo_inertia import links_of
 from problem.robot_file import LinkEntry, RobotFile
 
 CORRECTED_FOLDER = "corrected"
-POSITION_SIGNALS = ("position", "link_position", "reference_position")
+POSITION_SIGNALS = ("position", "reference_position")
 VELOCITY_SIGNALS = ("velocity", "reference_velocity")
 
 
 def correct_recording(recording: Recording, reading: Reading) -> Recording:
-    """The recording as a reading has it."""
+    """The recording as a reading has it.
+
+    Positions of link encoders stay: they have no transmission. So do velocities where the clock is wrong: it is doubted
+    only where they are not the slopes of the positions.
+    """
     arm = reading.arm
     if recording.arm.links is not None and recording.simulation is None and reading.inertial is not None:
         arm = replace(arm, links=links_of(reading.inertial))
@@ -34,7 +38,7 @@ def correct_recording(recording: Recording, reading: Reading) -> Recording:
     transmission = Transmission(
         _at_channels(reading.position, reading.position_order),
         reading.offset,
-        _at_channels(reading.torque / given.gains, reading.torque_order),
+        _at_channels(reading.torque, reading.torque_order) / given.gains,
         given.gains,
     )
     return replace(recording, arm=arm, runs=runs, transmission=transmission)
@@ -55,7 +59,7 @@ def _correct_run(run: Run, given: Transmission, reading: Reading) -> Run:
         if name in POSITION_SIGNALS:
             signals[name] = _mix(signal - given.offset, to_joints) + reading.offset
         elif name in VELOCITY_SIGNALS:
-            signals[name] = _mix(signal, to_joints) * reading.clock
+            signals[name] = _mix(signal, to_joints)
     return read_late(run.with_signals(run.time / reading.clock, signals), reading.delay)
 
 
@@ -96,9 +100,8 @@ def _recording_settings(
         run["file"] = beside(run["file"])
     if file.simulation is not None:
         settings["simulation"] = beside(file.simulation)
-    _reorder(settings, "position", reading.position_order)
-    _reorder(settings, "velocity", reading.position_order)
-    _reorder(settings, "reference_position", reading.position_order)
+    for signal in (*POSITION_SIGNALS, *VELOCITY_SIGNALS):
+        _reorder(settings, signal, reading.position_order)
     _reorder(settings, "torque" if file.columns.torque else "current", reading.torque_order)
     given = recording.transmission
     stated = {
@@ -111,7 +114,7 @@ def _recording_settings(
     if changed:
         settings["transmission"] = changed
     before = file.timing or TimingEntry()
-    delays = np.add(reading.delay, before.delays(reading.joints))
+    delays = np.add(reading.delay, np.divide(before.delays(reading.joints), reading.clock))
     if reading.clock != 1.0 or np.any(delays):
         clock = before.clock_factor * reading.clock
         settings["timing"] = {"clock_factor": clock, "torque_delay": delays.tolist()}

@@ -229,7 +229,7 @@ class Fitter:
         return out
 
     def too_fast(self, reading: Reading) -> int:
-        """How many joints would be faster than joints are, most of the time that they move."""
+        """How many joints would be faster than joints are, a quarter of the time."""
         speed = np.quantile(np.abs(self.columns(reading).motion.velocity), USUAL, axis=0)
         return int(np.sum(speed > self.tuning.fastest_speed))
 

@@ -21,19 +21,18 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.settings import read_yaml, validate
-from armlab.recordings.reading.reading import SPRING, Mistake, Reading
+from armlab.recordings.reading.reading import BOTH, SPRING, Mistake, Reading
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 from problem.pseudo_inertia import link_from_centre_of_mass, links_of
 from problem.robot_file import BUILT_IN_FOLDER, RobotFile, built_in_arms
 
-POSITION, TORQUE, BOTH, TIME = "position", "torque", "position and torque", "time"
+POSITION, TORQUE, TIME = "position", "torque", "time"
 DEGREES = 180 / np.pi
 STANDARD_GRAVITY = 9.81  # m/s2
 UNIT_FACTORS = {POSITION: (DEGREES, 1 / DEGREES, 1000.0, 1e-3), TORQUE: (1000.0, 1e-3), TIME: (1000.0, 1e-3)}
 TORQUE_UNITS = (1000.0, 1e-3, 1 / 9.80665, 9.80665, 1 / 1.355818, 1.355818, 8.850746, 1 / 8.850746)
 GEAR_RATIOS = tuple(np.geomspace(5, 300, 83).tolist())
-COARSE_GEAR_RATIOS = (30.0, 45.0, 60.0, 80.0, 100.0, 121.0, 160.0, 220.0)
 QUARTERS = (90, 180, -90)
 ZERO_STEPS = tuple(range(-150, 181, 30))  # degrees
 
@@ -52,21 +51,20 @@ def signs(reading: Reading) -> Iterator[Reading]:
 def exchanges(reading: Reading, names: tuple[str, ...]) -> Iterator[Reading]:
     """Columns in another order. names: of the joints."""
     count = reading.joints
-    forms = ((POSITION, "position"), (TORQUE, "torque"), ("both", "both"))
     for first, second in combinations(range(count), 2):
         exchanged = list(range(count))
         exchanged[first], exchanged[second] = second, first
-        for form, what in forms:
+        for form in (POSITION, TORQUE, BOTH):
             mistake = Mistake("channel_swap", joints=(first + 1, second + 1), form=form)
-            yield reading.reorder(tuple(exchanged), what).with_mistake(mistake)
+            yield reading.reorder(tuple(exchanged), form).with_mistake(mistake)
     own = tuple(range(count))
     # recorded columns that stand in alphabetical order of the joints, where the order of the robot was named
     alphabetical = tuple(int(place) for place in np.argsort(np.argsort(names)))
     for order in {own[::-1], (*own[1:], 0), (own[-1], *own[:-1]), alphabetical}:
         if sum(place != each for place, each in enumerate(order)) > 2:
-            for form, what in forms:
+            for form in (POSITION, TORQUE, BOTH):
                 mistake = Mistake("channel_order", joints=tuple(each + 1 for each in order), form=form)
-                yield reading.reorder(order, what).with_mistake(mistake)
+                yield reading.reorder(order, form).with_mistake(mistake)
 
 
 def unit_error(reading: Reading, joint: int | None, form: str, factor: float) -> Reading:
@@ -75,24 +73,31 @@ def unit_error(reading: Reading, joint: int | None, form: str, factor: float) ->
     mistake = Mistake("unit_error", number, form=form, parameters=(("factor", factor, ""),))
     if form == TIME:
         return replace(reading, clock=reading.clock * factor).with_mistake(mistake)
-    where = slice(None) if joint is None else joint
-    changed = reading.scale_position if form == POSITION else reading.scale_torque
-    return changed(where, 1 / factor).with_mistake(mistake)
+    if form == TORQUE:
+        return reading.scale_torque(slice(None) if joint is None else joint, 1 / factor).with_mistake(mistake)
+    alike = _joints_of_unit(reading, factor) if joint is None else [joint]
+    for each in alike:
+        reading = reading.scale_position(each, 1 / factor)
+    return reading.with_mistake(mistake)
 
 
 def units(reading: Reading) -> Iterator[Reading]:
     """Usual units that were taken for each other."""
-    kinds = [joint.kind for joint in reading.arm.joints]
     for form, factors in UNIT_FACTORS.items():
         for factor in factors:
-            angle = factor in (DEGREES, 1 / DEGREES)
-            places: list[int | None] = [None] if form == TIME or reading.joints > 1 else []
-            if form != TIME:
-                places += list(range(reading.joints))
+            places = list(range(reading.joints)) if form == TORQUE else []
+            if form == POSITION:
+                places = _joints_of_unit(reading, factor)
+            if form == TIME or len(places) > 1:
+                yield unit_error(reading, None, form, factor)
             for joint in places:
-                kind = kinds[joint or 0]
-                if form != POSITION or angle == (kind == "revolute"):
-                    yield unit_error(reading, joint, form, factor)
+                yield unit_error(reading, joint, form, factor)
+
+
+def _joints_of_unit(reading: Reading, factor: float) -> list[int]:
+    """Joints (from 0) whose position may be off by a factor: those that turn by degrees, those that slide by mm."""
+    kind = "revolute" if factor in (DEGREES, 1 / DEGREES) else "prismatic"
+    return [number for number, joint in enumerate(reading.arm.joints) if joint.kind == kind]
 
 
 def gear_ratio(reading: Reading, joint: int, ratio: float) -> Reading:
@@ -114,9 +119,14 @@ def base_tilt(reading: Reading, gravity: Array) -> Reading:
     return reading.with_gravity(gravity).with_mistake(Mistake("base_tilt", parameters=(("gravity", vector, "m/s2"),)))
 
 
+def size_of_gravity(reading: Reading) -> float:
+    """Of the robot file, m/s2; the standard one where it states none."""
+    return float(np.linalg.norm(reading.arm.gravity)) or STANDARD_GRAVITY
+
+
 def gravity_directions(reading: Reading) -> Iterator[Reading]:
-    """Gravity of the same size along the axes and the diagonals of the base frame."""
-    size = float(np.linalg.norm(reading.arm.gravity)) or STANDARD_GRAVITY
+    """Gravity of the same size along the axes and the space diagonals of the base frame."""
+    size = size_of_gravity(reading)
     for direction in product((-1, 0, 1), repeat=3):
         length = float(np.linalg.norm(direction))
         if length > 0 and len([each for each in direction if each]) != 2:

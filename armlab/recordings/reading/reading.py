@@ -14,6 +14,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
+BOTH = "position and torque"  # the form of a mistake
 SPRING = "cable_stiffness"  # physics that a joint may have in the place of a mistake
 
 
@@ -91,11 +92,11 @@ class Reading:
         return replace(self, offset=self.offset + angle * np.eye(self.joints)[joint])
 
     def reorder(self, order: tuple[int, ...], form: str) -> "Reading":
-        """Other channels for the places. form: position, torque or both."""
+        """Other channels for the places. form: position, torque, or `BOTH`."""
         out = self
-        if form in ("position", "both"):
+        if form in ("position", BOTH):
             out = replace(out, position_order=tuple(self.position_order[each] for each in order))
-        if form in ("torque", "both"):
+        if form in ("torque", BOTH):
             out = replace(out, torque_order=tuple(self.torque_order[each] for each in order))
         return out
 

@@ -38,7 +38,7 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
     if start.loss - least < tuning.min_gain:
         return Found(start, start, looks=judge.looks[0])
     singles = search_singles(judge, start)
-    best, beside = _extend(judge, start, start, singles)
+    best, beside = _extend(judge, start, singles)
     limit = start.loss - tuning.min_refined_gain
     if best is not start:
         limit = min(limit, singles[0].loss + tuning.near_best)
@@ -47,12 +47,12 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
             continue
         if not _may_begin_pair(start, first, tuning):
             continue
-        other, more = _extend(judge, start, first, search_singles(judge, first))
+        other, more = _extend(judge, first, search_singles(judge, first))
         if other is not first and other.loss < best.loss - tuning.min_gain and is_accepted(judge, start, other):
             best, beside = other, more
     if best is start:
         return Found(start, start, tried=tuple(singles[: tuning.beam]), looks=judge.looks[0])
-    best = _merge_at_joints(judge, start, best)
+    extended, best = best, _merge_at_joints(judge, start, best)
     without, lists = _in_each_place(judge, start, best, singles)
     for _ in range(tuning.max_mistakes):
         better = _better_in_place(judge, without, lists, best)
@@ -60,6 +60,8 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
             break
         best = better
         without, lists = _in_each_place(judge, start, best, singles)
+    if best is not extended:
+        beside = search_singles(judge, best)
     rivals = tuple(_rivals(judge, without[place], best, place, each) for place, each in enumerate(lists))
     return Found(start, best, without, rivals, _undecided(beside, best, tuning), looks=judge.looks[0])
 
@@ -92,7 +94,7 @@ def _gain_at_bad(before: Trial, after: Trial, tuning: ReadingTuning) -> float:
     return max(float(np.sum(np.mean(old - new, axis=0)[_bad_joints(old, tuning)])) for old, new in views)
 
 
-def _extend(judge: Judge, start: Trial, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
+def _extend(judge: Judge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
     """Takes the best accepted mistake, one after the other; the last list of single mistakes beside it."""
     while len(trial.reading.mistakes) < judge.tuning.max_mistakes:
         accepted = next((each for each in singles if is_accepted(judge, trial, each)), None)
@@ -107,8 +109,7 @@ def _distinct(singles: list[Trial], count: int) -> list[Trial]:
     """The best ones, each effect once at a place and in a form."""
     out: dict[tuple[str, str], Trial] = {}
     for each in singles:
-        own = each.reading.mistakes[-1]
-        out.setdefault((own.label, own.form), each)
+        out.setdefault(_name(each.reading.mistakes[-1]), each)
     return list(out.values())[:count]
 
 
@@ -167,17 +168,18 @@ def _better_in_place(judge: Judge, without: tuple[Trial, ...], lists: list[list[
 def _rivals(judge: Judge, without: Trial, best: Trial, place: int, singles: list[Trial]) -> tuple[Trial, ...]:
     """Readings with another mistake at one place that fit as well as the best one. singles: beside the other ones."""
     tuning = judge.tuning
-    own = best.reading.mistakes[place]
-    out: dict[str, Trial] = {}
+    out = {_name(best.reading.mistakes[place]): best}
     for each in singles:
-        mistake = each.reading.mistakes[-1]
-        gain = Gain.between(each, best)
+        name, gain = _name(each.reading.mistakes[-1]), Gain.between(each, best)
         alike = gain.near < tuning.rival_gain or gain.near_sigmas < tuning.rival_sigmas
-        if gain.near > tuning.max_rival_gain or not alike or mistake.label in (own.label, *out):
-            continue
-        if is_accepted(judge, without, each):
-            out[mistake.label] = each
-    return tuple(out.values())
+        if gain.near <= tuning.max_rival_gain and alike and name not in out and is_accepted(judge, without, each):
+            out[name] = each
+    return tuple(out.values())[1:]
+
+
+def _name(mistake: Mistake) -> tuple[str, str]:
+    """What is wrong and where, and in which form; its number does not count."""
+    return mistake.label, mistake.form
 
 
 def _undecided(singles: list[Trial], best: Trial, tuning: ReadingTuning) -> tuple[int, ...]:

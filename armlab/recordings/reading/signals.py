@@ -80,7 +80,8 @@ def thin_channels(recording: Recording, tuning: ReadingTuning) -> Channels | Non
     if min(_length(run) for run in runs) < tuning.min_run_s:
         return None
     margin = min(tuning.max_delay_s, *(tuning.max_delay_share * _length(run) for run in runs))
-    step_s = sum(_length(run) for run in runs) / tuning.max_rows
+    whole_s = sum(_length(run) for run in runs)
+    step_s = whole_s / tuning.max_rows
     motions, stamps, numbers, torques, blocks = [], [], [], [], []
     first = 0
     for number, run in enumerate(runs):
@@ -95,7 +96,7 @@ def thin_channels(recording: Recording, tuning: ReadingTuning) -> Channels | Non
         stamps.append(time[rows])
         numbers.append(np.full(len(rows), number))
         torques.append((time, signals.filter.smooth(signals.run.torque) @ undo_torque))
-        count = max(round(tuning.blocks / len(runs)), 4)
+        count = int(np.clip(round(tuning.blocks * _length(run) / whole_s), 1, len(rows)))
         blocks.append(first + np.arange(len(rows)) * count // len(rows))
         first += count
     motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))

@@ -98,17 +98,22 @@ def _zeros(judge: Judge, start: Trial) -> list[Trial]:
             continue
         refined = _refine(make, judge, best, 30.0)
         angle = np.rad2deg(refined.reading.mistakes[-1].value("offset"))
-        quarter = round(angle / 90) * 90
+        quarter = (0, *table.QUARTERS)[round(angle / 90) % 4]
         if abs(angle) >= judge.tuning.min_zero_deg and not _is_quarter(judge, scanned.get(quarter), refined, angle):
             out.append(refined)
     return out
+
+
+def _half_turn(angle: float) -> float:
+    """The same angle between -180 and 180 degrees."""
+    return (angle + 180) % 360 - 180
 
 
 def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float) -> bool:
     """Whether a zero is a multiple of 90 degrees: near it, or the data do not tell it from one not far away."""
     if turned is None:
         return False
-    off = abs(angle - np.rad2deg(turned.reading.mistakes[-1].value("offset")))
+    off = abs(_half_turn(angle - np.rad2deg(turned.reading.mistakes[-1].value("offset"))))
     if off < judge.tuning.quarter_tolerance_deg:
         return True
     gain = Gain.between(turned, refined)
@@ -118,9 +123,7 @@ def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float
 
 def _gravities(judge: Judge, start: Trial) -> list[Trial]:
     """Directions of gravity: the best of some, refined over both angles."""
-    size = float(np.linalg.norm(start.reading.arm.gravity))
-    if size == 0:
-        return []
+    size = table.size_of_gravity(start.reading)
     coarse = [judge.trial(each) for each in table.gravity_directions(start.reading)]
     best = min(coarse, key=lambda each: each.loss)
     if best.loss > start.loss - judge.tuning.min_refined_gain:

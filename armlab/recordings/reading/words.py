@@ -6,7 +6,6 @@ from armlab.recordings.reading.reading import SPRING, Mistake
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 
-POSITION_AND_TORQUE = "position and torque"
 INERTIAL_ERROR = "inertial_parameter_error"
 NAMES = {
     "torque_sign": "torque of the other sign",
@@ -59,13 +58,12 @@ def describe(mistake: Mistake, arm: Arm) -> str:
     link = "all links" if mistake.joint is None else links_in_words(arm, [mistake.joint])
     pair = joints_in_words(arm, mistake.joints) if mistake.joints else ""
     form = mistake.form
-    columns = POSITION_AND_TORQUE if form == "both" else form
     texts = {
         SPRING: f"{place} has a spring or a gravity compensator",
         "torque_sign": f"the torque of {place} has the other sign",
         "joint_direction": f"{place} counts the other way round ({form})",
-        "channel_swap": f"the {columns} columns of {pair} are exchanged",
-        "channel_order": f"the {columns} columns stand in the order {', '.join(map(str, mistake.joints))}",
+        "channel_swap": f"the {form} columns of {pair} are exchanged",
+        "channel_order": f"the {form} columns stand in the order {', '.join(map(str, mistake.joints))}",
         "gravity_compensated_torque": "the recorded torque holds no gravity",
         "dh_convention": f"the D-H table is of the {form} convention",
         "inertia_reference": _reference_text(form),
