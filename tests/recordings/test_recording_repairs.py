@@ -140,7 +140,9 @@ def test_repeated_rows_are_found_where_an_encoder_wraps(tmp_path: Path) -> None:
     last_read = np.floor(table["t"].to_numpy() * 0.97 * RATE_HZ) / (0.97 * RATE_HZ)
     torque = [name for name in table if name not in ("t", *POSITION)]
     table[POSITION] = motion_at(last_read).position
-    table[POSITION[0]] = (3 * table[POSITION[0]] + np.pi) % (2 * np.pi) - np.pi
+    turned = table[POSITION[0]] + 2 * last_read
+    table[POSITION[0]] = (turned + np.pi) % (2 * np.pi) - np.pi
+    assert 0 < np.sum(np.abs(np.diff(table[POSITION[0]])) > np.pi) < 4
     table[torque] = motion_at(last_read).velocity
     (run,) = loaded(tmp_path, table)
     assert ("repeated_row", "repaired") in kinds(run)
