@@ -196,7 +196,7 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
 def _without_prediction_of(claim: Claim, unknowns: Sequence[Structure]) -> Claim:
     """An unnamed claim beside structure that is a finding, too: at one joint, the structure holds what it predicts."""
     same = any(each.joint + 1 == claim.joint for each in unknowns)
-    return replace(claim, prediction=np.zeros_like(claim.prediction)) if same else claim
+    return replace(claim, prediction=np.zeros_like(claim.prediction), left_out=0.0) if same else claim
 
 
 def _with_probable(named: "NamedEffects") -> tuple["NamedEffects", Additions]:

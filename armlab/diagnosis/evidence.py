@@ -159,6 +159,11 @@ class Evidence:
     repeatable: bool = True
     usual: bool = False
 
+    @property
+    def fall(self) -> float:
+        """By what share the RMS on validation rows falls."""
+        return 1 - self.rms_after / self.rms_before if self.rms_before > 0 else 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class Judge:

@@ -17,7 +17,7 @@ SHAPE_STEP = 1e-4  # of the way between a shape's bounds, for derivatives
 class ShapedFit:
     """The fit of a round with the derivatives by all shapes: covariance of links, effects, and shapes.
 
-    places: where a group's shapes stand, by group. lengths: of the shapes' whitened columns, by which they are scaled.
+    places: where a group's shapes stand, by group. lengths: by which the shapes' columns are scaled.
     """
 
     model: FittedModel
@@ -54,7 +54,7 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
     """Adds the torque's derivatives by the shapes to the columns of the fit."""
     bench, fit = model.design, model.fit
     extra = {joint: np.empty((bench.observed.rows, 0)) for joint in range(bench.observed.joints)}
-    places, start = {}, len(fit.inverse)
+    places, start, bounds = {}, len(fit.inverse), list[tuple[float, float]]()
     for group in fit.state.groups:
         candidate = model.solver.groups[group].candidate
         count = len(candidate.shape)
@@ -67,14 +67,17 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
                 own = np.column_stack([slope[:, candidate.rows.index(joint)] for slope in slopes])
             extra[joint] = np.hstack([extra[joint], own])
         places[group] = slice(start, start + count)
+        bounds += candidate.bounds
         start += count
     settings, lengths = bench.settings, model.moments.lengths
     rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, bench.observed, settings.tuning.blocks)
     own = np.sum([np.sum(design[:, len(fit.inverse) :] ** 2, axis=0) for design in rows.designs], axis=0)
-    shapes = np.sqrt(np.where(own > 0, own, 1.0))
+    anywhere = np.array([12 / (high - low) ** 2 for low, high in bounds])  # a shape is known to be within its bounds
+    shapes = np.sqrt(own + anywhere)
     scale = np.append(np.ones(len(fit.inverse)), shapes)
     rows = replace(rows, designs=tuple(design / scale for design in rows.designs))
     precision = prior_precision(model.solver, fit, start)
+    precision += np.diag(np.append(np.zeros(len(fit.inverse)), anywhere / shapes**2))
     for group in fit.state.groups:
         known = model.solver.groups[group].candidate.known(model.solver.values(fit, group))
         if known is not None:

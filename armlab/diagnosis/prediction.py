@@ -54,7 +54,7 @@ def fit_prediction(named: FittedModel) -> Prediction:
     tuning = named.design.settings.tuning.prediction
     groups = named.solver.groups
     own = named.state.groups
-    more = [number for number, group in enumerate(groups) if number not in own and group.candidate.facts.common]
+    more = [number for number, group in enumerate(groups) if number not in own and _may_help(group.candidate)]
     numbers = (*own, *more)
     candidates = [groups[number].candidate for number in more]
     candidates = [*(_of_found_size(named, number) for number in own), *candidates]
@@ -79,6 +79,11 @@ def fit_prediction(named: FittedModel) -> Prediction:
     model = _settled(replace(best.trial.model, state=best.state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in best.state.groups}
     return Prediction(model, places, best.held_out)
+
+
+def _may_help(law: Candidate) -> bool:
+    """Whether it is what many arms have, and foretells nothing absurd of faster motions."""
+    return law.facts.common and not law.outgrows_speed
 
 
 def _of_found_size(named: FittedModel, number: int) -> Candidate:

@@ -77,6 +77,7 @@ class Claim:
     joints), N m, its torque at the kept rows. depends_on: variables of an unknown. in_links: whether the links of the
     model found hold it already. group: its number in the model that predicts. weighed: names that it could have.
     probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
+    left_out: what the model found does not predict of its torque.
     """
 
     effect: str
@@ -97,6 +98,7 @@ class Claim:
     weighed: Weighed = ()
     probability: float | None = None
     members: tuple[Member, ...] = ()
+    left_out: Array | float = 0.0
 
 
 @dataclass(frozen=True)

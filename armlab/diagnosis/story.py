@@ -1,10 +1,10 @@
 """The story of a verdict: findings grouped by cause, largest first, with the share of the error that each explains.
 
-The error is the squared held-out error over all joints, each in units of its own torque. It falls from the model found
-without the torque of any finding to the model found. The torques of the causes are added one after the other, each time
-the one with which the error falls most, so that the shares sum to at most one; within a cause its findings are added in
-the same way. A share is of the gap between the start and the noise floor. What a surrogate predicts has the cause
-`unknown`: it is not named physics.
+The error is the squared held-out error over all joints, each in units of its own torque. It starts at the model found
+without the torque of any finding. The torques of the causes are added one after the other, each time the one with which
+the error falls most, so that the shares sum to at most one; within a cause its findings are added in the same way. A
+share is of the gap between the start and the noise floor. What a surrogate predicts has the cause `unknown`: it is not
+named physics, and the model found does not predict it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -85,7 +85,7 @@ def finding_shares(diagnosis: Diagnosis) -> tuple[float | None, ...]:
     torques = [stacked(claim.prediction) for claim in claims]
     left = stacked(final)
     floor = sum(each.noise_floor**2 / scale for each, scale in zip(diagnosis.fit, scales, strict=True))
-    start = left + np.sum(torques, axis=0)
+    start = left + np.sum([stacked(claim.prediction - claim.left_out) for claim in claims], axis=0)
     gap = float(start @ start) - min(float(floor), float(left @ left))
     if gap <= 0:
         return (None,) * len(claims)

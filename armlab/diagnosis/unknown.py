@@ -96,6 +96,7 @@ def unknown_claim(
         f"tau_{joint} += f({', '.join(depends_on) or 'the motion'})",
         evidence,
         prediction,
+        left_out=prediction,
         next_experiment=UNKNOWN.experiment,
         depends_on=depends_on,
         weighed=weighed,

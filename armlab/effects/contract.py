@@ -236,6 +236,11 @@ class Candidate(ABC):
         """Whether it is friction of one joint by that joint's own motion."""
         return self.facts.dissipates and self.facts.where == "joint" and len(self.joints) == 1
 
+    @property
+    def outgrows_speed(self) -> bool:
+        """Whether its torque grows faster than the speed: slow motions do not tell that of fast ones."""
+        return False
+
     def is_friction_of(self, joint: int) -> bool:
         """Whether it is friction of this joint, from 1, alone."""
         return self.is_friction and self.joint == joint

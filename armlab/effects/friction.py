@@ -274,6 +274,10 @@ class PowerFriction(Term):
     facts = NONLINEAR_VISCOUS_FACTS
     names = ("coefficient", "exponent")
 
+    @property
+    def outgrows_speed(self) -> bool:
+        return self.shape[0] > 1
+
     @classmethod
     def initial_shapes(cls, arm: Arm, joint: int, scenes: Sequence[Scene]) -> list[Self]:
         """Root, quadratic and cubic friction, and between."""

@@ -268,7 +268,8 @@ class LinearSpring(Term):
 class HardeningSpring(Term):
     """stiffness x + cubic x^3 + offset, x = q - rest; shape: the rest position.
 
-    The offset is that of the torque: a linear spring hides it in its rest position, here the bend tells that.
+    A torque offset moves the rest position of a linear spring. Here the cube fixes the rest position, and the offset
+    is a coefficient of its own.
     """
 
     facts = CABLE_STIFFNESS_FACTS

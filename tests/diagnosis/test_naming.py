@@ -118,6 +118,29 @@ def test_friction_keeps_its_law_at_a_joint_of_whose_friction_the_simulation_says
     assert (nameless.effect, nameless.probability) == ("unknown", pytest.approx(0.5))
 
 
+def test_a_link_that_is_off_keeps_its_name_where_nothing_is_likelier() -> None:
+    others = dict.fromkeys(("payload", "geometry_error", "encoder_offset"), 0.1)
+    names = weighed(0.05, inertial_parameter_error=0.45, torque_offset=0.2, **others)
+    link = replace(claim("inertial_parameter_error", names), in_links=True)
+    (found,) = named_claims([link], Settings())
+    assert (found.effect, found.probability) == ("inertial_parameter_error", pytest.approx(0.45))
+    likelier = replace(link, weighed=weighed(0.3, inertial_parameter_error=0.3, torque_offset=0.4))
+    (found,) = named_claims([likelier], Settings())
+    assert found.effect == "unknown"
+
+
+def test_a_law_without_a_name_is_a_finding_only_where_held_out_errors_fall() -> None:
+    doubtful = claim("payload", weighed(0.4, payload=0.6))
+    (found,) = named_claims([doubtful], Settings())
+    assert found.effect == "unknown"
+    small = replace(doubtful, evidence=replace(doubtful.evidence, rms_after=0.97))
+    assert named_claims([small], Settings()) == ()
+    structure = replace(small, effect="unknown")
+    assert len(named_claims([structure], Settings())) == 1
+    certain = replace(small, weighed=weighed(0.02, payload=0.98))
+    assert [each.effect for each in named_claims([certain], Settings())] == ["payload"]
+
+
 def test_more_than_four_names_are_no_class() -> None:
     names = weighed(0.05, **{f"law_{number}": 0.19 for number in range(5)})
     assert naming_of(names, Settings()).is_unknown

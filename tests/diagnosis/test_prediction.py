@@ -15,6 +15,7 @@ from armlab.diagnosis.formats import VerdictFile
 from armlab.diagnosis.found_model import model_found, named_model
 from armlab.diagnosis.noise import Noise, choose_noise
 from armlab.diagnosis.prediction import (
+    _may_help,
     choose_smoothing,
     filtered_residual,
     fit_prediction,
@@ -24,6 +25,7 @@ from armlab.diagnosis.prediction import (
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Guards, Settings
 from armlab.diagnosis.verdict_files import make_verdict
+from armlab.effects.friction import PowerFriction
 from armlab.effects.library import library
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
@@ -60,6 +62,13 @@ def test_what_is_not_sure_is_present_without_a_claim(found: Diagnosis) -> None:
     assert ("viscous_friction", 3) not in claimed
     assert all((parts[place] in model.unclaimed) == (place not in claimed) for place in parts)
     assert {("viscous_friction", 3), ("torque_offset", 1)} <= set(parts)
+
+
+def test_no_law_that_outgrows_the_speed_is_present_without_a_claim() -> None:
+    """Its size at the speeds of the recording says nothing of faster motions."""
+    for exponent, helps in ((0.5, True), (1.0, True), (3.0, False)):
+        law = PowerFriction(2, (2,), (1,), shape=(exponent,))
+        assert _may_help(law) == helps
 
 
 def test_the_named_model_has_the_claims_and_nothing_else(found: Diagnosis) -> None:

@@ -30,7 +30,7 @@ def _judged(
     *said: ReportedFinding, sought: SoughtEffect = SPRING, control: tuple[ReportedFinding, ...] = (), joints: int = 3
 ) -> DrawnVerdict:
     def outcome(findings: tuple[ReportedFinding, ...]) -> Outcome:
-        return Outcome("told", findings, (1.0,), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1)
+        return Outcome("told", findings, (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1)
 
     return judge_drawn(CASE, outcome(said), (sought,), outcome(control), joints)
 
@@ -40,7 +40,7 @@ def _weighed(*names: str) -> Weighed:
 
 
 def _labels(*weighed: Weighed, control: tuple[ReportedFinding, ...] = ()) -> list[LabelledFinding]:
-    outcome = Outcome("told", (), (1.0,), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1, weighed=weighed)
+    outcome = Outcome("told", (), (1.0,), (1.0,), (1.0,), (1.0,), None, 0.1, weighed=weighed)
     return list(label_weighed(outcome, (SPRING,), replace(outcome, findings=control), 3))
 
 

@@ -21,10 +21,10 @@ def _said(
     return ReportedFinding(effect, joints, "", (ParameterSize(name, size, (size - 0.2, size + 0.2), "kg"),), rivals)
 
 
-def _outcome(*said: ReportedFinding, joints: int = 3, given: float = 3.0, named: float = 1.0) -> Outcome:
+def _outcome(*said: ReportedFinding, joints: int = 3, given: float = 3.0, found: float = 1.0) -> Outcome:
     every = (given,) * joints
     hidden = (0.5, 4.0, 0.5)[:joints]
-    return Outcome("told", said, every, (named,) * joints, (named,) * joints, hidden, (9.0,) * joints, 1.0, 0.1)
+    return Outcome("told", said, every, (found,) * joints, hidden, (9.0,) * joints, 1.0, 0.1)
 
 
 def _verdict(

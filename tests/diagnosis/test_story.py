@@ -1,11 +1,14 @@
 """The story of a verdict: causes, their order, and shares that sum to at most one."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from armlab.diagnosis.story import MAX_WORDS, Chapter, add_in_order, story_sentence
+from armlab.diagnosis.result import Claim
+from armlab.diagnosis.story import MAX_WORDS, Chapter, add_in_order, finding_shares, story_sentence
 from armlab.effects.contract import UNKNOWN, Effect
 from armlab.effects.library import effect_named
 from problem.presets import load_arm
@@ -24,6 +27,22 @@ def test_torques_that_explain_the_same_error_do_not_count_it_twice() -> None:
     start = np.array([2.0, 0.0])
     falls = add_in_order(start, {"one": np.array([1.5, 0.0]), "other": np.array([0.5, 0.0])})
     assert sum(falls.values()) == pytest.approx(4.0)
+
+
+def test_an_unknown_that_the_model_leaves_counts_once() -> None:
+    rows = np.arange(400)
+    named, left = np.sin(rows)[:, None], np.cos(rows)[:, None]
+    facts: dict[str, Any] = {"joint": 1, "joints": (1,), "parameters": (), "equation": "", "evidence": None}
+    claims = (
+        Claim("payload", prediction=named, **facts),
+        Claim("unknown", prediction=left, left_out=left, **facts),
+    )
+    observed = SimpleNamespace(
+        torque=named + left, joints=1, rows=len(rows), of_role=lambda role, joint: [slice(0, len(rows))]
+    )
+    fit = (SimpleNamespace(noise_floor=0.0),)
+    diagnosis = cast(Any, SimpleNamespace(observed=observed, final=left, claims=claims, fit=fit))
+    assert finding_shares(diagnosis) == pytest.approx((0.5, 0.5), abs=0.01)
 
 
 def test_the_sentence_names_the_causes_and_has_at_most_thirty_words() -> None:

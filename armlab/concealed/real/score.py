@@ -45,7 +45,7 @@ TITLES = {  # of measures that mean something else here than in a simulated tier
     "right_name": f"named first, strength {MIN_STRENGTH:g} and more",
     "right_name_all_sizes": "named first, all strengths",
     "wrong_names_beyond_background": "wrong names among new claims",
-    "wrong_first_names": "wrong first names, a class or not, among new names",
+    "wrong_first_names": "new findings whose first name is wrong, classes included",
     "missing_verdicts": "cases without a diagnosis",
 }
 

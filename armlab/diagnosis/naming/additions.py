@@ -43,8 +43,9 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
     """Adds the likeliest effects one after the other, where they have a name or a class of names.
 
     What has as much evidence as a name needs, and validation runs do not refute, is there for certain: of its class
-    `unknown` may be a part, and it is a finding without a name where none is likely. Else names alone have to reach the
-    level. Laws whose numbers cannot be believed are neither. left: structure of the joints of the model.
+    `unknown` may be a part, and it is a finding without a name where none is likely and held-out errors fall enough.
+    Else names alone have to reach the level. Laws whose numbers cannot be believed are neither. left: structure of the
+    joints of the model.
     """
     exact = not any(is_structured(each, model.design.settings.tuning) for each in left)
     tuning, banned, out = model.design.settings.tuning, frozenset[int](), Additions(model, {}, {})
@@ -70,7 +71,7 @@ def add_probable(model: FittedModel, left: Sequence[Structure]) -> Additions:
             out = replace(out, model=added, effects=effects | {group: evidence}, names=out.names | {group: names})
             continue
         banned |= _acting_where(out.model, first) | _acting_where(out.model, found)
-        if believed and certain:
+        if believed and certain and evidence.fall >= tuning.naming.least_unnamed_fall:
             out = replace(out, unnamed=(*out.unnamed, _unnamed(out.model, group, state, evidence, names)))
         else:
             out = replace(out, nothing=(*out.nothing, names))

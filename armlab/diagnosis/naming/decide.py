@@ -91,11 +91,16 @@ def naming_of(weighed: Weighed, settings: Settings) -> Naming:
 def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[int] = ()) -> tuple[Claim, ...]:
     """Claims with their probabilities; names that no motion separates count together.
 
-    Those without a name are one finding a joint. plain: joints, from 1, of whose friction the simulation says nothing.
-    Every arm has friction and offsets: there they keep the law that was found, and only the law is in doubt.
+    Those without a name are one finding a joint, and none where a law hardly changes what is predicted. plain: joints,
+    from 1, of whose friction the simulation says nothing. Every arm has friction and offsets: there they keep the law
+    that was found, and only the law is in doubt. So does a link that is off, if nothing is likelier: no simulation
+    knows its links exactly.
     """
-    out = list[Claim]()
-    for each in (_named(claim, settings, plain) for claim in claims):
+    out, least = list[Claim](), settings.tuning.naming.least_unnamed_fall
+    for claim in claims:
+        each = _named(claim, settings, plain)
+        if each.effect == UNKNOWN.id != claim.effect and claim.evidence.fall < least:
+            continue
         there = next((at for at, other in enumerate(out) if _are_one(each, other)), None)
         if there is None:
             out.append(each)
@@ -111,7 +116,8 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     known = {(each.effect, each.joint) for each in identical}
     own = {(claim.effect, claim.joint), *known}
     nameless = not any(naming.may_be(*each) for each in own)
-    if claim.effect == UNKNOWN.id or (nameless and not (usual and claim.evidence.joint + 1 in plain)):
+    likeliest = claim.in_links and naming.answers[0].is_of(claim.effect, claim.joint)
+    if claim.effect == UNKNOWN.id or (nameless and not likeliest and not (usual and claim.evidence.joint + 1 in plain)):
         return _without_name(claim, naming, tuning)
     chance = sum(naming.probability_of(*each) for each in own)
     members = (naming.members(tuning) or naming.claimed) if chance < tuning.level else ()
@@ -164,6 +170,7 @@ def _together(one: Claim, other: Claim) -> Claim:
     return replace(
         first,
         prediction=first.prediction + second.prediction,
+        left_out=first.left_out + second.left_out,
         depends_on=variables,
         equation=f"tau_{first.joint} += f({', '.join(variables) or 'the motion'})",
     )

@@ -29,7 +29,6 @@ from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.result import Claim, Diagnosis, Weighed
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.stored import code_digest, recording_digest
-from armlab.effects.contract import UNKNOWN
 from armlab.identification.model_file import write_model
 from armlab.identification.real.looks import Looks
 from armlab.identification.torque_model import TorqueModel
@@ -87,17 +86,16 @@ class ReportedFinding:
 class Outcome:
     """The outcome of one case: findings, and the RMS of each joint in N m (N), on the runs that took no part.
 
-    given: of the error of the simulation that was handed over. named: of the error with every named finding. found: of
-    the error with the surrogates of unknown structure, too. hidden: of the torque that is concealed. torque: of the
-    filtered torque as measured. recovered: share of the hidden torque that the findings sought explain; None in a
-    control. refused: why nothing was diagnosed, empty where something was; there are no errors then. weighed: the names
-    of each finding, and of what was not probable enough for one.
+    given: of the error of the simulation that was handed over. found: of the error with the model found, in which
+    no surrogate predicts what is unknown. hidden: of the torque that is concealed. torque: of the filtered torque as
+    measured. recovered: share of the hidden torque that the findings sought explain; None in a control. refused: why
+    nothing was diagnosed, empty where something was; there are no errors then. weighed: the names of each finding, and
+    of what was not probable enough for one.
     """
 
     case: str
     findings: tuple[ReportedFinding, ...]
     given: tuple[float, ...]
-    named: tuple[float, ...]
     found: tuple[float, ...]
     hidden: tuple[float, ...]
     torque: tuple[float, ...]
@@ -173,7 +171,7 @@ def examine_case(reference: Reference, case: Case, path: Path, progress: Callabl
     findings = tuple(summarise_mistake(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     findings += tuple(summarise_claim(each) for each in diagnosis.claims)
     if diagnosis.observed is None or diagnosis.final is None:
-        return Outcome(case.name, findings, (), (), (), (), (), None, diagnosis.seconds, diagnosis.summary)
+        return Outcome(case.name, findings, (), (), (), (), None, diagnosis.seconds, diagnosis.summary)
     hidden = _concealed_torque(diagnosis.observed, reference.model, handed, added)
     return _measure_outcome(case, diagnosis, findings, hidden, sought_in_case(reference, case))
 
@@ -216,9 +214,6 @@ def _measure_outcome(
     assert diagnosis.nominal is not None
     assert diagnosis.final is not None
     rows = rows_in(diagnosis.observed.of_role("validate"), diagnosis.observed.rows)
-    named = diagnosis.final + sum(
-        (each.prediction for each in diagnosis.claims if each.effect == UNKNOWN.id), np.zeros(1)
-    )
     predictions = [each.prediction for each in diagnosis.claims if is_sought_kind(each, wanted)]
     left = hidden[rows] - sum((each[rows] for each in predictions), np.zeros(1))
     power = float(np.sum(hidden[rows] ** 2))
@@ -226,7 +221,6 @@ def _measure_outcome(
         case=case.name,
         findings=findings,
         given=_rms(diagnosis.nominal[rows]),
-        named=_rms(named[rows]),
         found=_rms(diagnosis.final[rows]),
         hidden=_rms(hidden[rows]),
         torque=_rms(diagnosis.observed.torque[rows]),

@@ -88,7 +88,7 @@ def judge_case(case: Case, outcome: Outcome, wanted: tuple[SoughtEffect, ...], c
     others = tuple(each for each in left if each not in laws)
     over = np.array(outcome.hidden) / np.array(control.given)
     joint = int(np.argmax(over))
-    before, after, floor = outcome.given[joint], outcome.named[joint], control.named[joint]
+    before, after, floor = outcome.given[joint], outcome.found[joint], control.found[joint]
     gap = (before - after) / (before - floor) if wanted and before > floor else None
     return CaseVerdict(case, outcome, parts, others, laws, joint + 1, float(over[joint]), gap)
 

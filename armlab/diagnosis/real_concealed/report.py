@@ -100,7 +100,6 @@ CSV_COLUMNS = (
     "joint_shown",
     "error_handed_over",
     "error_reference",
-    "error_named",
     "error_found",
     "recovered",
     "gap_closed",
@@ -133,7 +132,6 @@ def _verdict_rows(study: ConcealedStudy, verdict: CaseVerdict) -> Iterator[tuple
             verdict.joint_shown,
             outcome.given[joint],
             study.control.given[joint],
-            outcome.named[joint],
             outcome.found[joint],
             outcome.recovered,
             verdict.gap,
@@ -210,8 +208,8 @@ def _study_parts(study: ConcealedStudy) -> Iterator[str]:
     yield f"## {study.name}"
     yield (
         f"Reference: {study.reference.description}. "
-        f"Error {format_percent(control, control.given)}, {format_percent(control, control.named)} with what "
-        "the control names."
+        f"Error {format_percent(control, control.given)}, {format_percent(control, control.found)} with the "
+        "model that the control finds."
     )
     yield f"Control, nothing concealed: {'; '.join(map(finding_in_words, control.findings)) or 'nothing'}."
     withheld = [each for each in study.verdicts if each.case.injected is None]
@@ -240,7 +238,7 @@ INJECTED_HEADINGS = ("injected", "strength", "answer", "truth → found", "recov
 
 def _withheld_row(verdict: CaseVerdict, study: ConcealedStudy) -> tuple[str, ...]:
     outcome = verdict.outcome
-    errors = (outcome.given, study.control.given, outcome.named)
+    errors = (outcome.given, study.control.given, outcome.found)
     return (
         verdict.case.name,
         f"{verdict.strength:.1f}",

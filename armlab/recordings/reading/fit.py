@@ -32,9 +32,9 @@ from problem.pseudo_inertia import (
 from problem.regressor import observation_matrix, rigid_body_torque
 
 FOLDS = 2  # even and odd blocks are held out in turn
-OWN = 5  # columns of a joint: viscous and Coulomb friction, rotor inertia, offset, spring
+JOINT_COLUMNS = 5  # columns of a joint: viscous and Coulomb friction, rotor inertia, offset, spring
 SPRING = 4  # which of them is the spring
-SIGNED = 3  # of them the first ones, which are not negative
+NON_NEGATIVE = 3  # of them the first ones, which are not negative
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +57,11 @@ def make_columns(arm: Arm, motion: Motion, fold: NDArray[np.intp], sign_width: f
     speed = np.abs(motion.velocity).max(axis=0)
     sign = np.tanh(motion.velocity / (sign_width * np.where(speed > 0, speed, 1.0)))
     own = np.stack([motion.velocity, sign, motion.acceleration, np.ones_like(sign), motion.position], axis=2)
-    grams = np.zeros((FOLDS, joints, 10 * joints + OWN, 10 * joints + OWN))
+    grams = np.zeros((FOLDS, joints, 10 * joints + JOINT_COLUMNS, 10 * joints + JOINT_COLUMNS))
     for number in range(FOLDS):
         rows = fold == number
         for joint in range(joints):
-            used = np.arange(10 * joint, 10 * joints + OWN)  # links before a joint do not load it
+            used = np.arange(10 * joint, 10 * joints + JOINT_COLUMNS)  # links before a joint do not load it
             part = np.concatenate([rigid[rows, joint, 10 * joint :], own[rows, joint]], axis=1)
             grams[number, joint][np.ix_(used, used)] = part.T @ part
     return Columns(motion, rigid, own, grams)
@@ -199,19 +199,19 @@ class Fitter:
         joints, rows = torque.shape[1], self.fold == fold
         blocks = len(np.unique(self.channels.block[rows]))
         scale = blocks * self.tuning.independent_rows / (max(rows.sum(), 1) * self.tuning.model_error**2) * weight**2
-        links, size = 10 * joints, (10 + OWN) * joints
+        links, size = 10 * joints, (10 + JOINT_COLUMNS) * joints
         gram, product = np.zeros((size, size)), np.zeros(size)
         grams, target = columns.grams[fold], torque[rows]
         gram[:links, :links] = np.tensordot(scale, grams[:, :links, :links], axes=1)
         product[:links] = np.einsum("rjp,rj->p", columns.rigid[rows], target * scale, optimize=True)
         own = scale[:, None] * np.einsum("rjk,rj->jk", columns.own[rows], target)
         for joint in range(joints):
-            places = slice(links + OWN * joint, links + OWN * (joint + 1))
+            places = slice(links + JOINT_COLUMNS * joint, links + JOINT_COLUMNS * (joint + 1))
             gram[:links, places] = scale[joint] * grams[joint, :links, links:]
             gram[places, :links] = gram[:links, places].T
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
             product[places] = own[joint]
-        absent = [links + OWN * joint + SPRING for joint in springless]
+        absent = [links + JOINT_COLUMNS * joint + SPRING for joint in springless]
         gram[absent], gram[:, absent], product[absent] = 0.0, 0.0, 0.0
         return gram, product
 
@@ -230,7 +230,7 @@ class Fitter:
 
     def too_fast(self, reading: Reading) -> int:
         """How many joints would be faster than joints are, a quarter of the time."""
-        speed = np.quantile(np.abs(self.columns(reading).motion.velocity), USUAL, axis=0)
+        speed = np.quantile(np.abs(self.columns(reading).motion.velocity), SPEED_QUANTILE, axis=0)
         return int(np.sum(speed > self.tuning.fastest_speed))
 
     def implausible(self, reading: Reading) -> frozenset[int]:
@@ -272,7 +272,7 @@ class _Task:
     @property
     def _signed(self) -> NDArray[np.intp]:
         links = 10 * self.joints
-        return np.concatenate([links + OWN * joint + np.arange(SIGNED) for joint in range(self.joints)])
+        return np.concatenate([links + JOINT_COLUMNS * joint + np.arange(NON_NEGATIVE) for joint in range(self.joints)])
 
     @property
     def _information(self) -> Array:
@@ -299,7 +299,7 @@ class _Task:
         lengths = np.sqrt(np.maximum(np.diag(gram), 1e-300))
         unit = gram / np.outer(lengths, lengths) + 1e-10 * np.eye(len(gram))
         signed = self._signed
-        for _ in range(SIGNED * self.joints):
+        for _ in range(NON_NEGATIVE * self.joints):
             chosen = np.flatnonzero(free)
             x[chosen] = np.linalg.solve(unit[np.ix_(chosen, chosen)], (product / lengths)[chosen]) / lengths[chosen]
             negative = [place for place in signed if free[place] and x[place] < 0]
@@ -307,7 +307,7 @@ class _Task:
                 break
             free[negative] = False
             x[negative] = 0.0
-        return x[:links], x[links:].reshape(self.joints, OWN)
+        return x[:links], x[links:].reshape(self.joints, JOINT_COLUMNS)
 
     def physical(self) -> tuple[Array, Array]:
         """Links that bodies can have; friction and rotors stay positive by a barrier.
@@ -323,7 +323,7 @@ class _Task:
         while True:
             x = self._newton(x, factor * self.precision, factor * FRICTION_BARRIER)
             if factor <= 1:
-                return x[:links], x[links:].reshape(self.joints, OWN)
+                return x[:links], x[links:].reshape(self.joints, JOINT_COLUMNS)
             factor = max(factor * BARRIER_FALL, 1.0)
 
     def _newton(self, x: Array, precision: Array, barrier: float) -> Array:
@@ -373,7 +373,7 @@ class _Task:
 
 
 SMALLEST = 1e-100
-USUAL = 0.75  # quantile of the speeds: more than a spike
+SPEED_QUANTILE = 0.75  # quantile of the speeds: more than a spike
 MAX_NEWTON_STEPS = 40  # for each weight of the barriers
 NEWTON_TOLERANCE = 1e-2  # of the weight of the barriers
 BARRIER_FALL = 0.1
