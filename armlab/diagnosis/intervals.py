@@ -72,7 +72,7 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
     settings, lengths = bench.settings, model.moments.lengths
     rows = whitened_rows(model.columns, extra, fit, lengths, model.noise, bench.observed, settings.tuning.blocks)
     own = np.sum([np.sum(design[:, len(fit.inverse) :] ** 2, axis=0) for design in rows.designs], axis=0)
-    anywhere = np.array([12 / (high - low) ** 2 for low, high in bounds])  # a shape is known to be within its bounds
+    anywhere = np.array([12 / (high - low) ** 2 for low, high in bounds])  # of a number anywhere in its bounds
     shapes = np.sqrt(own + anywhere)
     scale = np.append(np.ones(len(fit.inverse)), shapes)
     rows = replace(rows, designs=tuple(design / scale for design in rows.designs))

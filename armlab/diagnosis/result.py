@@ -77,7 +77,7 @@ class Claim:
     joints), N m, its torque at the kept rows. depends_on: variables of an unknown. in_links: whether the links of the
     model found hold it already. group: its number in the model that predicts. weighed: names that it could have.
     probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
-    left_out: what the model found does not predict of its torque.
+    left_out: the part of its torque that the model found does not predict.
     """
 
     effect: str

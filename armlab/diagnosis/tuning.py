@@ -579,7 +579,7 @@ class NamingTuning:
     least_unnamed_fall: float = tuned(
         0.05,
         unit="of the held-out error",
-        meaning="by which it falls with a law without a name that is a finding",
+        meaning="fall from which on a law without a name is a finding",
         source="nulls judged on commit 15dd9f6: most false claims were such laws below it",
     )
     shown: float = tuned(0.05, unit="probability", meaning="a less probable name is not listed", most=1.0)

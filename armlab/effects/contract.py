@@ -238,7 +238,7 @@ class Candidate(ABC):
 
     @property
     def outgrows_speed(self) -> bool:
-        """Whether its torque grows faster than the speed: slow motions do not tell that of fast ones."""
+        """Whether its torque grows faster than the speed: slow motions do not tell its torque in fast ones."""
         return False
 
     def is_friction_of(self, joint: int) -> bool:

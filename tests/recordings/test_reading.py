@@ -356,7 +356,7 @@ def test_all_questions_that_the_data_leave_open_are_told(tmp_path: Path) -> None
     assert first.description in text
     assert second.description in text
     certain = replace(asked, open=(first,), beside_open=(second,))
-    assert f"Certain is: {second.description}." in str(certain.reason_inconclusive(TUNING))
+    assert f"This is certain: {second.description}." in str(certain.reason_inconclusive(TUNING))
 
 
 def test_a_mistake_that_leaves_too_much_is_told_and_not_corrected(tmp_path: Path) -> None:

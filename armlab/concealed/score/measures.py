@@ -97,7 +97,7 @@ MEASURE_TEXTS = {
     "wrong_names": MeasureText("wrong names among claims"),
     "wrong_names_beyond_background": MeasureText("wrong names among claims beyond background", "at most 5 %"),
     "wrong_first_names": MeasureText("claims beyond background whose first name is wrong, classes included"),
-    "false_of_any_kind": MeasureText("false claims beyond background, `unknown` where all has a name included"),
+    "false_of_any_kind": MeasureText("false claims beyond background, also `unknown` where everything has a name"),
     "parts_of_laws": MeasureText("names of a part of what is hidden, or of what no motion separates from it"),
     "right_when_doubtful": MeasureText("right among names of probability 0.5-0.7", "within 50-70 %"),
     "right_when_likely": MeasureText("right among names of probability 0.7-0.9", "within 70-90 %"),

@@ -91,15 +91,16 @@ def naming_of(weighed: Weighed, settings: Settings) -> Naming:
 def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[int] = ()) -> tuple[Claim, ...]:
     """Claims with their probabilities; names that no motion separates count together.
 
-    Those without a name are one finding a joint, and none where a law hardly changes what is predicted. plain: joints,
-    from 1, of whose friction the simulation says nothing. Every arm has friction and offsets: there they keep the law
-    that was found, and only the law is in doubt. So does a link that is off, if nothing is likelier: no simulation
-    knows its links exactly.
+    Those without a name are one finding a joint; a law that loses its name and hardly lowers held-out errors is none.
+    plain: joints, from 1, of whose friction the simulation says nothing. Every arm has friction and offsets: there they
+    keep the law that was found, and only the law is in doubt. A link that is off keeps its name, too, where nothing is
+    likelier: no simulation knows its links exactly.
     """
     out, least = list[Claim](), settings.tuning.naming.least_unnamed_fall
     for claim in claims:
         each = _named(claim, settings, plain)
-        if each.effect == UNKNOWN.id != claim.effect and claim.evidence.fall < least:
+        loses_its_name = claim.effect != UNKNOWN.id and each.effect == UNKNOWN.id
+        if loses_its_name and claim.evidence.fall < least:
             continue
         there = next((at for at, other in enumerate(out) if _are_one(each, other)), None)
         if there is None:

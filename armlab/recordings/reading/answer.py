@@ -114,7 +114,7 @@ class Answer:
             questions = ". And: ".join(
                 "; or ".join([each.description, *(rival.text for rival in each.rivals)]) for each in self.open
             )
-            certain = "".join(f" Certain is: {each.description}." for each in self.beside_open)
+            certain = "".join(f" This is certain: {each.description}." for each in self.beside_open)
             steps = list(dict.fromkeys(_measurement_for(each) for each in self.open))
             return (
                 f"The recording is read wrongly, and these data do not tell how: {questions}.{certain} "
