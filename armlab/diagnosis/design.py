@@ -23,7 +23,7 @@ from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.solver import Solver
-from armlab.diagnosis.surrogate import Features
+from armlab.diagnosis.surrogate import Features, FoldedFeatures
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals
@@ -35,7 +35,8 @@ from problem.motion import Motion
 class DesignMatrix:
     """rigid: filtered columns of the base parameters by run and joint. target: measured less simulated torque,
     filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
-    candidates that follow the model. blocks: the candidates' filtered columns. features: of each joint, for surrogates.
+    candidates that follow the model. blocks: the candidates' filtered columns. features, banks: of each joint, for
+    surrogates: many of everything, and few of one kind each.
     """
 
     settings: Settings
@@ -48,7 +49,8 @@ class DesignMatrix:
     scenes: tuple[Scene, ...]
     calm: tuple[Scene, ...]
     blocks: tuple[Block, ...] = ()
-    features: tuple[Features, ...] = ()
+    features: tuple[FoldedFeatures, ...] = ()
+    banks: tuple[tuple[Features, ...], ...] = ()
 
     @property
     def places(self) -> int:

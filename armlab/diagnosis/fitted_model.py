@@ -15,7 +15,7 @@ from armlab.diagnosis.noise import Noise, choose_noise, error_colours, fit_noise
 from armlab.diagnosis.refine import prior_precision, refine_shapes
 from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import Fit, Solver, State
-from armlab.diagnosis.surrogate import flexible_features, predict_structure
+from armlab.diagnosis.surrogate import flexible_features, fold_features, motion_banks, predict_structure
 from armlab.effects.contract import Family, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from problem.regressor import rigid_body_torque
@@ -91,8 +91,11 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     left = first.residual(first.fit)
     rng = np.random.default_rng(seed)
     tuning = design.settings.tuning.surrogate
-    made = tuple(flexible_features(moved.observed, joint, rng, tuning) for joint in range(moved.observed.joints))
-    whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made)
+    observed, joints = moved.observed, range(moved.observed.joints)
+    flexible = [flexible_features(observed, joint, rng, tuning) for joint in joints]
+    made = tuple(fold_features(each, observed, joint, tuning) for joint, each in enumerate(flexible))
+    banks = tuple(motion_banks(observed, joint, tuning) for joint in joints)
+    whole = replace(moved.with_candidates(families, _split_by_run(moved, left)), features=made, banks=banks)
     rough = _fit_model(
         whole, _white_noise(left, whole), lambda solver: background_state(solver, initial_link_widths(whole))
     )
@@ -211,7 +214,12 @@ def _follow_model(model: FittedModel) -> DesignMatrix:
 
 def follow_model(design: DesignMatrix, model: FittedModel) -> DesignMatrix:
     """A design with columns that follow a model."""
-    fit = model.fit
+    return design.with_model(inertial_parameters(model), torque_of(model))
+
+
+def torque_of(model: FittedModel) -> Callable[[Scene], Array]:
+    """The torque in the mechanism of a model, (samples, joints) of a scene."""
+    fit, design = model.fit, model.design
     inertial = inertial_parameters(model)
     nominal = design.simulation.inertial
     change = inertial if nominal is None else inertial - nominal
@@ -224,7 +232,7 @@ def follow_model(design: DesignMatrix, model: FittedModel) -> DesignMatrix:
         rigid = simulated + rigid_body_torque(scene.arm, scene.motion, change)
         return torque_in_mechanism(effects, replace(scene, inertial=inertial, torque=rigid))
 
-    return design.with_model(inertial, torque)
+    return torque
 
 
 def inertial_parameters(model: FittedModel) -> Array:

@@ -8,13 +8,13 @@ from scipy.interpolate import make_interp_spline
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.result import Located
-from armlab.diagnosis.surrogate import Features, predict_structure
+from armlab.diagnosis.surrogate import FoldedFeatures, predict_structure
 from armlab.diagnosis.tuning import LocationTuning, SurrogateTuning
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.periods import find_period
 
 
-def noise_floor(final: Array, made: Sequence[Features], observed: Observed, tuning: SurrogateTuning) -> Array:
+def noise_floor(final: Array, made: Sequence[FoldedFeatures], observed: Observed, tuning: SurrogateTuning) -> Array:
     """RMS (joints,), N m (N), of the noise of the filtered torque.
 
     final: (rows, joints), what the model leaves. What it leaves less what a surrogate can foretell of it: structure

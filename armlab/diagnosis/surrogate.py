@@ -4,7 +4,7 @@ Splines and random waves (Rahimi and Recht 2007) of the joints' motion and of ti
 what they predict on data that took no part counts.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, islice
 
@@ -97,15 +97,78 @@ Part = tuple[Array, tuple[str, ...]]
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """values: (rows, features). variables: per feature the names of what it depends on.
-
-    folds: (rows,), which third of the identification rows each belongs to, -1 for none. grams: of each third.
-    """
+    """values: (rows, features). variables: per feature the names of what it depends on."""
 
     values: Array
     variables: tuple[frozenset[str], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FoldedFeatures:
+    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none.
+
+    grams: of each third.
+    """
+
+    features: Features
     folds: NDArray[np.intp]
     grams: tuple[Array, ...]
+
+
+def fold_features(made: Features, observed: Observed, joint: int, tuning: SurrogateTuning) -> FoldedFeatures:
+    """Features of a joint (from 0), with their products third by third."""
+    thirds = time_thirds(observed, joint, tuning)
+    grams = tuple(made.values[thirds == fold].T @ made.values[thirds == fold] for fold in range(3))
+    return FoldedFeatures(made, thirds, grams)
+
+
+@dataclass(frozen=True, eq=False)
+class WholeRuns:
+    """All samples of all runs, stacked, (samples, joints): what jumps is made of them and then filtered as torque is.
+
+    A low-pass rounds every jump. A feature that is made of what was filtered and thinned before jumps elsewhere.
+    """
+
+    observed: Observed
+    position: Array
+    velocity: Array
+
+    def filtered(self, columns: Array) -> Array:
+        """Columns (samples, count) through the filter of the torque, (rows, count)."""
+        pairs = zip(self.observed.signals, self.split(columns), strict=True)
+        return np.concatenate([each.filter(part) for each, part in pairs])
+
+    def split(self, values: Array) -> list[Array]:
+        """Values of all samples, run by run."""
+        return np.split(values, np.cumsum([each.run.samples for each in self.observed.signals])[:-1])
+
+    def lags(self, values: Array, memories: Sequence[float]) -> Array:
+        """First-order lags (samples, memories) of a signal (samples,), run by run. memories: time constants, s."""
+        rate, out = self.observed.signals[0].run.rate_hz, []
+        for memory in memories:
+            keep = float(np.exp(-1 / (memory * rate)))
+            parts = [lfilter([1 - keep], [1, -keep], part, zi=[keep * part[0]])[0] for part in self.split(values)]
+            out.append(np.concatenate(parts))
+        return np.column_stack(out)
+
+    def turns(self, joint: int, ways: Sequence[float]) -> Array:
+        """Signs of a joint's motion that turn over some way after a reversal (Dahl 1968), (samples, ways).
+
+        ways: of its travel. It is what hysteresis makes of the motion, however fast that is.
+        """
+        positions = self.split(self.position[:, joint])
+        travel = max(max(float(np.ptp(each)) for each in positions), 1e-9)
+        parts = [np.column_stack([dahl_state(each, way * travel) for way in ways]) for each in positions]
+        return np.concatenate(parts)
+
+
+def whole_runs(observed: Observed) -> WholeRuns:
+    """The samples of all runs."""
+    motions = [each.motion for each in observed.signals]
+    position, velocity = (
+        np.concatenate([getattr(each, name) for each in motions]) for name in ("position", "velocity")
+    )
+    return WholeRuns(observed, position, velocity)
 
 
 def flexible_features(observed: Observed, joint: int, rng: np.random.Generator, tuning: SurrogateTuning) -> Features:
@@ -140,62 +203,73 @@ def flexible_features(observed: Observed, joint: int, rng: np.random.Generator, 
     driven = np.column_stack([velocity[:, joint], acceleration[:, joint]])
     add(_waves(placed, rng, tuning.waves), f"position_{joint + 1}", own)
     add(_waves(driven, rng, tuning.waves), own, f"acceleration_{joint + 1}")
-    signs = _smooth_signs(velocity[:, joint], tuning.sign_widths)
-    add(signs, own)
-    add(_hats(position[:, joint], tuning.fine_hats) * signs[:, 2:3], own, f"position_{joint + 1}")
-    add(_lags(observed, signs[:, 1], tuning.memories_s), own)
-    add(_lags(observed, velocity[:, joint], tuning.memories_s), own)
+    runs = whole_runs(observed)
+    signs = _smooth_signs(runs.velocity[:, joint], tuning.sign_widths)
+    turn = runs.filtered(signs[:, 2:3])
+    add(runs.filtered(signs), own)
+    patches = _hats(runs.position[:, joint], tuning.fine_hats) * signs[:, 2:3]
+    add(runs.filtered(patches), own, f"position_{joint + 1}")
+    add(runs.filtered(runs.lags(signs[:, 1], tuning.memories_s)), own)
+    add(runs.filtered(runs.lags(runs.velocity[:, joint], tuning.memories_s)), own)
     clock = observed.time
     add(_hats(clock, hats), "time")
-    add(np.column_stack([clock, clock**2]) * signs[:, 2:3], own, "time")
+    add(np.column_stack([clock, clock**2]) * turn, own, "time")
     add(np.column_stack([clock, clock**2]) * velocity[:, [joint]], own, "time")
-    return _standardise(parts, time_thirds(observed, joint, tuning))
+    return _standardise(parts)
 
 
-def feature_banks(observed: Observed, joint: int, load: Array, tuning: SurrogateTuning) -> Iterator[Features]:
-    """Few features each, of one kind of dependence. load: torque of the model at the joint, (rows,), N m.
+def motion_banks(observed: Observed, joint: int, tuning: SurrogateTuning) -> tuple[Features, ...]:
+    """Few features each, of one kind of dependence on the motion.
 
     What depends on little drowns in the noise of what does not matter where hundreds of features are taught at once.
     """
     position = observed.kept("position")
     velocity = observed.kept("velocity")
     acceleration = observed.kept("acceleration")
-    signals = ("torque", "position", "velocity", "acceleration")
-    torque, place, speed, change = (f"{name}_{joint + 1}" for name in signals)
-    own, signs = velocity[:, joint], _smooth_signs(velocity[:, joint], tuning.sign_widths)
-    turn, hats, memories = signs[:, 2:3], tuning.hats, tuning.memories_s
-    thirds = time_thirds(observed, joint, tuning)
+    place, speed, change = (f"{name}_{joint + 1}" for name in ("position", "velocity", "acceleration"))
+    runs, own, hats, memories = whole_runs(observed), velocity[:, joint], tuning.hats, tuning.memories_s
+    signs = _smooth_signs(runs.velocity[:, joint], tuning.sign_widths)
+    lagged = [runs.lags(values, memories) for values in (signs[:, 1], runs.velocity[:, joint])]
+    fast = [_hats(own, tuning.fine_hats), runs.filtered(np.column_stack([signs, *lagged]))]
+    patches = signs[:, 2:3] * _hats(runs.position[:, joint], tuning.fine_position_hats)
+    mapped = [runs.filtered(patches), own[:, None] * _hats(position[:, joint], tuning.position_hats)]
+    driven = _products(own, acceleration[:, joint], tuning.product_speeds)
+    out = [
+        _standardise([(columns, (speed,)) for columns in fast]),
+        _standardise([(columns, (place, speed)) for columns in mapped]),
+        _standardise([(_hats(position[:, joint], tuning.fine_position_hats), (place,))]),
+        _standardise([(driven, (speed, change))]),
+    ]
+    for other in range(observed.joints):
+        theirs = f"velocity_{other + 1}"
+        turned = runs.filtered(runs.turns(other, tuning.turning_ways))
+        out.append(_standardise([(turned, (theirs,))]))
+        if other != joint:
+            both = _products(position[:, joint], position[:, other], tuning.product_positions)
+            smooth = _smooth_signs(runs.velocity[:, other], tuning.sign_widths)
+            late = [runs.lags(values, memories) for values in (smooth[:, 2], runs.velocity[:, other])]
+            moved = [_hats(velocity[:, other], hats), runs.filtered(np.column_stack([smooth, *late]))]
+            out.append(_standardise([(both, (place, f"position_{other + 1}"))]))
+            out.append(_standardise([(columns, (theirs,)) for columns in moved]))
+    return tuple(out)
+
+
+def load_banks(observed: Observed, joint: int, load: Array, tuning: SurrogateTuning) -> tuple[Features, ...]:
+    """The same of dependence on the load. load: torque of the model at the joint, (samples,) of all runs, N m."""
+    torque, speed = f"torque_{joint + 1}", f"velocity_{joint + 1}"
+    runs, hats = whole_runs(observed), tuning.hats
+    own = runs.velocity[:, joint]
+    turn = _smooth_signs(own, tuning.sign_widths)[:, 2:3]
     loaded = [
         (_hats(load, hats), (torque,)),
         (load[:, None] * _hats(own, hats), (torque, speed)),
         (turn * _hats(load, hats), (torque, speed)),
     ]
-    lagged = [_lags(observed, values, memories) for values in (signs[:, 1], own)]
-    fast = [_hats(own, tuning.fine_hats), signs, *lagged]
-    mapped = [
-        turn * _hats(position[:, joint], tuning.fine_position_hats),
-        own[:, None] * _hats(position[:, joint], tuning.position_hats),
-    ]
-    yield _standardise(loaded, thirds)
-    yield _standardise([(_smooth_signs(load, tuning.sign_widths), (torque,))], thirds)
-    yield _standardise([(columns, (speed,)) for columns in fast], thirds)
-    yield _standardise([(columns, (place, speed)) for columns in mapped], thirds)
-    yield _standardise([(_hats(position[:, joint], tuning.fine_position_hats), (place,))], thirds)
-    driven = _products(own, acceleration[:, joint], tuning.product_speeds)
-    yield _standardise([(driven, (speed, change))], thirds)
-    for other in range(observed.joints):
-        theirs = f"velocity_{other + 1}"
-        yield _standardise([(_turns(observed, other, tuning.turning_ways), (theirs,))], thirds)
-        if other != joint:
-            both = _products(position[:, joint], position[:, other], tuning.product_positions)
-            smooth = _smooth_signs(velocity[:, other], tuning.sign_widths)
-            moved = [_hats(velocity[:, other], hats), smooth, _lags(observed, smooth[:, 2], memories)]
-            moved.append(_lags(observed, velocity[:, other], memories))
-            yield _standardise([(both, (place, f"position_{other + 1}"))], thirds)
-            yield _standardise([(columns, (theirs,)) for columns in moved], thirds)
+    banks = (loaded, [(_smooth_signs(load, tuning.sign_widths), (torque,))])
+    return tuple(_standardise([(runs.filtered(columns), names) for columns, names in bank]) for bank in banks)
 
 
-def _standardise(parts: Sequence[Part], thirds: NDArray[np.intp]) -> Features:
+def _standardise(parts: Sequence[Part]) -> Features:
     """Features of columns (rows, count) with the variables that they depend on; constant ones left out."""
     matrix = np.column_stack([columns for columns, _ in parts])
     names = [frozenset(variables) for columns, variables in parts for _ in range(columns.shape[1])]
@@ -203,9 +277,7 @@ def _standardise(parts: Sequence[Part], thirds: NDArray[np.intp]) -> Features:
     spread = matrix.std(axis=0)
     kept = spread > 1e-9
     chosen = tuple(name for name, wanted in zip(names, kept, strict=True) if wanted)
-    scaled = matrix[:, kept] / spread[kept]
-    grams = tuple(scaled[thirds == fold].T @ scaled[thirds == fold] for fold in range(3))
-    return Features(scaled, chosen, thirds, grams)
+    return Features(matrix[:, kept] / spread[kept], chosen)
 
 
 def _hats(values: Array, hats: int) -> Array:
@@ -235,31 +307,6 @@ def _smooth_signs(values: Array, widths: Sequence[float]) -> Array:
     return np.column_stack([np.tanh(values / (width * top)) for width in widths])
 
 
-def _turns(observed: Observed, joint: int, ways: Sequence[float]) -> Array:
-    """Signs of a joint's motion that turn over some way after a reversal (Dahl 1968), run by run, (rows, ways).
-
-    ways: of its travel. It is what hysteresis makes of the motion, however fast that is.
-    """
-    positions = [each.motion.position[:, joint] for each in observed.signals]
-    travel = max(max(float(np.ptp(each)) for each in positions), 1e-9)
-    parts = [
-        np.column_stack([dahl_state(position, way * travel) for way in ways])[each.filter.rows]
-        for position, each in zip(positions, observed.signals, strict=True)
-    ]
-    return np.concatenate(parts)
-
-
-def _lags(observed: Observed, values: Array, memories: Sequence[float]) -> Array:
-    """First-order lags of a signal, run by run. memories: time constants, s."""
-    lengths = np.cumsum([len(each.torque) for each in observed.signals])[:-1]
-    out = []
-    for memory in memories:
-        keep = float(np.exp(-1 / (memory * observed.rate_hz)))
-        parts = [lfilter([1 - keep], [1, -keep], part, zi=[keep * part[0]])[0] for part in np.split(values, lengths)]
-        out.append(np.concatenate(parts))
-    return np.column_stack(out)
-
-
 @dataclass(frozen=True, eq=False)
 class Structure:
     """What a surrogate predicts of a joint's residual.
@@ -279,66 +326,86 @@ class Structure:
 
 
 def predict_structure(
-    residual: Array, joint: int, made: Features, observed: Observed, tuning: SurrogateTuning
+    residual: Array, joint: int, made: FoldedFeatures, observed: Observed, tuning: SurrogateTuning
 ) -> Array:
     """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
-    products = tuple(made.values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
+    values = made.features.values
+    products = tuple(values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
     ridge, weights = best_ridge(made.grams, products, tuning.ridge_exponents)
-    predicted = made.values @ weights
+    predicted = values @ weights
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
     numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), made.folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
-    turned = errors_in_turn(made.values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
+    turned = errors_in_turn(values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
     inside = held_out_gain(residual[learn], turned, numbers[learn])
     gains = (validated, inside)
     sure = any(each.share > tuning.min_noise_gain and each.chance < tuning.noise_level for each in gains)
     return predicted if sure else np.zeros(len(residual))
 
 
-def find_structure(
-    residual: Array, joint: int, made: Features, noise: Noise, observed: Observed, tuning: SurrogateTuning
-) -> Structure:
-    """What the features predict of a residual (rows,) of a joint: whitened, or as it is.
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """What a fit leaves of the torque of a joint, (rows,), and of features that it is asked to be explained by."""
 
+    residual: Array
+    features: Features
+
+
+def find_structure(
+    learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
+) -> Structure:
+    """What features predict of what is left at a joint: whitened, or as it is.
+
+    learnt: by a fit of the identification rows, beside which validation runs are predicted. whole: by one of all rows,
+    beside which stretches are predicted in turn; where a fit of some rows is bad elsewhere, that is no structure.
     A slow structure that no surrogate foretold has passed for coloured noise, and whitening would hide it. As slow
     noise would pass for structure, it counts only if validation runs have it, too.
     """
     plain = replace(noise, taps=tuple(np.ones(1) for _ in noise.taps), scales=tuple(1.0 for _ in noise.taps))
-    whitened = _find_structure(residual, joint, made, noise, observed, tuning)
-    raw = _find_structure(residual, joint, made, plain, observed, tuning)
+    whitened = _find_structure(learnt, whole, joint, noise, observed, tuning)
+    raw = _find_structure(learnt, whole, joint, plain, observed, tuning)
     least = tuning.min_structure_gain
     ways = [whitened, raw] if raw.validation_gain > least else [whitened]
     return min(ways, key=lambda each: (each.gain <= least, each.p_value))
 
 
 def _find_structure(
-    residual: Array, joint: int, made: Features, noise: Noise, observed: Observed, tuning: SurrogateTuning
+    learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
 ) -> Structure:
     learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
     both = (*learn, *judge)
-    white, target = noise.whitened(made.values, joint, both), noise.whitened(residual[:, None], joint, both)[:, 0]
-    lost = noise.lost(joint)
-    known = np.arange(len(target)) < sum(each.stop - each.start - lost for each in learn)
+    lost, rows = noise.lost(joint), rows_in(judge, observed.rows)
     numbers = _stretch_numbers(both, lost, block_numbers(observed, tuning.fold_s, tuning.min_blocks))
-    grams, products, thirds = products_by_third(white, target, numbers % 3, known)
-    ridge, weights = best_ridge(grams, products, tuning.ridge_exponents)
     blocks = _stretch_numbers(both, lost, block_numbers(observed, tuning.block_s, tuning.min_blocks))
-    validated = held_out_gain(target[~known], target[~known] - white[~known] @ weights, blocks[~known])
-    all_grams, all_products, folds = products_by_third(white, target, thirds, np.ones(len(target), dtype=bool))
-    turned = errors_in_turn(white, target, folds, ridge, all_grams, all_products)
-    inside = held_out_gain(target, turned, blocks)
+    known = np.arange(len(blocks)) < sum(each.stop - each.start - lost for each in learn)
+
+    def white(left: Remainder) -> tuple[Array, Array]:
+        target = noise.whitened(left.residual[:, None], joint, both)[:, 0]
+        return noise.whitened(left.features.values, joint, both), target
+
+    columns, target = white(learnt)
+    grams, products, _ = products_by_third(columns, target, numbers % 3, known)
+    ridge, weights = best_ridge(grams, products, tuning.ridge_exponents)
+    validated = held_out_gain(target[~known], target[~known] - columns[~known] @ weights, blocks[~known])
+    all_columns, all_target = white(whole)
+    everything = np.ones(len(known), dtype=bool)
+    all_grams, all_products, folds = products_by_third(all_columns, all_target, numbers % 3, everything)
+    turned = errors_in_turn(all_columns, all_target, folds, ridge, all_grams, all_products)
+    inside = held_out_gain(all_target, turned, blocks)
     least = tuning.min_structure_gain
-    best = min((validated, inside), key=lambda gain: (gain.share <= least, gain.chance))
-    rows = rows_in(judge, observed.rows)
-    prediction = made.values @ weights
-    if best is inside:
-        prediction[rows] = predict_in_turn(made.values, rows, observed, ridge, all_grams, all_products, tuning)
-    power = float(np.mean(residual[rows] ** 2))
-    share = 1 - float(np.mean((residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
-    pair = (white[~known], target[~known]) if best is validated else (white, target)
+    if (inside.share <= least, inside.chance) < (validated.share <= least, validated.chance):
+        best, left, pair, sums = inside, whole, (all_columns, all_target), (all_grams, all_products)
+        used = np.ones(observed.rows, dtype=bool)
+        prediction = predict_in_turn(whole.features.values, used, observed, ridge, all_grams, all_products, tuning)
+    else:
+        best, left, pair, sums = validated, learnt, (columns[~known], target[~known]), (grams, products)
+        prediction = learnt.features.values @ weights
+    power = float(np.mean(left.residual[rows] ** 2))
+    share = 1 - float(np.mean((left.residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
     found: tuple[str, ...] = ()
     if best.share > least:
-        found = _important_variables(made, np.sum(grams, axis=0), np.sum(products, axis=0), pair, ridge, tuning)
+        gram, towards = (np.sum(parts, axis=0) for parts in sums)
+        found = _important_variables(left.features, gram, towards, pair, ridge, tuning)
     return Structure(joint, best.share, best.chance, validated.share, share, prediction, found)
 
 

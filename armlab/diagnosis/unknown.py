@@ -1,20 +1,22 @@
 """Structure that the library leaves: findings without a name, and names that it contradicts."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.blocks import rows_of_fit
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.fitted_model import FittedModel, initial_link_widths
+from armlab.diagnosis.fitted_model import FittedModel, initial_link_widths, torque_of
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim, Weighed
 from armlab.diagnosis.solver import State
-from armlab.diagnosis.surrogate import Structure, feature_banks, find_structure
+from armlab.diagnosis.surrogate import Features, Remainder, Structure, find_structure, load_banks
 from armlab.diagnosis.tuning import Tuning, UnknownTuning
 from armlab.effects.contract import UNKNOWN
+from armlab.recordings.recording import ROLES
 
 HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
 
@@ -30,27 +32,81 @@ def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Struct
     if widths is not None:
         widths = tuple(max(pair) for pair in zip(widths, initial_link_widths(model.design) or widths, strict=True))
     state = State(tuple(sorted({*model.state.groups, *usual})), widths)
-    residual = model.residual(model.solver.fit(state))
-    return tuple(_surest_structure(model, residual[:, joint], joint, noise) for joint in range(residual.shape[1]))
+    beside = replace(model, state=state)
+    load = _load(beside)
+    return tuple(_surest_structure(beside, joint, load[:, joint], noise) for joint in range(len(load.T)))
 
 
-def _surest_structure(model: FittedModel, residual: Array, joint: int, noise: Noise) -> Structure:
-    """What the surest surrogate predicts of a joint's residual (rows,), its p-value that of the best of all."""
-    observed, tuning = model.design.observed, model.design.settings.tuning.surrogate
-    few = feature_banks(observed, joint, observed.torque[:, joint] - residual, tuning)
-    features = (model.design.features[joint], *few)
-    tried = [find_structure(residual, joint, each, noise, observed, tuning) for each in features]
+def _load(model: FittedModel) -> Array:
+    """Torque of a model at all samples of all runs, (samples, joints), N m (N)."""
+    torque = torque_of(model)
+    return np.concatenate([torque(scene) for scene in model.design.scenes])
+
+
+def _surest_structure(model: FittedModel, joint: int, load: Array, noise: Noise) -> Structure:
+    """What the surest surrogate predicts of what a model leaves at a joint, its p-value that of the best of all."""
+    tuning = model.design.settings.tuning.surrogate
+    tried = _structures(model, joint, load, noise)
     best = min(tried, key=lambda each: (each.gain <= tuning.min_structure_gain, each.p_value))
     return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
 
 
+def _structures(model: FittedModel, joint: int, load: Array, noise: Noise) -> list[Structure]:
+    """What each surrogate predicts of what a model leaves at a joint. load: (samples,), torque of the model there."""
+    design, tuning, whole = model.design, model.design.settings.tuning.surrogate, _FitOfAll.of(model, joint)
+    banks = (*design.banks[joint], *load_banks(design.observed, joint, load, tuning))
+    return [
+        find_structure(Remainder(whole.residual, each), whole.remainder(each), joint, noise, design.observed, tuning)
+        for each in (design.features[joint].features, *banks)
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class _FitOfAll:
+    """A fit of a model's columns (rows, columns) to the identification rows, and to the validation rows of a joint.
+
+    residual: (rows,), what the fit of the identification rows leaves there. white: the columns of each role, whitened.
+    inverse: (columns, columns), the covariance of the parameters.
+    """
+
+    model: FittedModel
+    joint: int
+    rows: Array
+    residual: Array
+    white: tuple[Array, ...]
+    inverse: Array
+
+    @classmethod
+    def of(cls, model: FittedModel, joint: int) -> "_FitOfAll":
+        """What all rows say of the parameters of a model. joint: from 0."""
+        fit, observed = model.fit, model.design.observed
+        rows, residual = rows_of_fit(model.columns, fit, model.moments.lengths, joint)
+        white = tuple(model.noise.white(rows, joint, observed, role) for role in ROLES)
+        held = white[ROLES.index("validate")]
+        known = held @ fit.inverse
+        inverse = fit.inverse - known.T @ np.linalg.solve(np.eye(len(held)) + known @ held.T, known)  # Woodbury
+        return cls(model, joint, rows, residual, white, inverse)
+
+    def remainder(self, made: Features) -> Remainder:
+        """What it leaves of the torque and of features: less the columns times shares of them.
+
+        A fit takes from the torque what its columns share with a law that it lacks. What is left resembles the law
+        less than the part of the law that no column has (Frisch and Waugh 1933).
+        """
+        observed, noise = self.model.design.observed, self.model.noise
+        towards = np.zeros((len(self.inverse), made.values.shape[1]))
+        for own, role in zip(self.white, ROLES, strict=True):
+            towards += own.T @ noise.white(made.values, self.joint, observed, role)
+        held = noise.white(self.residual[:, None], self.joint, observed, "validate")[:, 0]
+        moved = self.inverse @ (self.white[ROLES.index("validate")].T @ held)
+        features = Features(made.values - self.rows @ (self.inverse @ towards), made.variables)
+        return Remainder(self.residual - self.rows @ moved, features)
+
+
 def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
     """What the best surrogate explains of what a state leaves at a joint (from 0): see `Structure.gain`."""
-    observed, tuning = model.design.observed, model.design.settings.tuning.surrogate
-    residual = model.residual_at(joint, model.solver.fit(state))
-    few = feature_banks(observed, joint, observed.torque[:, joint] - residual, tuning)
-    features = (model.design.features[joint], *few)
-    return max(find_structure(residual, joint, each, model.noise, observed, tuning).gain for each in features)
+    beside = replace(model, state=state)
+    return max(each.gain for each in _structures(beside, joint, _load(beside)[:, joint], model.noise))
 
 
 def is_structured(each: Structure, tuning: Tuning) -> bool:
