@@ -10,7 +10,7 @@ from itertools import combinations, islice
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
+from scipy.signal import bilinear, lfilter
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import block_numbers, held_out_gain
@@ -161,6 +161,21 @@ class WholeRuns:
         parts = [np.column_stack([dahl_state(each, way * travel) for way in ways]) for each in positions]
         return np.concatenate(parts)
 
+    def swings(self, drive: Array, tuning: SurrogateTuning) -> Array:
+        """Deflection and speed of damped springs that a signal (samples,) drives, (samples, features), run by run.
+
+        It is what anything that swings makes of the motion: a liquid, a hose, a base that gives way.
+        """
+        rate, out = self.observed.signals[0].run.rate_hz, []
+        fastest = min(tuning.fastest_swing_hz, tuning.max_swing_share * rate)
+        for frequency in np.geomspace(fastest / tuning.swing_range, fastest, tuning.swings):
+            turn = 2 * rate * np.tan(np.pi * frequency / rate)  # the bilinear transform moves it to the frequency
+            spring = [1, 2 * tuning.swing_damping * turn, turn**2]
+            for driven in ([turn**2], [turn, 0]):
+                taps = bilinear(driven, spring, rate)
+                out.append(np.concatenate([lfilter(*taps, part - part[0]) for part in self.split(drive)]))
+        return np.column_stack(out)
+
 
 def whole_runs(observed: Observed) -> WholeRuns:
     """The samples of all runs."""
@@ -265,7 +280,8 @@ def load_banks(observed: Observed, joint: int, load: Array, tuning: SurrogateTun
         (load[:, None] * _hats(own, hats), (torque, speed)),
         (turn * _hats(load, hats), (torque, speed)),
     ]
-    banks = (loaded, [(_smooth_signs(load, tuning.sign_widths), (torque,))])
+    about_zero, swung = _smooth_signs(load, tuning.sign_widths), runs.swings(load, tuning)
+    banks = (loaded, [(about_zero, (torque,))], [(swung, (torque,))])
     return tuple(_standardise([(runs.filtered(columns), names) for columns, names in bank]) for bank in banks)
 
 

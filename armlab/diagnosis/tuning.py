@@ -406,7 +406,7 @@ class SurrogateTuning:
     )
     fold_s: float = tuned(2.0, unit="s", meaning="length of the stretches that choose the ridge in turn", least=1e-3)
     block_s: float = tuned(
-        1.0, unit="s", meaning="length of the stretches that are compared on held-out data", least=1e-3
+        0.5, unit="s", meaning="length of the stretches that are compared on held-out data", least=1e-3
     )
     min_blocks: int = tuned(12, unit="stretches", meaning="least number of these stretches", least=3)
     hats: int = tuned(8, unit="functions", meaning="piecewise linear functions of a variable", least=3)
@@ -445,6 +445,13 @@ class SurrogateTuning:
         meaning="lags of signs and velocities, for what depends on the way since a reversal",
         least=1e-6,
     )
+    fastest_swing_hz: float = tuned(25.0, unit="Hz", meaning="fastest of the springs that a load drives", least=1e-3)
+    max_swing_share: float = tuned(
+        0.25, unit="of the sampling rate", meaning="fastest of them where samples are few", least=0.01, most=0.45
+    )
+    swing_range: float = tuned(50.0, meaning="fastest of them over slowest", least=1.1)
+    swings: int = tuned(14, unit="springs", meaning="how many of them, in equal ratios", least=2)
+    swing_damping: float = tuned(0.12, meaning="their damping ratio: each answers as far as the next one", least=1e-6)
     min_noise_gain: float = tuned(
         0.02, unit="of the held-out error", meaning="gain of a prediction that is taken out of the noise"
     )

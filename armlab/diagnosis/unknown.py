@@ -53,7 +53,7 @@ def _surest_structure(model: FittedModel, joint: int, load: Array, noise: Noise)
 
 def _structures(model: FittedModel, joint: int, load: Array, noise: Noise) -> list[Structure]:
     """What each surrogate predicts of what a model leaves at a joint. load: (samples,), torque of the model there."""
-    design, tuning, whole = model.design, model.design.settings.tuning.surrogate, _FitOfAll.of(model, joint)
+    design, tuning, whole = model.design, model.design.settings.tuning.surrogate, FitOfAll.of(model, joint)
     banks = (*design.banks[joint], *load_banks(design.observed, joint, load, tuning))
     return [
         find_structure(Remainder(whole.residual, each), whole.remainder(each), joint, noise, design.observed, tuning)
@@ -62,7 +62,7 @@ def _structures(model: FittedModel, joint: int, load: Array, noise: Noise) -> li
 
 
 @dataclass(frozen=True, eq=False)
-class _FitOfAll:
+class FitOfAll:
     """A fit of a model's columns (rows, columns) to the identification rows, and to the validation rows of a joint.
 
     residual: (rows,), what the fit of the identification rows leaves there. white: the columns of each role, whitened.
@@ -77,7 +77,7 @@ class _FitOfAll:
     inverse: Array
 
     @classmethod
-    def of(cls, model: FittedModel, joint: int) -> "_FitOfAll":
+    def of(cls, model: FittedModel, joint: int) -> "FitOfAll":
         """What all rows say of the parameters of a model. joint: from 0."""
         fit, observed = model.fit, model.design.observed
         rows, residual = rows_of_fit(model.columns, fit, model.moments.lengths, joint)

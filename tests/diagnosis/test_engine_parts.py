@@ -1,20 +1,34 @@
 """The parts of the engine: whitening, fits of subsets, robust covariance, links' widths, surrogates."""
 
+from dataclasses import replace
+
 import engine_cases as cases
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import link_prior
-from armlab.diagnosis.noise import error_colours, fit_noise
+from armlab.diagnosis.noise import Noise, error_colours, fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import read_simulation
 from armlab.diagnosis.solver import Solver, State
-from armlab.diagnosis.surrogate import feature_banks, find_structure, flexible_features
+from armlab.diagnosis.surrogate import (
+    Features,
+    Remainder,
+    Structure,
+    find_structure,
+    flexible_features,
+    load_banks,
+    motion_banks,
+    whole_runs,
+)
 from armlab.diagnosis.tuning import Tuning
+from armlab.diagnosis.unknown import FitOfAll
 from armlab.effects.library import library
 from armlab.effects.memory import dahl_state
 from problem.base_parameters import base_parameters
@@ -142,16 +156,27 @@ def test_parts_are_the_long_stretches_where_a_joint_moves() -> None:
     assert [(each.start, each.stop) for each in found] == [(10, 90), (121, 190)]
 
 
+def filtered(values: Array, observed: Observed) -> Array:
+    """A signal of all samples (samples,) through the filter of the torque, (rows,)."""
+    return whole_runs(observed).filtered(values[:, None])[:, 0]
+
+
+def structure_of(left: Array, joint: int, made: Features, noise: Noise, observed: Observed) -> Structure:
+    """What features predict of a signal (rows,) that no model has been fitted to. joint: from 0."""
+    remainder = Remainder(left, made)
+    return find_structure(remainder, remainder, joint, noise, observed, TUNING.surrogate)
+
+
 def test_a_surrogate_finds_structure_of_other_joints_and_none_in_noise(observed: Observed) -> None:
     rng = np.random.default_rng(1)
     made = flexible_features(observed, 0, rng, TUNING.surrogate)
     noise_only = 0.05 * rng.standard_normal((observed.rows, 3))
     noise = fit_noise(noise_only, observed, 0.0, TUNING.noise)
     wave = np.sin(3 * observed.kept("position")[:, 2]) * 0.2
-    found = find_structure(noise_only[:, 0] + wave, 0, made, noise, observed, TUNING.surrogate)
+    found = structure_of(noise_only[:, 0] + wave, 0, made, noise, observed)
     assert found.gain > 0.5
     assert "position_3" in found.depends_on
-    assert find_structure(noise_only[:, 0], 0, made, noise, observed, TUNING.surrogate).gain < 0.05
+    assert structure_of(noise_only[:, 0], 0, made, noise, observed).gain < 0.05
 
 
 def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed) -> None:
@@ -159,28 +184,57 @@ def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed)
     rng = np.random.default_rng(2)
     left = 0.05 * rng.standard_normal(observed.rows)
     noise = fit_noise(np.column_stack([left] * 3), observed, 0.0, TUNING.noise)
-    load = np.sin(2 * observed.kept("position")[:, 2]) + observed.kept("acceleration")[:, 1] / 10
-    weak = 0.02 * load * observed.kept("velocity")[:, 1] ** 2
-    banks = list(feature_banks(observed, 1, load, TUNING.surrogate))
-    found = [find_structure(left + weak, 1, each, noise, observed, TUNING.surrogate) for each in banks]
+    motions = [each.motion for each in observed.signals]
+    load = np.concatenate([np.sin(2 * each.position[:, 2]) + each.acceleration[:, 1] / 10 for each in motions])
+    weak = 0.02 * load * np.concatenate([each.velocity[:, 1] for each in motions]) ** 2
+    banks = [*motion_banks(observed, 1, TUNING.surrogate), *load_banks(observed, 1, load, TUNING.surrogate)]
+    found = [structure_of(left + filtered(weak, observed), 1, each, noise, observed) for each in banks]
     best = max(found, key=lambda each: each.gain)
     assert best.gain > 0.2
     assert best.p_value < 0.05
     assert set(best.depends_on) <= {"torque_2", "velocity_2"}
-    chance = [find_structure(left, 1, each, noise, observed, TUNING.surrogate) for each in banks]
+    chance = [structure_of(left, 1, each, noise, observed) for each in banks]
     assert min(each.p_value for each in chance) * len(chance) > 0.1
 
 
 def test_hysteresis_of_another_joint_is_found_at_any_speed(observed: Observed) -> None:
     left = 0.05 * np.random.default_rng(4).standard_normal(observed.rows)
     noise = fit_noise(np.column_stack([left] * 3), observed, 0.0, TUNING.noise)
-    turned = [dahl_state(each.motion.position[:, 2], 0.2)[each.filter.rows] for each in observed.signals]
-    hose = 0.05 * np.concatenate(turned)
-    banks = feature_banks(observed, 0, np.zeros(observed.rows), TUNING.surrogate)
-    found = [find_structure(left + hose, 0, each, noise, observed, TUNING.surrogate) for each in banks]
+    hose = filtered(
+        np.concatenate([dahl_state(each.motion.position[:, 2], 0.2) for each in observed.signals]), observed
+    )
+    banks = motion_banks(observed, 0, TUNING.surrogate)
+    found = [structure_of(left + 0.05 * hose, 0, each, noise, observed) for each in banks]
     best = min(found, key=lambda each: each.p_value)
     assert best.depends_on == ("velocity_3",)
     assert best.gain > 0.3
+
+
+def test_what_jumps_with_the_load_passes_the_filter_of_the_torque(observed: Observed) -> None:
+    """A dead zone of the current that is smaller than the load: a sign of the load, rounded by the filter."""
+    load = np.concatenate([np.sin(9 * each.motion.position[:, 2]) for each in observed.signals])
+    jumps = filtered(np.sign(load), observed)
+    about_zero = load_banks(observed, 1, load, TUNING.surrogate)[1].values
+    left = jumps - about_zero @ np.linalg.lstsq(about_zero, jumps, rcond=None)[0]
+    assert np.var(left) < 0.01 * np.var(jumps)
+
+
+def test_a_law_that_columns_share_with_it_is_found_beside_them(bench: DesignMatrix) -> None:
+    """Friction columns take a part of a cube of the velocity; what is left resembles the rest of the cube."""
+    observed = bench.observed
+    rng = np.random.default_rng(5)
+    cube = filtered(np.concatenate([each.motion.velocity[:, 0] ** 3 for each in observed.signals]), observed)
+    torque = np.zeros((observed.rows, 3))
+    torque[:, 0] = 0.3 * cube
+    noisy = replace(bench, target=torque + 0.02 * rng.standard_normal(torque.shape))
+    noise = fit_noise(noisy.target - torque, observed, 0.0, TUNING.noise)
+    moments, solver = noisy.solver(noise)
+    model = FittedModel(noisy, noise, moments, solver, State(tuple(range(len(solver.groups))), (0.0, 0.0, 0.0)))
+    residual = model.residual_at(0, model.fit)
+    assert np.var(residual) < 0.5 * np.var(torque[:, 0])
+    beside = FitOfAll.of(model, 0).remainder(Features(cube[:, None], (frozenset({"velocity_1"}),)))
+    alone = np.corrcoef(residual, cube)[0, 1]
+    assert np.corrcoef(beside.residual, beside.features.values[:, 0])[0, 1] > 2 * alone
 
 
 def test_a_gain_in_few_stretches_is_sure_but_in_one_alone_is_not() -> None:

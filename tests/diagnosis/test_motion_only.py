@@ -26,6 +26,7 @@ from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
+from armlab.diagnosis.motion.payload import JointModel, estimate_mass
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
@@ -562,6 +563,20 @@ def test_a_payload_at_the_tool_loads_arm_and_model_alike(soft: Path) -> None:
     )
     assert sum(model.body_mass) == pytest.approx(0.65)
     assert not simulation.with_payload(-1.0).is_physical()
+
+
+def test_a_joint_that_does_not_carry_the_tool_says_nothing_of_a_mass_there(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[1]
+    values, free = NEUTRAL.copy(), np.zeros(len(NEUTRAL), dtype=bool)
+    values[place("kp")] = TRUTH["kp"]
+    carrying = JointModel(windows, values, free)
+    rounding = 1e-18 * np.ones_like(windows.unit_load)
+    upright = JointModel(replace(windows, unit_load=rounding, unit_inertia=rounding), values, free)
+    alone = estimate_mass([carrying], DEFAULT)
+    assert alone[1] > 1e-6
+    assert estimate_mass([upright, carrying], DEFAULT) == alone
+    assert estimate_mass([upright], DEFAULT) == (0.0, np.inf)
 
 
 def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:

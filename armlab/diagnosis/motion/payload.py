@@ -166,9 +166,9 @@ def find_payload(fit: ArmFit, models: Sequence[JointModel | None]) -> Payload | 
 
 
 def estimate_mass(joints: Sequence[JointModel], tuning: MotionTuning) -> tuple[float, float]:
-    """A mass at the tool beside that of the windows, and its standard error, kg; infinite where no joint tells."""
+    """A mass at the tool beside that of the windows, and its standard error, kg; infinite where no joint carries it."""
     weights, masses = [], []
-    for joint in joints:
+    for joint in (each for each in joints if _carries_tool(each.windows)):
         free = joint.free.copy()
         free[place("payload")] = True
         found = fit_servo(joint.windows, joint.values, free, tuning.refit_evaluations)

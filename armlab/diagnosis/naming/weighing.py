@@ -33,6 +33,7 @@ from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
 Place = int | None  # a joint or link, from 1; None for the whole robot
 Kind = Literal["found", "left", "structure"]
 LEAST_GAIN = 0.02  # of the held-out error, where gains are compared as ratios
+MOST_BENT = 30.0  # log likelihood; beyond it a law is certain to bend
 MOST_COLOUR = 1.0  # of errors, a logarithm; beyond, the rate of samples says more than the arm does
 
 
@@ -56,7 +57,7 @@ class _Trial:
 
 def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> Weighed:
     """The names of an effect of a model. claimed: all its effects; left: structure of its joints."""
-    evidence, without, best = claimed[group], model.state.minus(group), model.fit.score
+    evidence, without = claimed[group], model.state.minus(group)
     candidate = model.solver.groups[group].candidate
     trials = list(_in_place(model, without, group, beside=model.state))
     trials += _other_friction(model, without, group)
@@ -68,8 +69,8 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
         none["found usual"] = 1.0
     else:
         none["found flexible"] = _flexible_ratio(model, without, evidence)
-        best += _bent_gain(model, without, group)
-    return _weighed("found", trials, none, candidate.joint, candidate.joints, model, best)
+        none["found bent"] = min(_bent_gain(model, without, group), MOST_BENT) / 10
+    return _weighed("found", trials, none, candidate.joint, candidate.joints, model)
 
 
 def weigh_link(
@@ -136,15 +137,14 @@ def _weighed(
     joint: Place,
     joints: tuple[int, ...],
     model: FittedModel,
-    nameless: float = -np.inf,
 ) -> Weighed:
-    """Each name once, by its likeliest law, and none of them. nameless: the score of a law that has no name."""
+    """Each name once, by its likeliest law, and none of them."""
     ordered = sorted(trials, key=lambda each: (not each.own, -each.score))
     known: dict[tuple[str, Place], _Trial] = {}
     for each in ordered:
         if kind == "found" or each.score > model.fit.score:
             known.setdefault((each.effect, each.joint), each)
-    best = max((*(each.score for each in known.values()), nameless))
+    best = max((each.score for each in known.values()), default=0.0)
     names = [
         WeighedName(each.effect, each.joint, each.joints, _for_name(kind, each, best, model.fit.score))
         for each in known.values()
