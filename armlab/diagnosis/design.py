@@ -18,12 +18,13 @@ from armlab.diagnosis.columns import (
     stack_columns,
 )
 from armlab.diagnosis.data import Observed
+from armlab.diagnosis.features import Features
 from armlab.diagnosis.links import LinkPrior
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.solver import Solver
-from armlab.diagnosis.surrogate import Features, FoldedFeatures
+from armlab.diagnosis.surrogate import FoldedFeatures
 from armlab.effects.contract import Candidate, Family, Scene
 from armlab.effects.scene import scene_of
 from armlab.recordings.differentiate import Signals

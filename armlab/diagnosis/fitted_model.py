@@ -10,12 +10,13 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import Folds, split_folds, whitened_rows
 from armlab.diagnosis.columns import Columns, Moments
 from armlab.diagnosis.design import DesignMatrix
+from armlab.diagnosis.features import flexible_features, motion_banks
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.noise import Noise, choose_noise, error_colours, fit_noise
 from armlab.diagnosis.refine import prior_precision, refine_shapes
 from armlab.diagnosis.search import Search, Step, background_state
 from armlab.diagnosis.solver import Fit, Solver, State
-from armlab.diagnosis.surrogate import flexible_features, fold_features, motion_banks, predict_structure
+from armlab.diagnosis.surrogate import fold_features, predict_structure
 from armlab.effects.contract import Family, Scene
 from armlab.effects.model import FittedEffect, torque_in_mechanism
 from problem.regressor import rigid_body_torque

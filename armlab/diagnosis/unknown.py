@@ -9,11 +9,12 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import rows_of_fit
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.features import Features, load_banks
 from armlab.diagnosis.fitted_model import FittedModel, initial_link_widths, torque_of
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim, Weighed
 from armlab.diagnosis.solver import State
-from armlab.diagnosis.surrogate import Features, Remainder, Structure, find_structure, load_banks
+from armlab.diagnosis.surrogate import Remainder, Structure, find_structure
 from armlab.diagnosis.tuning import Tuning, UnknownTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.recordings.recording import ROLES

@@ -11,22 +11,14 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
+from armlab.diagnosis.features import Features, flexible_features, load_banks, motion_banks, whole_runs
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.noise import Noise, error_colours, fit_noise
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import read_simulation
 from armlab.diagnosis.solver import Solver, State
-from armlab.diagnosis.surrogate import (
-    Features,
-    Remainder,
-    Structure,
-    find_structure,
-    flexible_features,
-    load_banks,
-    motion_banks,
-    whole_runs,
-)
+from armlab.diagnosis.surrogate import Remainder, Structure, find_structure
 from armlab.diagnosis.tuning import Tuning
 from armlab.diagnosis.unknown import FitOfAll
 from armlab.effects.library import library
