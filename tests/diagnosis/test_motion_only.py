@@ -20,7 +20,7 @@ from armlab.diagnosis.motion.choose import choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, split_runs
+from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, replays_as_well, split_runs
 from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
 from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
@@ -563,6 +563,17 @@ def test_a_payload_at_the_tool_loads_arm_and_model_alike(soft: Path) -> None:
     )
     assert sum(model.body_mass) == pytest.approx(0.65)
     assert not simulation.with_payload(-1.0).is_physical()
+
+
+def test_a_mass_is_refused_by_replays_that_are_worse_with_short_steps_too(diagnosis: MotionDiagnosis) -> None:
+    assert diagnosis.servos is not None
+    off = tuple(replace(each, position=each.position + 0.1) for each in diagnosis.replayed_after)
+    assert replays_as_well(replace(diagnosis, replayed_after=off), diagnosis, DEFAULT)
+    stiffer = Servos(diagnosis.servos.values.copy())
+    stiffer.values[:, place("kp")] *= 2
+    worse = replace(diagnosis, replayed_after=off, servos=stiffer)
+    assert not replays_as_well(worse, diagnosis, DEFAULT)
+    assert not replays_as_well(replace(worse, servos=None), diagnosis, DEFAULT)
 
 
 def test_a_joint_that_does_not_carry_the_tool_says_nothing_of_a_mass_there(soft: Path) -> None:
