@@ -103,6 +103,7 @@ class Effect:
     nothing is known. single_event: it happens once, in one stretch of one run, and no other data repeat it.
     scanned: its places are found by a scan of the residual, not by columns alone.
     in_links: the links of a model hold it, so that it is no term beside them.
+    scales_torque: it is a scale by which torque is read; one that bends looks like it, and has no name.
     axis: the variable against which a figure shows it; `cycle` is the position within one wave, of which a parameter
     `order` says how many there are in a turn.
     experiment: the next experiment that separates it from its rivals.
@@ -130,6 +131,7 @@ class Effect:
     single_event: bool = False
     scanned: bool = False
     in_links: bool = False
+    scales_torque: bool = False
     axis: Literal["velocity", "position", "acceleration", "time", "cycle", ""] = ""
     experiment: str = ""
     origin: Cause | None = None

@@ -31,6 +31,7 @@ TORQUE_GAIN_FACTS = Effect(
     figures="factor {gain}",
     law=r"\tau_{\text{recorded},j} = \text{gain} \; \tau_j",
     prior_scale=0.2,
+    scales_torque=True,
     experiment="record the motion with and without a payload of known mass",
 )
 TORQUE_OFFSET_FACTS = Effect(

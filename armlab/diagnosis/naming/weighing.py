@@ -69,7 +69,8 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
         none["found usual"] = 1.0
     else:
         none["found flexible"] = _flexible_ratio(model, without, evidence)
-        none["found bent"] = min(_bent_gain(model, without, group), MOST_BENT) / 10
+        if candidate.facts.scales_torque:
+            none["found bent"] = min(_bent_gain(model, without, group), MOST_BENT) / 10
     return _weighed("found", trials, none, candidate.joint, candidate.joints, model)
 
 
@@ -230,9 +231,9 @@ def _flexible_ratio(model: FittedModel, without: State, evidence: Evidence) -> f
 
 
 def _bent_gain(model: FittedModel, without: State, group: int) -> float:
-    """By how much a law that bends raises the log likelihood more than one of the library does in whose place it is.
+    """By how much a scale that bends raises the log likelihood more than the scale of the library in whose place it is.
 
-    It is the square of the law's own torque, with its sign or without: what a scale that is not straight makes of it.
+    It is the square of that law's own torque, with its sign or without.
     """
     joint, law = model.solver.groups[group].candidate.rows[0], np.zeros(model.moments.size)
     law[model.solver.groups[group].columns] = model.solver.values(model.fit, group)
