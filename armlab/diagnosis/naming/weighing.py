@@ -57,7 +57,7 @@ class _Trial:
 
 def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence], left: Sequence[Structure]) -> Weighed:
     """The names of an effect of a model. claimed: all its effects; left: structure of its joints."""
-    evidence, without = claimed[group], model.state.minus(group)
+    evidence, without, bent = claimed[group], model.state.minus(group), 0.0
     candidate = model.solver.groups[group].candidate
     trials = list(_in_place(model, without, group, beside=model.state))
     trials += _other_friction(model, without, group)
@@ -70,8 +70,9 @@ def weigh_effect(model: FittedModel, group: int, claimed: Mapping[int, Evidence]
     else:
         none["found flexible"] = _flexible_ratio(model, without, evidence)
         if candidate.facts.scales_torque:
-            none["found bent"] = min(_bent_gain(model, without, group), MOST_BENT) / 10
-    return _weighed("found", trials, none, candidate.joint, candidate.joints, model)
+            bent = _bent_gain(model, without, group)
+            none["found bent"] = float(np.log1p(min(bent, MOST_BENT)))
+    return _weighed("found", trials, none, candidate.joint, candidate.joints, model, model.fit.score + bent)
 
 
 def weigh_link(
@@ -138,14 +139,15 @@ def _weighed(
     joint: Place,
     joints: tuple[int, ...],
     model: FittedModel,
+    nameless: float = -np.inf,
 ) -> Weighed:
-    """Each name once, by its likeliest law, and none of them."""
+    """Each name once, by its likeliest law, and none of them. nameless: the score of a law that has no name."""
     ordered = sorted(trials, key=lambda each: (not each.own, -each.score))
     known: dict[tuple[str, Place], _Trial] = {}
     for each in ordered:
         if kind == "found" or each.score > model.fit.score:
             known.setdefault((each.effect, each.joint), each)
-    best = max((each.score for each in known.values()), default=0.0)
+    best = max((*(each.score for each in known.values()), nameless))
     names = [
         WeighedName(each.effect, each.joint, each.joints, _for_name(kind, each, best, model.fit.score))
         for each in known.values()
