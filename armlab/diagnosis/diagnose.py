@@ -237,9 +237,10 @@ def name_effects(pruned: Pruned) -> NamedEffects:
     tuning = model.design.settings.tuning
     if not model.design.settings.guards.unknown:
         return NamedEffects(model, effects, links, ())
-    left = predict_residual_structure(model, fit_coloured_noise(model))
-    while doubtful := names_contradicted_by_residual(effects, left, tuning):
-        contradicted = withdraw(model, doubtful, "what is left at its joint is no less structured")
+    left, withdrawn = predict_residual_structure(model, fit_coloured_noise(model)), frozenset[int]()
+    while doubtful := names_contradicted_by_residual(effects, left, tuning) - withdrawn:
+        withdrawn |= doubtful
+        contradicted = withdraw(model, doubtful, "what is left at its joint is no less structured", withdrawn)
         model, effects, links = withdraw_implausible(contradicted)
         left = predict_residual_structure(model, fit_coloured_noise(model))
     wrong = names_contradicted_by_residual(links, left, tuning)

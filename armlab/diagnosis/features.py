@@ -174,10 +174,21 @@ def motion_banks(observed: Observed, joint: int, tuning: SurrogateTuning) -> tup
     return tuple(out)
 
 
-def load_banks(observed: Observed, joint: int, load: Array, tuning: SurrogateTuning) -> tuple[Features, ...]:
-    """The same of dependence on the load. load: torque of the model at the joint, (samples,) of all runs, N m."""
+@dataclass(frozen=True, eq=False)
+class Load:
+    """Torque of a model at all samples of all runs, (samples, joints), N m (N). bodies: of its rigid bodies alone."""
+
+    torque: Array
+    bodies: Array
+
+
+def load_banks(observed: Observed, joint: int, loads: Load, tuning: SurrogateTuning) -> tuple[Features, ...]:
+    """The same of dependence on the load of a joint (from 0).
+
+    What swings is driven by the bodies: friction acts between two neighbours, inside of what swings.
+    """
     torque, speed = f"torque_{joint + 1}", f"velocity_{joint + 1}"
-    runs, hats = whole_runs(observed), tuning.hats
+    runs, hats, load = whole_runs(observed), tuning.hats, loads.torque[:, joint]
     own = runs.velocity[:, joint]
     turn = _smooth_signs(own, tuning.sign_widths)[:, 2:3]
     loaded = [
@@ -185,7 +196,7 @@ def load_banks(observed: Observed, joint: int, load: Array, tuning: SurrogateTun
         (load[:, None] * _hats(own, hats), (torque, speed)),
         (turn * _hats(load, hats), (torque, speed)),
     ]
-    about_zero, swung = _smooth_signs(load, tuning.sign_widths), runs.swings(load, tuning)
+    about_zero, swung = _smooth_signs(load, tuning.sign_widths), runs.swings(loads.bodies[:, joint], tuning)
     banks = (loaded, [(about_zero, (torque,))], [(swung, (torque,))])
     return tuple(_standardise([(runs.filtered(columns), names) for columns, names in bank]) for bank in banks)
 

@@ -83,8 +83,11 @@ def _search_again(model: FittedModel, banned: frozenset[int], fixed: bool) -> Fi
     return replace(model, state=state, steps=tuple(steps))
 
 
-def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
-    """The same without some groups, and without what no longer passes; usual friction in the place of special laws."""
+def withdraw(model: FittedModel, groups: frozenset[int], why: str, before: frozenset[int] = frozenset()) -> Pruned:
+    """The same without some groups, and without what no longer passes; usual friction in the place of special laws.
+
+    before: groups that were withdrawn earlier; nor do they come back.
+    """
     judge, steps = Judge(model, model.state), list(model.steps)
     for group in groups:
         candidate = model.solver.groups[group].candidate
@@ -92,7 +95,7 @@ def withdraw(model: FittedModel, groups: frozenset[int], why: str) -> Pruned:
     back = {other for group in groups for other in judge.in_place_of(group)}
     state = State(tuple(sorted(set(model.state.groups) - groups | back)), model.state.widths)
     less = replace(model, state=state, steps=tuple(steps))
-    return _settle_links(_remove_failing(less, groups | other_bodies(model)))
+    return _settle_links(_remove_failing(less, groups | before | other_bodies(model)))
 
 
 def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:

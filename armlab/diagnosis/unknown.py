@@ -9,8 +9,8 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import rows_of_fit
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.features import Features, load_banks
-from armlab.diagnosis.fitted_model import FittedModel, initial_link_widths, torque_of
+from armlab.diagnosis.features import Features, Load, load_banks
+from armlab.diagnosis.fitted_model import FittedModel, inertial_parameters, initial_link_widths, torque_of
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim, Weighed
 from armlab.diagnosis.solver import State
@@ -18,6 +18,7 @@ from armlab.diagnosis.surrogate import Remainder, Structure, find_structure
 from armlab.diagnosis.tuning import Tuning, UnknownTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.recordings.recording import ROLES
+from problem.regressor import rigid_body_torque
 
 HELD_OUT_WAYS = 2  # that held-out data are taken: validation runs, and identification stretches in turn
 
@@ -35,16 +36,17 @@ def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Struct
     state = State(tuple(sorted({*model.state.groups, *usual})), widths)
     beside = replace(model, state=state)
     load = _load(beside)
-    return tuple(_surest_structure(beside, joint, load[:, joint], noise) for joint in range(len(load.T)))
+    return tuple(_surest_structure(beside, joint, load, noise) for joint in range(model.design.observed.joints))
 
 
-def _load(model: FittedModel) -> Array:
-    """Torque of a model at all samples of all runs, (samples, joints), N m (N)."""
-    torque = torque_of(model)
-    return np.concatenate([torque(scene) for scene in model.design.scenes])
+def _load(model: FittedModel) -> Load:
+    """The load of all joints by a model."""
+    torque, inertial, scenes = torque_of(model), inertial_parameters(model), model.design.scenes
+    bodies = [rigid_body_torque(each.arm, each.motion, inertial) for each in scenes]
+    return Load(np.concatenate([torque(each) for each in scenes]), np.concatenate(bodies))
 
 
-def _surest_structure(model: FittedModel, joint: int, load: Array, noise: Noise) -> Structure:
+def _surest_structure(model: FittedModel, joint: int, load: Load, noise: Noise) -> Structure:
     """What the surest surrogate predicts of what a model leaves at a joint, its p-value that of the best of all."""
     tuning = model.design.settings.tuning.surrogate
     tried = _structures(model, joint, load, noise)
@@ -52,8 +54,8 @@ def _surest_structure(model: FittedModel, joint: int, load: Array, noise: Noise)
     return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
 
 
-def _structures(model: FittedModel, joint: int, load: Array, noise: Noise) -> list[Structure]:
-    """What each surrogate predicts of what a model leaves at a joint. load: (samples,), torque of the model there."""
+def _structures(model: FittedModel, joint: int, load: Load, noise: Noise) -> list[Structure]:
+    """What each surrogate predicts of what a model leaves at a joint."""
     design, tuning, whole = model.design, model.design.settings.tuning.surrogate, FitOfAll.of(model, joint)
     banks = (*design.banks[joint], *load_banks(design.observed, joint, load, tuning))
     return [
@@ -107,7 +109,7 @@ class FitOfAll:
 def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
     """What the best surrogate explains of what a state leaves at a joint (from 0): see `Structure.gain`."""
     beside = replace(model, state=state)
-    return max(each.gain for each in _structures(beside, joint, _load(beside)[:, joint], model.noise))
+    return max(each.gain for each in _structures(beside, joint, _load(beside), model.noise))
 
 
 def is_structured(each: Structure, tuning: Tuning) -> bool:

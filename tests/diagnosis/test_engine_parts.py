@@ -11,7 +11,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
-from armlab.diagnosis.features import Features, flexible_features, load_banks, motion_banks, whole_runs
+from armlab.diagnosis.features import Features, Load, flexible_features, load_banks, motion_banks, whole_runs
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.noise import Noise, error_colours, fit_noise
@@ -177,8 +177,9 @@ def test_a_small_family_finds_what_drowns_among_all_features(observed: Observed)
     left = 0.05 * rng.standard_normal(observed.rows)
     noise = fit_noise(np.column_stack([left] * 3), observed, 0.0, TUNING.noise)
     motions = [each.motion for each in observed.signals]
-    load = np.concatenate([np.sin(2 * each.position[:, 2]) + each.acceleration[:, 1] / 10 for each in motions])
-    weak = 0.02 * load * np.concatenate([each.velocity[:, 1] for each in motions]) ** 2
+    torque = np.concatenate([np.sin(2 * each.position[:, [2]]) + each.acceleration[:, [1]] / 10 for each in motions])
+    load = Load(np.tile(torque, 3), np.tile(torque, 3))
+    weak = 0.02 * torque[:, 0] * np.concatenate([each.velocity[:, 1] for each in motions]) ** 2
     banks = [*motion_banks(observed, 1, TUNING.surrogate), *load_banks(observed, 1, load, TUNING.surrogate)]
     found = [structure_of(left + filtered(weak, observed), 1, each, noise, observed) for each in banks]
     best = max(found, key=lambda each: each.gain)
@@ -204,11 +205,30 @@ def test_hysteresis_of_another_joint_is_found_at_any_speed(observed: Observed) -
 
 def test_what_jumps_with_the_load_passes_the_filter_of_the_torque(observed: Observed) -> None:
     """A dead zone of the current that is smaller than the load: a sign of the load, rounded by the filter."""
-    load = np.concatenate([np.sin(9 * each.motion.position[:, 2]) for each in observed.signals])
-    jumps = filtered(np.sign(load), observed)
+    torque = np.concatenate([np.sin(9 * each.motion.position[:, [2]]) for each in observed.signals])
+    load = Load(np.tile(torque, 3), np.zeros((len(torque), 3)))
+    jumps = filtered(np.sign(torque[:, 0]), observed)
     about_zero = load_banks(observed, 1, load, TUNING.surrogate)[1].values
     left = jumps - about_zero @ np.linalg.lstsq(about_zero, jumps, rcond=None)[0]
     assert np.var(left) < 0.01 * np.var(jumps)
+
+
+def test_what_swings_is_driven_by_the_bodies_and_not_by_friction(observed: Observed) -> None:
+    speeds = np.concatenate([each.motion.velocity for each in observed.signals])
+    bodies = np.concatenate([np.sin(2 * each.motion.position) for each in observed.signals])
+    with_friction, without = (
+        load_banks(observed, 1, Load(bodies + 3 * jumps, bodies), TUNING.surrogate) for jumps in (np.sign(speeds), 0)
+    )
+    np.testing.assert_array_equal(with_friction[2].values, without[2].values)
+    assert not np.array_equal(with_friction[1].values, without[1].values)
+
+
+def test_features_of_a_joint_that_carries_nothing_find_nothing(observed: Observed) -> None:
+    rng = np.random.default_rng(3)
+    left = 0.05 * rng.standard_normal((observed.rows, 3))
+    noise, samples = fit_noise(left, observed, 0.0, TUNING.noise), sum(each.run.samples for each in observed.signals)
+    banks = load_banks(observed, 1, Load(np.zeros((samples, 3)), np.zeros((samples, 3))), TUNING.surrogate)
+    assert [structure_of(left[:, 1], 1, each, noise, observed).gain for each in banks] == [0, 0, 0]
 
 
 def test_a_law_that_columns_share_with_it_is_found_beside_them(bench: DesignMatrix) -> None:

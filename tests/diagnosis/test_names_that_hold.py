@@ -1,13 +1,16 @@
 """When a name is withdrawn, when what is left is its own form, and what was no push."""
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any, cast
 
+import engine_cases as cases
 import numpy as np
 import pytest
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment
+from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.evidence import Evidence, reason_no_contact
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import Tuning
@@ -32,6 +35,20 @@ def test_a_law_that_leaves_as_much_as_it_explains_has_the_wrong_name() -> None:
 @pytest.mark.parametrize("left", [_left(0.4), _left(0.6, p_value=0.5), _left(0.6, joint=2)])
 def test_a_name_holds_where_little_or_nothing_sure_is_left_at_its_joint(left: Structure) -> None:
     assert not names_contradicted_by_residual({4: _evidence(0.3)}, (left,), TUNING)
+
+
+def test_a_name_that_does_not_hold_is_withdrawn_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two laws that are found in the place of each other would be withdrawn in turn without end."""
+    asked: list[frozenset[int]] = []
+
+    def same_again(claimed: Mapping[int, Evidence], *_: object) -> frozenset[int]:
+        asked.append(asked[0] if asked else frozenset(number for number, each in claimed.items() if not each.usual))
+        assert len(asked) < 10
+        return asked[-1]
+
+    monkeypatch.setattr("armlab.diagnosis.diagnose.names_contradicted_by_residual", same_again)
+    diagnose(cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0))
+    assert asked[0]
 
 
 def test_friction_that_every_arm_has_keeps_its_name() -> None:
