@@ -41,9 +41,9 @@ def predict_residual_structure(model: FittedModel, noise: Noise) -> tuple[Struct
 
 def _load(model: FittedModel) -> Load:
     """The load of all joints by a model."""
-    torque, inertial, scenes = torque_of(model), inertial_parameters(model), model.design.scenes
-    bodies = [rigid_body_torque(each.arm, each.motion, inertial) for each in scenes]
-    return Load(np.concatenate([torque(each) for each in scenes]), np.concatenate(bodies))
+    torque, inertial, design = torque_of(model), inertial_parameters(model), model.design
+    bodies = [rigid_body_torque(each.arm, each.motion, inertial) for each in design.calm]
+    return Load(np.concatenate([torque(each) for each in design.scenes]), np.concatenate(bodies))
 
 
 def _surest_structure(model: FittedModel, joint: int, load: Load, noise: Noise) -> Structure:
