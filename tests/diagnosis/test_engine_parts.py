@@ -12,7 +12,7 @@ from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gai
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.features import Features, Load, flexible_features, load_banks, motion_banks, whole_runs
-from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.fitted_model import FittedModel, fit_background
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.noise import Noise, error_colours, fit_noise
 from armlab.diagnosis.settings import Settings
@@ -20,7 +20,7 @@ from armlab.diagnosis.simulation import read_simulation
 from armlab.diagnosis.solver import Solver, State
 from armlab.diagnosis.surrogate import Remainder, Structure, find_structure
 from armlab.diagnosis.tuning import Tuning
-from armlab.diagnosis.unknown import FitOfAll
+from armlab.diagnosis.unknown import FitOfAll, is_structured, predict_residual_structure
 from armlab.effects.library import library
 from armlab.effects.memory import dahl_state
 from problem.base_parameters import base_parameters
@@ -221,6 +221,22 @@ def test_what_swings_is_driven_by_the_bodies_and_not_by_friction(observed: Obser
     )
     np.testing.assert_array_equal(with_friction[2].values, without[2].values)
     assert not np.array_equal(with_friction[1].values, without[1].values)
+
+
+def test_noise_of_the_encoder_is_no_spring_that_the_bodies_drive() -> None:
+    """The noise of an acceleration is in the torque of the bodies and, with the other sign, in what is left."""
+    rng, quiet = np.random.default_rng(0), cases.recording()
+    runs = tuple(
+        replace(each, position=each.position + 3e-4 * rng.standard_normal(each.position.shape)) for each in quiet.runs
+    )
+    recording = replace(quiet, runs=runs)
+    simulation = read_simulation(recording, None)
+    observed = observe(runs, simulation.arm, simulation.inertial, Settings())
+    base = base_parameters(simulation.arm)
+    prior = link_prior(simulation.arm, base, recording.arm.parameters)
+    plain = build_design_matrix(observed, simulation, base, prior, Settings())
+    model = fit_background(plain, library(), 0, lambda _: None)
+    assert not any(is_structured(each, TUNING) for each in predict_residual_structure(model, model.noise))
 
 
 def test_features_of_a_joint_that_carries_nothing_find_nothing(observed: Observed) -> None:
