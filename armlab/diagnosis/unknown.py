@@ -86,8 +86,8 @@ class FitOfAll:
         rows, residual = rows_of_fit(model.columns, fit, model.moments.lengths, joint)
         white = tuple(model.noise.white(rows, joint, observed, role) for role in ROLES)
         held = white[ROLES.index("validate")]
-        known = held @ fit.inverse
-        inverse = fit.inverse - known.T @ np.linalg.solve(np.eye(len(held)) + known @ held.T, known)  # Woodbury
+        told = np.eye(len(fit.inverse)) + fit.inverse @ (held.T @ held)
+        inverse = np.asarray(np.linalg.solve(told, fit.inverse), dtype=float)  # also of a singular covariance
         return cls(model, joint, rows, residual, white, inverse)
 
     def remainder(self, made: Features) -> Remainder:

@@ -23,6 +23,7 @@ from armlab.diagnosis.tuning import Tuning
 from armlab.diagnosis.unknown import FitOfAll, is_structured, predict_residual_structure
 from armlab.effects.library import library
 from armlab.effects.memory import dahl_state
+from armlab.recordings.recording import ROLES
 from problem.base_parameters import base_parameters
 
 TUNING = Tuning()
@@ -260,7 +261,12 @@ def test_a_law_that_columns_share_with_it_is_found_beside_them(bench: DesignMatr
     model = FittedModel(noisy, noise, moments, solver, State(tuple(range(len(solver.groups))), (0.0, 0.0, 0.0)))
     residual = model.residual_at(0, model.fit)
     assert np.var(residual) < 0.5 * np.var(torque[:, 0])
-    beside = FitOfAll.of(model, 0).remainder(Features(cube[:, None], (frozenset({"velocity_1"}),)))
+    whole = FitOfAll.of(model, 0)
+    held = whole.white[ROLES.index("validate")]
+    np.testing.assert_allclose(
+        whole.inverse @ (np.linalg.inv(model.fit.inverse) + held.T @ held), np.eye(len(held.T)), atol=1e-6
+    )
+    beside = whole.remainder(Features(cube[:, None], (frozenset({"velocity_1"}),)))
     alone = np.corrcoef(residual, cube)[0, 1]
     assert np.corrcoef(beside.residual, beside.features.values[:, 0])[0, 1] > 2 * alone
 
