@@ -21,6 +21,7 @@ from armlab.concealed.formats import (
     write_model,
 )
 from armlab.concealed.outside import OutsideEffect
+from armlab.concealed.plan import Plan
 from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
 from armlab.concealed.sizing import SimulatedCase
 from armlab.recordings.recording import Role
@@ -59,7 +60,7 @@ class LoggedRun:
 def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
     """A run of a case, sampled at its rate; without noise, rounding and jitter on request."""
     plan, track, rng = case.plan, case.tracks[run], case.plan.stream(f"log {run}")
-    stamp, instant = _sample_instants(case, run, rng, noisy)
+    stamp, instant = _sample_instants(plan, run, rng, noisy)
     joints, effects = track.joints, case.all_effects
     centre = np.repeat(instant[:, None], joints, axis=1)
     lag = np.sum([effect.lag(joints) for effect in effects] or [np.zeros(joints)], axis=0)
@@ -71,15 +72,25 @@ def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
     position, role = sampled.position + shift, plan.runs[run].role
     if not noisy:
         return LoggedRun(role, stamp, position, torque, torque)
-    step = 2 * np.pi / 2.0 ** rng.integers(*LOGGING.encoder_bits, joints)
+    step = _draw_encoder_steps(rng, joints)
     noise = plan.noise.sample(plan.stream(f"noise {run}"), sampled.velocity, instant)
     read = plan.noise.quantise(torque + noise)
     return LoggedRun(role, stamp, np.rint(position / step) * step, read, torque)
 
 
-def _sample_instants(case: SimulatedCase, run: int, rng: np.random.Generator, noisy: bool) -> tuple[Array, Array]:
+def encoder_steps(plan: Plan, run: int) -> Array:
+    """To what the positions of a run are rounded, (joints,), rad."""
+    rng = plan.stream(f"log {run}")
+    _sample_instants(plan, run, rng, noisy=True)  # which a run draws first
+    return _draw_encoder_steps(rng, plan.machine.joints)
+
+
+def _draw_encoder_steps(rng: np.random.Generator, joints: int) -> Array:
+    return np.asarray(2 * np.pi / 2.0 ** rng.integers(*LOGGING.encoder_bits, joints))
+
+
+def _sample_instants(plan: Plan, run: int, rng: np.random.Generator, noisy: bool) -> tuple[Array, Array]:
     """Stamps and true instants, s: even samples with late stamps, or uneven samples with exact stamps."""
-    plan = case.plan
     even = np.arange(round(plan.runs[run].length_s * plan.rate_hz)) / plan.rate_hz
     if not noisy:
         return even, even

@@ -1,15 +1,16 @@
 """How far could anyone get? An oracle that knows all laws, of the library and outside it, and names hidden effects.
 
-The oracle of detection limits knows the law and asks whether it is there. This one knows the noise, the motion and
-every law, and asks which it is. With s the whitened torque of a hidden effect and u that of another law, both without
-what free columns explain, the other law of the size that fits best leaves
+The oracle of detection limits knows the motion and the law, and asks whether it is there. This one has positions as
+they are recorded (`armlab/concealed/encoder_noise.py`), knows the noise and every law, and asks which it is. With s the
+torque of a hidden effect and u that of another law, both whitened and without what free columns explain, the other law
+of the size that fits best leaves
 
     d^2 = |s|^2 - (s . u)^2 / |u|^2
 
 of the effect. Twice the expected difference of log likelihoods is d^2, its standard deviation d, so that the oracle
 prefers the right law with the probability Phi(d / 2), Phi the normal distribution. With its rivals ordered by d, it has
-the right name with the probability that it prefers it to all of them, and the right class of four where it prefers it
-to all but three; the comparisons are taken as independent.
+the right name with the probability that it sees the effect and prefers it to all of them, and the right class of four
+where it prefers it to all but three; the comparisons are taken as independent.
 
 The numbers of another law are sought: many draws as a set has them, then steps about the best. A law of a link may be
 any sum of draws, because its parameters are linear. Laws with parts of their own act on motions of their own.
@@ -22,8 +23,10 @@ import numpy as np
 from scipy.stats import norm
 
 from armlab.common.arrays import Array
+from armlab.concealed.case_files import encoder_steps
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.encoder_noise import encoder_noise
 from armlab.concealed.engine import Track
 from armlab.concealed.outside import OUTSIDE
 from armlab.concealed.plan import Plan
@@ -43,6 +46,7 @@ from armlab.concealed.sizing import (
     Oracle,
     SimulatedCase,
     companion_columns,
+    detection_power,
     identification_tracks,
     limit_noncentrality,
     make_oracle,
@@ -65,6 +69,7 @@ LIMITS = {  # what a law is at an end of the range of its numbers, beside what i
 class OracleAnswer:
     """What the oracle says of one hidden effect. multiple: its size in detection limits.
 
+    multiple_recorded: the same of an oracle that has recorded positions. seen: the probability that this one finds it.
     rival: the law that is hardest to tell from it, at its place (from 1, None for the whole arm), and distance: d.
     right_name, right_class: probabilities.
     """
@@ -76,6 +81,8 @@ class OracleAnswer:
     joint: int | None
     outside: bool
     multiple: float
+    multiple_recorded: float
+    seen: float
     rival: str
     rival_joint: int | None
     distance: float
@@ -87,8 +94,9 @@ class OracleAnswer:
 class _Bench:
     """Where laws are compared: coarse tracks of a case, and rows without what is free.
 
-    others: effects beside the one that is asked. beside: plain friction that is free for it, (samples, joints, columns)
-    a run, or None. absorbed_rotors: joints (from 1) whose rotor no motion separates from the links.
+    others: effects beside the one that is asked. motion_known, oracle: know the motion, or have recorded positions.
+    beside: plain friction that is free for it, (samples, joints, columns) a run, or None. absorbed_rotors: joints (from
+    1) whose rotor no motion separates from the links.
     """
 
     plan: Plan
@@ -96,12 +104,17 @@ class _Bench:
     wanted: Sequence[Track]
     tracks: Sequence[Track]
     others: tuple[HiddenEffect, ...]
+    motion_known: Oracle
     oracle: Oracle
     beside: Sequence[Array] | None
     absorbed_rotors: tuple[int, ...]
 
     def rows(self, effect: HiddenEffect) -> Array:
         """Whitened rows of an effect of any law, free columns projected out."""
+        return self.oracle.rows_without_free(self.torque(effect), self.beside)
+
+    def torque(self, effect: HiddenEffect) -> list[Array]:
+        """What an effect of any law adds to the recorded torque, (samples, joints) each run, N m."""
         hidden = tuple(each for each in self.others if each not in self.plan.background)
         tracks = self.tracks
         if effect.has_parts:
@@ -110,11 +123,10 @@ class _Bench:
             tracks = identification_tracks(plan, played)
         arms = arm_with_effects(self.plan, (*hidden, effect)), arm_with_effects(self.plan, hidden)
         grids = [oracle_grid(track) for track in self.tracks]
-        torque = [
+        return [
             effect_torque(effect, self.others, arms, track, run, grid)
             for run, (track, grid) in enumerate(zip(tracks, grids, strict=True))
         ]
-        return self.oracle.rows_without_free(torque, self.beside)
 
 
 def ask_oracle(case: SimulatedCase, least: float) -> Iterator[OracleAnswer]:
@@ -127,9 +139,11 @@ def ask_oracle(case: SimulatedCase, least: float) -> Iterator[OracleAnswer]:
 def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
     effect, plan = case.hidden[number], case.plan
     bench = _make_bench(case, number)
-    own = bench.rows(effect)
-    power = case.multiples[number] ** 2 * limit_noncentrality(plan.machine.joints)
-    own = own * np.sqrt(power / max(float(own @ own), 1e-300))  # as large as in the recording
+    joints, torque = plan.machine.joints, bench.torque(effect)
+    coarse = max(bench.motion_known.multiple(torque, bench.beside), 1e-150)
+    own = bench.oracle.rows_without_free(torque, bench.beside) * case.multiples[number] / coarse  # as in the recording
+    power = float(own @ own)
+    seen = detection_power(power, joints)
     rng = plan.stream(f"oracle {number}")
     rivals = sorted(_distances(bench, effect, own, rng), key=lambda each: each[0])
     better = [float(norm.cdf(each[0] / 2)) for each in rivals]
@@ -142,11 +156,13 @@ def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
         joint=effect.place,
         outside=type(effect) in OUTSIDE,
         multiple=case.multiples[number],
+        multiple_recorded=float(np.sqrt(power / limit_noncentrality(joints))),
+        seen=seen,
         rival=law,
         rival_joint=place,
         distance=distance,
-        right_name=float(np.prod(better)),
-        right_class=float(np.prod(better[CLASS_SIZE - 1 :])),
+        right_name=seen * float(np.prod(better)),
+        right_class=seen * float(np.prod(better[CLASS_SIZE - 1 :])),
     )
 
 
@@ -156,10 +172,23 @@ def _make_bench(case: SimulatedCase, number: int) -> _Bench:
     tracks = [coarse_track(track) for track in case.tracks]
     others = tuple(each for each in case.all_effects if each is not effect)
     controller = draw_controller(plan.stream("controller"), plan.machine.arm)
-    oracle, chosen = make_oracle(plan, tracks), identification_tracks(plan, tracks)
-    beside = companion_columns(plan, effect, chosen)
+    chosen, runs = identification_tracks(plan, tracks), (n for n, run in enumerate(plan.runs) if run.role == "identify")
+    encoders = [
+        encoder_noise(plan.true_arm, track, encoder_steps(plan, run), plan.rate_hz)
+        for run, track in zip(runs, chosen, strict=True)
+    ]
     absorbed = tuple(joint + 1 for joint in absorbed_rotors(plan.machine.arm))
-    return _Bench(plan, controller, wanted, chosen, others, oracle, beside, absorbed)
+    return _Bench(
+        plan=plan,
+        controller=controller,
+        wanted=wanted,
+        tracks=chosen,
+        others=others,
+        motion_known=make_oracle(plan, tracks),
+        oracle=make_oracle(plan, tracks, encoders),
+        beside=companion_columns(plan, effect, chosen),
+        absorbed_rotors=absorbed,
+    )
 
 
 def _distances(
@@ -211,8 +240,11 @@ def _draws(
 def _is_right(other: HiddenEffect, effect: HiddenEffect, bench: _Bench) -> bool:
     """Whether another law has the right name, or one that the score counts as right, or holds the right one.
 
-    A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred.
+    A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred. Outside
+    the library no name of another law is right.
     """
+    if type(effect) in OUTSIDE:
+        return other.effect == effect.effect and other.place == effect.place
     if other.place == effect.place and (
         other.effect in (effect.effect, *effect.equivalent) or _holds(type(other), type(effect))
     ):

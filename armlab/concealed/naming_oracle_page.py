@@ -48,10 +48,11 @@ def write_oracle(answers: Sequence[OracleAnswer], score: Path | None, out: Path)
     ]
     page = markdown_page(
         "How far could anyone get?",
-        f"Effects above {MIN_NAMED_MULTIPLE:g} detection limits. *Oracle*: what an observer names who knows the noise, "
-        "the motion and the equations of all laws, of the library and outside it. *Diagnosis*: what was named blindly; "
-        "outside the library, what was called unknown. *Hardest*: the law that is nearest most often, and the median "
-        "distance from it in standard deviations.",
+        f"Effects above {MIN_NAMED_MULTIPLE:g} detection limits, which are those of an observer who knows the motion. "
+        "*Limits, recorded*: their median for one who has positions as the encoders round them. *Oracle*: what such an "
+        "observer names who knows the noise and the equations of all laws, of the library and outside it. *Diagnosis*: "
+        "what was named blindly; outside the library, what was called unknown. *Hardest*: the law that is nearest most "
+        "often, and the median distance from it in standard deviations.",
         *sections,
     )
     return write_texts({TABLE_FILE: table.to_csv(index=False), PAGE_FILE: page}, out)
@@ -73,6 +74,7 @@ def _effects_table(table: pd.DataFrame) -> str:
     heads = [
         "effect",
         "cases",
+        "limits, recorded",
         "oracle: name",
         "oracle: class of four",
         "diagnosis: name",
@@ -81,9 +83,10 @@ def _effects_table(table: pd.DataFrame) -> str:
     ]
     groups = [(str(name), own) for name, own in table.groupby("effect")]
     rows = [_row(name.replace("_", " "), own) for name, own in groups]
-    inside, outside = table[~table["outside"]], table[table["outside"]]
-    totals = (("of the library", inside), ("outside the library", outside))
-    rows += [_row(f"**{name}**", own) for name, own in totals if len(own)]
+    for name, whole in (("of the library", table[~table["outside"]]), ("outside the library", table[table["outside"]])):
+        told = whole["multiple_recorded"] > MIN_NAMED_MULTIPLE
+        parts = (name, whole), ("above three limits, recorded", whole[told]), ("below", whole[~told])
+        rows += [_row(f"**{part}**", own) for part, own in parts if len(own)]
     return markdown_table(heads, rows)
 
 
@@ -95,6 +98,7 @@ def _row(name: str, own: pd.DataFrame) -> tuple[str, ...]:
     return (
         name,
         str(len(own)),
+        f"{own['multiple_recorded'].median():.1f}",
         *(share(column) for column in ("right_name", "right_class", "named_first", "named_class")),
         f"{hardest}, {own['distance'].median():.1f}",
     )

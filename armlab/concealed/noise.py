@@ -70,6 +70,13 @@ class Noise:
                 noise = noise + self.white * np.sin(2 * np.pi * 50 * order * time[:, None] + angle) / order
         return np.asarray(noise)
 
+    def power(self, frequency: Array, rate_hz: float) -> Array:
+        """Variance of a sample at rate_hz, per frequency in Hz, (frequencies, joints), (N m)2; that of white noise is
+        the same at every frequency."""
+        memory = self.memory(rate_hz)
+        passed = (1 - memory**2) / np.abs(1 - memory * np.exp(-2j * np.pi * frequency / rate_hz)) ** 2
+        return np.asarray(self.white**2 + np.outer(passed, self.coloured**2))
+
     def quantise(self, torque: Array) -> Array:
         """Torque channels (samples, joints) at the resolution of the kind of noise."""
         return np.rint(torque / (3 * self.white)) * 3 * self.white if self.kind == "quantised" else torque

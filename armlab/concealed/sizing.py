@@ -25,6 +25,7 @@ from scipy.stats import chi2, ncx2
 from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
+from armlab.concealed.encoder_noise import EncoderNoise, whiten_with_encoders
 from armlab.concealed.engine import Track
 from armlab.concealed.noise import Noise
 from armlab.concealed.plan import Plan, draw_effects, target_multiple
@@ -92,8 +93,12 @@ def candidate_count(joints: int) -> int:
 @lru_cache(maxsize=32)
 def limit_noncentrality(joints: int) -> float:
     """Noncentrality of a chi-square of one degree of freedom that is found with 90 % power."""
-    critical = chi2.isf(ORACLE.family_wise_level / candidate_count(joints), 1)
-    return float(brentq(lambda value: ncx2.sf(critical, 1, value) - ORACLE.power, 1.0, 200.0))
+    return float(brentq(lambda value: detection_power(value, joints) - ORACLE.power, 1.0, 200.0))
+
+
+def detection_power(noncentrality: float, joints: int) -> float:
+    """Chance to find an effect, at the level of the oracle."""
+    return float(ncx2.sf(chi2.isf(ORACLE.family_wise_level / candidate_count(joints), 1), 1, noncentrality))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,12 +106,14 @@ class Oracle:
     """Whitens rows by the true noise and projects out what is free.
 
     noise: of the recording's samples at rate_hz. resting: of each run, (samples, joints), where a joint stands still;
-    empty where none does. basis: (rows, columns), orthonormal, of the free columns.
+    empty where none does. encoders: noise of the positions of each run; empty for an oracle that knows the motion.
+    basis: (rows, columns), orthonormal, of the free columns.
     """
 
     noise: Noise
     rate_hz: float
     resting: tuple[NDArray[np.bool_], ...] = ()
+    encoders: tuple[EncoderNoise, ...] = ()
     basis: Array | None = None
 
     def with_free_columns(self, columns: Sequence[Array]) -> "Oracle":
@@ -139,10 +146,14 @@ class Oracle:
         )
         resting = self.resting or tuple(np.zeros(run.shape[:2], dtype=bool) for run in columns)
         out = []
-        for run, rest in zip(columns, resting, strict=True):
-            for joint in range(run.shape[1]):
-                white = thinned.whitened(_bridged(run[:, joint], rest[:, joint]), joint, ORACLE.rate_hz)
-                out.append(np.where(rest[:, joint, None], 0.0, white))
+        for number, (run, rest) in enumerate(zip(columns, resting, strict=True)):
+            bridged = [_bridged(run[:, joint], rest[:, joint]) for joint in range(run.shape[1])]
+            if self.encoders:
+                known = whiten_with_encoders(np.stack(bridged, 1), thinned, self.encoders[number], ORACLE.rate_hz)
+                white = list(known.transpose(1, 0, 2))
+            else:
+                white = [thinned.whitened(each, joint, ORACLE.rate_hz) for joint, each in enumerate(bridged)]
+            out += [np.where(rest[:, joint, None], 0.0, each) for joint, each in enumerate(white)]
         return np.vstack(out)
 
 
@@ -230,10 +241,14 @@ def effect_multiples(plan: Plan, hidden: Sequence[HiddenEffect], tracks: Sequenc
     return tuple(effect_multiple(plan, oracle, hidden, number, tracks) for number in range(len(hidden)))
 
 
-def make_oracle(plan: Plan, tracks: Sequence[Track]) -> Oracle:
-    """Knows the noise; in the realistic tier base parameters and friction of every joint are free."""
+def make_oracle(plan: Plan, tracks: Sequence[Track], encoders: Sequence[EncoderNoise] = ()) -> Oracle:
+    """Knows the noise; in the realistic tier base parameters and friction of every joint are free.
+
+    encoders: noise of the positions of each run that identifies; without them the oracle knows the motion.
+    """
     runs = identification_tracks(plan, tracks)
-    oracle = Oracle(plan.noise, plan.rate_hz, tuple(standstills(track, oracle_grid(track)) for track in runs))
+    resting = tuple(standstills(track, oracle_grid(track)) for track in runs)
+    oracle = Oracle(plan.noise, plan.rate_hz, resting, tuple(encoders))
     if not plan.realistic:
         return oracle
     return oracle.with_free_columns([free_columns(plan.true_arm, track, oracle_grid(track)) for track in runs])

@@ -47,12 +47,15 @@ def test_a_law_that_holds_the_right_one_as_a_limit_is_no_rival() -> None:
 
 
 def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) -> None:
-    answer = OracleAnswer("a", "clean", "payload", "compact", 2, False, 5.0, "rotor_inertia", 2, 3.0, 0.93, 1.0)
+    answer = OracleAnswer(
+        "a", "clean", "payload", "compact", 2, False, 5.0, 2.0, 0.9, "rotor_inertia", 2, 3.0, 0.93, 1.0
+    )
     row = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_first": False, "named_class": True}
     pd.DataFrame([row]).to_csv(tmp_path / "effects.csv", index=False)
     _, page = write_oracle([answer], tmp_path, tmp_path / "out")
     text = page.read_text(encoding="utf-8")
-    assert "| payload | 1 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
+    assert "| payload | 1 | 2.0 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
+    assert "| **below** | 1 | 2.0 | 93 % |" in text
     pd.DataFrame([{**row, "case": "b"}]).to_csv(tmp_path / "effects.csv", index=False)
     with pytest.raises(InputError, match="the score of another set"):
         write_oracle([answer], tmp_path, tmp_path / "again")
