@@ -80,6 +80,14 @@ def test_a_scale_that_is_not_straight_speaks_against_a_wrong_gain() -> None:
     assert "unknown" in [each.effect for each in bent.claims[0].members]
 
 
+def test_a_scale_that_differs_by_sign_is_a_wrong_gain_and_a_square_that_looks_like_it_is_none() -> None:
+    by_sign = diagnose(cases.recording(read_wrongly(lambda torque: 0.03 * np.abs(torque))))
+    assert [(each.effect, each.joint, each.members) for each in by_sign.claims] == [("torque_gain_error", 2, ())]
+    assert lacking(by_sign) == 0
+    square = diagnose(cases.recording(read_wrongly(lambda torque: 0.004 * torque**2)))
+    assert square.claims[0].effect == "unknown"
+
+
 def lacking(found: Diagnosis) -> float:
     """The log evidence that a wrong gain, which the search found, lacks of the best law."""
     own = next(each for each in found.weighed[0] if each.effect == "torque_gain_error")

@@ -235,13 +235,15 @@ def _flexible_ratio(model: FittedModel, without: State, evidence: Evidence) -> f
 def _bent_gain(model: FittedModel, without: State, group: int) -> float:
     """By how much a scale that bends raises the log likelihood more than the scale of the library in whose place it is.
 
-    It is the square of that law's own torque, with its sign or without.
+    It is the square of the torque that is scaled, with its sign or without. A scale that differs by the sign of the
+    torque has a column for each sign: their sum is that torque.
     """
-    joint, law = model.solver.groups[group].candidate.rows[0], np.zeros(model.moments.size)
-    law[model.solver.groups[group].columns] = model.solver.values(model.fit, group)
-    torque = model.columns.torque_at(joint, law)
-    own, square, signed = _log_gains(model, without, joint, np.column_stack([torque, torque**2, torque * abs(torque)]))
-    return float(max(square - own, signed - own, 0.0))
+    joint, columns = model.solver.groups[group].candidate.rows[0], model.solver.groups[group].columns
+    law, whole = np.zeros((2, model.moments.size))
+    law[columns], whole[columns] = model.solver.values(model.fit, group), 1.0
+    own, scaled = (model.columns.torque_at(joint, each) for each in (law, whole))
+    gains = _log_gains(model, without, joint, np.column_stack([own, scaled**2, scaled * abs(scaled)]))
+    return float(max(gains[1:].max() - gains[0], 0.0))
 
 
 def _log_gains(model: FittedModel, state: State, joint: int, torques: Array) -> Array:
