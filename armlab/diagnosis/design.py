@@ -1,6 +1,6 @@
 """What a diagnosis has on its table: the runs, the simulation, the candidates, and moments made of them."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -36,8 +36,8 @@ from problem.motion import Motion
 class DesignMatrix:
     """rigid: filtered columns of the base parameters by run and joint. target: measured less simulated torque,
     filtered, (rows, joints). scenes: one a run, for the present model; calm: the same with the calm motion, for
-    candidates that follow the model. blocks: the candidates' filtered columns. features, banks: of each joint, for
-    surrogates: many of everything, and few of one kind each.
+    candidates that follow the model. blocks: the candidates' filtered columns. families: those that offered them.
+    features, banks: of each joint, for surrogates: many of everything, and few of one kind each.
     """
 
     settings: Settings
@@ -50,6 +50,7 @@ class DesignMatrix:
     scenes: tuple[Scene, ...]
     calm: tuple[Scene, ...]
     blocks: tuple[Block, ...] = ()
+    families: tuple[Family, ...] = ()
     features: tuple[FoldedFeatures, ...] = ()
     banks: tuple[tuple[Features, ...], ...] = ()
 
@@ -84,13 +85,35 @@ class DesignMatrix:
 
         left: what a first fit leaves of each run, (samples, joints), for families that look at it.
         """
-        blocks = []
+        offered = tuple(families)
+        blocks = [block for family in offered for block in self._offered_blocks(family, left)]
+        return replace(self, blocks=tuple(blocks), families=offered)
+
+    def _offered_blocks(self, family: Family, left: Sequence[Array] | None) -> list[Block]:
         arm, scenes = self.simulation.arm, self.scenes
-        for family in families:
-            places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
-            for shapes in places:
-                blocks += [self.block(each, variant) for variant, each in enumerate(shapes) if not each.second_name]
-        return replace(self, blocks=tuple(block for block in blocks if _is_usable(block)))
+        places = family.candidates(arm, scenes) if left is None else family.scan(arm, scenes, left)
+        made = [self.block(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
+        return [block for block in made if _is_usable(block)]
+
+    def scanned_again(self, left: Callable[[str], Sequence[Array]], kept: Collection[int]) -> "DesignMatrix":
+        """With other shapes from families that look at what a fit leaves: what was left before hid the best ones.
+
+        left: what a fit leaves of each run without an effect, (samples, joints). kept: numbers of blocks that stay as
+        they are. Numbers of blocks do not change; a shape has been looked for twice.
+        """
+        blocks = list(self.blocks)
+        for family in (each for each in self.families if type(each).scan is not Family.scan):
+            free = [n for n, each in enumerate(self.blocks) if each.candidate.effect == family.effect and n not in kept]
+            for block in self._offered_blocks(family, left(family.effect)):
+                new = replace(block, candidate=block.candidate.looked_for_again())
+                own = type(new.candidate), place_of(new.candidate)
+                same = [n for n in free if (type(blocks[n].candidate), place_of(blocks[n].candidate)) == own]
+                if same:
+                    free.remove(same[0])
+                    blocks[same[0]] = replace(new, variant=blocks[same[0]].variant)
+                else:
+                    blocks.append(new)
+        return replace(self, blocks=tuple(blocks))
 
     def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":
         """With other columns for some candidates, by their number."""

@@ -18,9 +18,11 @@ from armlab.diagnosis.blocks import (
     held_out_gain,
     variance_inflation,
 )
-from armlab.diagnosis.data import Observed, rows_in
+from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.links import Widths
+from armlab.diagnosis.pushes import Stretch, reason_no_contact
+from armlab.diagnosis.refine import profile_without
 from armlab.diagnosis.search import Search, contained_groups, rival_formulas
 from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.tuning import EvidenceTuning
@@ -109,30 +111,6 @@ class Comparison:
         observed = self.model.design.observed
         rows = rows_in(observed.of_role("validate", joint), observed.rows)
         return float(np.sqrt(np.mean(self.model.residual_at(joint, fit)[rows] ** 2)))
-
-
-def reason_no_contact(push: Array, joint: int, observed: Observed, torque: Array, tuning: EvidenceTuning) -> str | None:
-    """What speaks against a push at a joint (from 0), in a few words.
-
-    push: (rows,), its torque; torque: (rows,), what the model says of the joint without it, N m. A law that the library
-    lacks, a spring that stiffens or a limit, shows where position, speed or torque is at an end of its range: where
-    that end was reached but once, in this stretch, nothing tells the law from a push.
-    """
-    pushed = np.abs(push) > tuning.push_level * np.abs(push).max()
-    moving = pushed & rows_in(observed.used(joint), len(push))
-    moving_s = float(np.sum(moving)) / observed.rate_hz
-    if moving_s <= tuning.min_push_s or moving.sum() <= tuning.min_push_moving_share * pushed.sum():
-        return "the joint hardly moves during it"
-    position = observed.kept("position")[:, joint]
-    velocity = observed.kept("velocity")[:, joint]
-    others = push == 0
-    if not others.any():
-        return "it goes on all the time"
-    for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(torque))):
-        low, high = values[others].min(), values[others].max()
-        if np.mean((values[pushed] < low) | (values[pushed] > high)) > tuning.max_extreme_share:
-            return f"no other stretch has such a {name}"
-    return None
 
 
 @dataclass(frozen=True)
@@ -297,13 +275,21 @@ class Judge:
         return float(chi2.sf(values @ np.linalg.pinv(block, hermitian=True) @ values, solver.ranks[group]))
 
     def _pushed(self, group: int) -> str | None:
-        """Against a push: see `engine.pushes`."""
-        found, candidate = self.model, self.model.solver.groups[group].candidate
-        joint, column = candidate.rows[0], int(self.model.solver.groups[group].columns[0])
-        own = found.columns.matrices[joint][:, int(np.flatnonzero(found.columns.index[joint] == column)[0])]
-        push, observed = own * found.coefficients(found.fit)[column], found.design.observed
-        torque = observed.torque[:, joint] - found.residual_at(joint, found.fit) - push
-        return reason_no_contact(push, joint, observed, torque, self.tuning)
+        """Against a push: see `reason_no_contact`."""
+        model, design = self.model, self.model.design
+        block, joint = design.blocks[group], design.blocks[group].candidate.rows[0]
+        push = block.values[:, 0] @ model.coefficients(model.fit)[model.solver.groups[group].columns]
+        torque = design.observed.torque[:, joint] - model.residual_at(joint, model.fit) - push
+        rest = profile_without(design, model.noise, model.solver, self.state.minus(group))
+
+        def whiten(matrix: Array, joint: int) -> Array:
+            return model.noise.white(matrix, joint, design.observed, "identify")
+
+        def lead(law: Array) -> float:
+            return rest.gain(block, whiten) - rest.gain(replace(block, values=law[:, None]), whiten)
+
+        stretch = Stretch(push, joint, torque, design.observed)
+        return reason_no_contact(stretch, lead, design.settings.tuning)
 
     def simpler(self, group: int) -> tuple[int, ...]:
         """See `contained_groups`."""

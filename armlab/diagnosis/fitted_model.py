@@ -122,7 +122,7 @@ def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
     for number in range(model.design.settings.tuning.search.rounds):
         progress(f"searching, round {number + 1}")
         noise, known = fit_coloured_noise(model), model.state if number else None
-        design, steps = _follow_model(model) if number else model.design, model.steps
+        design, steps = _look_again(model) if number else model.design, model.steps
         del model  # its columns, before there are others
         searched = _search_state(design, noise, known, True, steps)
         progress("fitting nonlinear parameters")
@@ -135,6 +135,20 @@ def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
         model = _fit_model(design, noise, known, steps)
     progress("searching, last round")
     return _search_state(model.design, fit_coloured_noise(model), model.state, False, model.steps)
+
+
+def _look_again(model: FittedModel) -> DesignMatrix:
+    """The design with columns that follow the model of a round, and shapes found by a scan of what that leaves."""
+    residual, coefficients = model.residual(model.fit), model.coefficients(model.fit)
+
+    def without(effect: str) -> list[Array]:
+        own = np.zeros_like(coefficients)
+        for group in (model.solver.groups[each] for each in model.state.groups):
+            if group.candidate.effect == effect:
+                own[group.columns] = coefficients[group.columns]
+        return _split_by_run(model.design, residual + model.columns.torque_of(own))
+
+    return _follow_model(model).scanned_again(without, model.state.groups)
 
 
 def _search_state(

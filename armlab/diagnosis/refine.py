@@ -48,14 +48,15 @@ def refine_shapes(design: DesignMatrix, noise: Noise, solver: Solver, state: Sta
     for group in state.groups:
         candidate = solver.groups[group].candidate
         if candidate.shape:
-            profile = _profile_without(design, noise, solver, state.minus(group))
+            profile = profile_without(design, noise, solver, state.minus(group))
             found = _search_shape(design, noise, profile, design.blocks[group])
             if found is not None:
                 out[group] = found
     return out
 
 
-def _profile_without(design: DesignMatrix, noise: Noise, solver: Solver, rest: State) -> Profile:
+def profile_without(design: DesignMatrix, noise: Noise, solver: Solver, rest: State) -> Profile:
+    """What a state leaves to an effect that is not in it."""
     fit, columns = solver.fit(rest), design.columns
     blocks = design.settings.tuning.blocks
     rows = whitened_rows(columns, {}, fit, solver.moments.lengths, noise, design.observed, blocks)

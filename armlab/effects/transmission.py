@@ -126,7 +126,7 @@ RESONANCES_HZ = (RIGID_HZ, 25.0)  # for a first look
 DAMPING_TIME = 3e-4  # s, of steel gears: a fiftieth of the critical damping at 20 Hz
 GAPS = (1e-4, 6e-4, 4e-3)  # rad, for a first look
 GAP_RANGE = (1e-5, 5e-2)
-SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 16)
+SCANNED_GAPS = np.geomspace(2e-5, 2e-2, 32)
 KEPT_GAPS = 2  # gaps of a scan
 
 

@@ -11,7 +11,8 @@ import pytest
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, Segment
 from armlab.diagnosis.diagnose import diagnose
-from armlab.diagnosis.evidence import Evidence, reason_no_contact
+from armlab.diagnosis.evidence import Evidence
+from armlab.diagnosis.pushes import Stretch, reason_no_contact
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.tuning import Tuning
 from armlab.diagnosis.unknown import is_form_error, names_contradicted_by_residual
@@ -62,6 +63,11 @@ def test_what_a_named_law_leaves_of_itself_is_no_finding() -> None:
     assert not is_form_error(_left(0.4), {4: _evidence(5.0, joint=0)}, TUNING.unknown)
 
 
+TIME = np.arange(0, 20, 0.01)
+INSIDE = (TIME > 5) & (TIME < 6)
+PUSH = np.where(INSIDE, 3.0 * np.sin(np.pi * (TIME - 5)), 0.0)
+
+
 def _observed(position: Array, velocity: Array) -> Observed:
     kept = {"position": position[:, None], "velocity": velocity[:, None]}
     whole = (Segment(0, "identify", 0, len(position)),)
@@ -69,32 +75,41 @@ def _observed(position: Array, velocity: Array) -> Observed:
     return cast(Observed, made)
 
 
+def _reason(push: Array, measured: Array, position: Array, torque: Array) -> str | None:
+    """What speaks against a push where `measured` is what acts, in white noise of 0.1 N m."""
+
+    def explained(columns: Array) -> float:
+        fitted = columns @ np.linalg.lstsq(columns, measured)[0]
+        return float(fitted @ measured) / (2 * 0.1**2)
+
+    observed = _observed(position, np.cos(TIME))
+
+    def lead(law: Array) -> float:
+        return explained(push[:, None]) - explained(law)
+
+    return reason_no_contact(Stretch(push, 0, torque, observed), lead, TUNING)
+
+
 def test_a_push_in_a_state_that_came_often_is_one() -> None:
-    time = np.arange(0, 20, 0.01)
-    push = np.where((time > 5) & (time < 6), 3.0, 0.0)
-    assert reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), np.sin(2 * time), TUNING.evidence) is None
+    assert _reason(PUSH, PUSH, np.sin(TIME), np.sin(2 * TIME)) is None
 
 
-def test_a_push_at_an_end_of_the_range_that_was_reached_once_may_be_a_law() -> None:
-    time = np.arange(0, 20, 0.01)
-    inside = (time > 5) & (time < 6)
-    push, reach = np.where(inside, 3.0, 0.0), np.where(inside, 2.0, np.sin(time))
-    far = reason_no_contact(push, 0, _observed(reach, np.cos(time)), np.sin(time), TUNING.evidence)
-    assert far == "no other stretch has such a position"
-    strong = reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), reach, TUNING.evidence)
-    assert strong == "no other stretch has such a torque"
+def test_a_push_is_one_at_an_end_of_the_range_that_was_reached_once_if_no_law_of_that_end_fits() -> None:
+    early = np.where(INSIDE, 1 + np.sin(np.pi * (TIME - 5)) ** 2, np.sin(TIME))  # beyond as far before as after
+    late = np.where((TIME > 5) & (TIME < 5.5), PUSH, 0.0)  # a push on the way there alone
+    assert _reason(late, late, early, np.sin(TIME)) is None
+
+
+def test_what_follows_the_position_beyond_all_other_stretches_is_no_push() -> None:
+    reach = np.where(INSIDE, 1 + np.sin(np.pi * (TIME - 5)), np.sin(TIME))
+    assert _reason(PUSH, 3.0 * (reach - 1) * INSIDE, reach, np.sin(TIME)) == "no other stretch has such a position"
+    assert _reason(PUSH, 3.0 * (reach - 1) * INSIDE, np.sin(TIME), reach) == "no other stretch has such a torque"
 
 
 def test_a_push_that_never_ends_is_none() -> None:
-    time = np.arange(0, 20, 0.01)
-    found = reason_no_contact(np.full(len(time), 3.0), 0, _observed(np.sin(time), np.cos(time)), time, TUNING.evidence)
-    assert found == "it goes on all the time"
+    assert _reason(np.full(len(TIME), 3.0), PUSH, np.sin(TIME), TIME) == "it goes on all the time"
 
 
 def test_a_short_push_is_a_reversal() -> None:
-    time = np.arange(0, 20, 0.01)
-    push = np.where((time > 5) & (time < 5.1), 3.0, 0.0)
-    assert (
-        reason_no_contact(push, 0, _observed(np.sin(time), np.cos(time)), np.sin(time), TUNING.evidence)
-        == "the joint hardly moves during it"
-    )
+    short = np.where((TIME > 5) & (TIME < 5.1), 3.0, 0.0)
+    assert _reason(short, short, np.sin(TIME), np.sin(TIME)) == "the joint hardly moves during it"
