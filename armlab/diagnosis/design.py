@@ -1,6 +1,6 @@
 """What a diagnosis has on its table: the runs, the simulation, the candidates, and moments made of them."""
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -95,24 +95,17 @@ class DesignMatrix:
         made = [self.block(each, at) for shapes in places for at, each in enumerate(shapes) if not each.second_name]
         return [block for block in made if _is_usable(block)]
 
-    def scanned_again(self, left: Callable[[str], Sequence[Array]], kept: Collection[int]) -> "DesignMatrix":
-        """With other shapes from families that look at what a fit leaves: what was left before hid the best ones.
+    def scanned_again(self, left: Callable[[str], Sequence[Array]]) -> "DesignMatrix":
+        """With more shapes from families that look at what a fit leaves: what was left before hid the best ones.
 
-        left: what a fit leaves of each run without an effect, (samples, joints). kept: numbers of blocks that stay as
-        they are. Numbers of blocks do not change; a shape has been looked for twice.
+        left: what a fit leaves of each run without an effect, (samples, joints). Numbers of blocks do not change; a
+        shape that is found by the second look has been looked for twice.
         """
-        blocks = list(self.blocks)
+        blocks, known = list(self.blocks), {each.candidate for each in self.blocks if each.candidate.shape}
         for family in (each for each in self.families if type(each).scan is not Family.scan):
-            free = [n for n, each in enumerate(self.blocks) if each.candidate.effect == family.effect and n not in kept]
             for block in self._offered_blocks(family, left(family.effect)):
-                new = replace(block, candidate=block.candidate.looked_for_again())
-                own = type(new.candidate), place_of(new.candidate)
-                same = [n for n in free if (type(blocks[n].candidate), place_of(blocks[n].candidate)) == own]
-                if same:
-                    free.remove(same[0])
-                    blocks[same[0]] = replace(new, variant=blocks[same[0]].variant)
-                else:
-                    blocks.append(new)
+                if block.candidate not in known:
+                    blocks.append(replace(block, candidate=block.candidate.looked_for_again()))
         return replace(self, blocks=tuple(blocks))
 
     def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":

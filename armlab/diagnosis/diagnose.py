@@ -42,7 +42,7 @@ from armlab.diagnosis.prediction import (
     fit_prediction,
     with_smoothing_of,
 )
-from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, withdraw
+from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, scan_what_is_left, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
@@ -218,7 +218,7 @@ def find_names(design: DesignMatrix, seed: int, progress: Progress) -> "NamedEff
 
 def _keep_what_holds(searched: FittedModel, progress: Progress) -> "NamedEffects":
     progress("testing claims")
-    return name_effects(prefer_one_body(find_friction_curves(prune(searched))))
+    return name_effects(prefer_one_body(find_friction_curves(scan_what_is_left(prune(searched)))))
 
 
 @dataclass(frozen=True, eq=False)

@@ -106,6 +106,26 @@ def fit_background(design: DesignMatrix, families: Sequence[Family], seed: int, 
     return replace(rough, state=forward.climb(rough.state, steps))
 
 
+def scan_residual(model: FittedModel) -> DesignMatrix:
+    """The design with more shapes of each scanned effect, from what a model leaves without the effect."""
+    residual, coefficients = model.residual(model.fit), model.coefficients(model.fit)
+
+    def without(effect: str) -> list[Array]:
+        own = np.zeros_like(coefficients)
+        for group in (model.solver.groups[each] for each in model.state.groups):
+            if group.candidate.effect == effect:
+                own[group.columns] = coefficients[group.columns]
+        return _split_by_run(model.design, residual + model.columns.torque_of(own))
+
+    return model.design.scanned_again(without)
+
+
+def with_design(model: FittedModel, design: DesignMatrix) -> FittedModel:
+    """The same state and noise on another design, in which its groups have the same numbers."""
+    moments, solver = design.solver(model.noise)
+    return replace(model, design=design, moments=moments, solver=solver)
+
+
 def _split_by_run(design: DesignMatrix, residual: Array) -> list[Array]:
     """A residual (rows, joints) of each run, (samples, joints), NaN at rows that were not kept."""
     parts, start = [], 0
@@ -122,7 +142,7 @@ def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
     for number in range(model.design.settings.tuning.search.rounds):
         progress(f"searching, round {number + 1}")
         noise, known = fit_coloured_noise(model), model.state if number else None
-        design, steps = _look_again(model) if number else model.design, model.steps
+        design, steps = _follow_model(model) if number else model.design, model.steps
         del model  # its columns, before there are others
         searched = _search_state(design, noise, known, True, steps)
         progress("fitting nonlinear parameters")
@@ -135,20 +155,6 @@ def search_effects(model: FittedModel, progress: Progress) -> FittedModel:
         model = _fit_model(design, noise, known, steps)
     progress("searching, last round")
     return _search_state(model.design, fit_coloured_noise(model), model.state, False, model.steps)
-
-
-def _look_again(model: FittedModel) -> DesignMatrix:
-    """The design with columns that follow the model of a round, and shapes found by a scan of what that leaves."""
-    residual, coefficients = model.residual(model.fit), model.coefficients(model.fit)
-
-    def without(effect: str) -> list[Array]:
-        own = np.zeros_like(coefficients)
-        for group in (model.solver.groups[each] for each in model.state.groups):
-            if group.candidate.effect == effect:
-                own[group.columns] = coefficients[group.columns]
-        return _split_by_run(model.design, residual + model.columns.torque_of(own))
-
-    return _follow_model(model).scanned_again(without, model.state.groups)
 
 
 def _search_state(

@@ -12,7 +12,8 @@ from armlab.diagnosis.added_body import (
     predicts_as_well,
 )
 from armlab.diagnosis.evidence import Evidence, Judge
-from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.fitted_model import FittedModel, scan_residual, with_design
+from armlab.diagnosis.refine import refine_shapes
 from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.solver import State
@@ -110,6 +111,23 @@ def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
     if searched.state == model.state:
         return pruned
     again = _settle_links(_remove_failing(searched, banned))
+    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
+
+
+def scan_what_is_left(pruned: Pruned) -> Pruned:
+    """The same with what scans find in what it leaves, where that passes, too, and is more likely in the end.
+
+    The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push.
+    """
+    before = pruned[0]
+    known = frozenset(range(len(before.design.blocks)))
+    model = with_design(before, scan_residual(before))
+    found = _search_again(model, known, fixed=True)
+    if found.state == model.state:
+        return pruned
+    better = refine_shapes(found.design, found.noise, found.solver, found.state, but=known)
+    refined = with_design(found, found.design.with_blocks(better))
+    again = _settle_links(_remove_failing(refined, known))
     return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
 
 

@@ -9,7 +9,6 @@ from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import WhitenedRows, block_covariance, held_out_gain, variance_inflation
-from armlab.diagnosis.columns import place_of
 from armlab.diagnosis.data import Observed, Segment, observe, split_segment
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.features import Features, Load, flexible_features, load_banks, motion_banks, whole_runs
@@ -315,22 +314,16 @@ def test_a_direction_that_the_prior_alone_holds_hides_no_other() -> None:
     assert chances[0] < 1e-3
 
 
-def test_a_second_look_changes_shapes_that_a_scan_found_and_no_numbers_of_blocks(bench: DesignMatrix) -> None:
-    """A push that the first look had not found, beside one that is kept."""
+def test_a_second_look_adds_what_a_scan_finds_then_and_leaves_what_was_there(bench: DesignMatrix) -> None:
     families = [family for family in library() if family.effect in ("external_contact", "viscous_friction")]
     quiet = [np.zeros(each.run.position.shape) for each in bench.observed.signals]
     first = bench.with_candidates(families, quiet)
-    kept = next(n for n, block in enumerate(first.blocks) if block.candidate.joint == 2 and block.candidate.shape)
+    assert first.scanned_again(lambda effect: quiet).blocks == first.blocks
     pushed = [each.copy() for each in quiet]
-    pushed[0][200:300] = 1.0
-    again = first.scanned_again(lambda effect: pushed, {kept})
-    more = again.blocks[len(first.blocks) :]  # another shape for the place of what is kept
-    assert [place_of(each.candidate) for each in more] == [place_of(first.blocks[kept].candidate)]
-    for number, (old, new) in enumerate(zip(first.blocks, again.blocks[: len(first.blocks)], strict=True)):
-        assert place_of(new.candidate) == place_of(old.candidate)
-        if number == kept or old.candidate.effect == "viscous_friction":
-            assert new is old
-        else:
-            assert new.candidate.looks == 2 * old.candidate.looks
-    moved = [each.candidate.shape for each in again.blocks if each.candidate.joint == 1 and each.candidate.shape]
-    assert moved[0] == pytest.approx((200 / cases.RATE_HZ, 300 / cases.RATE_HZ), abs=0.2)
+    pushed[0][200:300, 0] = 1.0
+    again = first.scanned_again(lambda effect: pushed)
+    assert again.blocks[: len(first.blocks)] == first.blocks
+    more = [each.candidate for each in again.blocks[len(first.blocks) :]]
+    assert {(each.effect, each.joint) for each in more} == {("external_contact", 1)}
+    assert more[0].shape == pytest.approx((200 / cases.RATE_HZ, 300 / cases.RATE_HZ), abs=0.2)
+    assert all(each.looks == 2 * first.blocks[-1].candidate.looks for each in more)
