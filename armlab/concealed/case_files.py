@@ -81,7 +81,7 @@ def log_run(case: SimulatedCase, run: int, noisy: bool = True) -> LoggedRun:
 def encoder_steps(plan: Plan, run: int) -> Array:
     """To what the positions of a run are rounded, (joints,), rad."""
     rng = plan.stream(f"log {run}")
-    _sample_instants(plan, run, rng, noisy=True)  # which a run draws first
+    _sample_instants(plan, run, rng, noisy=True)  # `log_run` draws the instants first
     return _draw_encoder_steps(rng, plan.machine.joints)
 
 

@@ -84,8 +84,9 @@ def _effects_table(table: pd.DataFrame) -> str:
     groups = [(str(name), own) for name, own in table.groupby("effect")]
     rows = [_row(name.replace("_", " "), own) for name, own in groups]
     for name, whole in (("of the library", table[~table["outside"]]), ("outside the library", table[table["outside"]])):
-        told = whole["multiple_recorded"] > MIN_NAMED_MULTIPLE
-        parts = (name, whole), ("above three limits, recorded", whole[told]), ("below", whole[~told])
+        above = whole["multiple_recorded"] > MIN_NAMED_MULTIPLE
+        limits = f"{MIN_NAMED_MULTIPLE:g} limits, recorded"
+        parts = (name, whole), (f"{name}, above {limits}", whole[above]), (f"{name}, below {limits}", whole[~above])
         rows += [_row(f"**{part}**", own) for part, own in parts if len(own)]
     return markdown_table(heads, rows)
 

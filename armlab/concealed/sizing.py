@@ -106,7 +106,8 @@ class Oracle:
     """Whitens rows by the true noise and projects out what is free.
 
     noise: of the recording's samples at rate_hz. resting: of each run, (samples, joints), where a joint stands still;
-    empty where none does. encoders: noise of the positions of each run; empty for an oracle that knows the motion.
+    empty where none does. encoders: noise of the positions of each run; empty for an oracle that knows the motion. It
+    is common to the joints, so that the bridge over a joint at rest reaches rows of others, a little.
     basis: (rows, columns), orthonormal, of the free columns.
     """
 
@@ -149,8 +150,8 @@ class Oracle:
         for number, (run, rest) in enumerate(zip(columns, resting, strict=True)):
             bridged = [_bridged(run[:, joint], rest[:, joint]) for joint in range(run.shape[1])]
             if self.encoders:
-                known = whiten_with_encoders(np.stack(bridged, 1), thinned, self.encoders[number], ORACLE.rate_hz)
-                white = list(known.transpose(1, 0, 2))
+                whole = whiten_with_encoders(np.stack(bridged, 1), thinned, self.encoders[number], ORACLE.rate_hz)
+                white = list(whole.transpose(1, 0, 2))
             else:
                 white = [thinned.whitened(each, joint, ORACLE.rate_hz) for joint, each in enumerate(bridged)]
             out += [np.where(rest[:, joint, None], 0.0, each) for joint, each in enumerate(white)]

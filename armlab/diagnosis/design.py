@@ -98,15 +98,18 @@ class DesignMatrix:
     def scanned_again(self, left: Callable[[str], Sequence[Array]]) -> "DesignMatrix":
         """With more shapes from families that look at what a fit leaves: what was left before hid the best ones.
 
-        left: what a fit leaves of each run without an effect, (samples, joints). Numbers of blocks do not change; a
-        shape that is found by the second look has been looked for twice.
+        left: what a fit leaves of each run without an effect, (samples, joints). Blocks that were there keep their
+        numbers. A place is corrected for what both looks have compared, because the looks of its blocks add up.
         """
-        blocks, known = list(self.blocks), {each.candidate for each in self.blocks if each.candidate.shape}
-        for family in (each for each in self.families if type(each).scan is not Family.scan):
-            for block in self._offered_blocks(family, left(family.effect)):
-                if block.candidate not in known:
-                    blocks.append(replace(block, candidate=block.candidate.looked_for_again()))
-        return replace(self, blocks=tuple(blocks))
+        known = {_scanned_shape(each.candidate) for each in self.blocks}
+        found = [
+            block
+            for family in self.families
+            if type(family).scan is not Family.scan
+            for block in self._offered_blocks(family, left(family.effect))
+            if block.candidate.looks > 1 and _scanned_shape(block.candidate) not in known
+        ]
+        return replace(self, blocks=(*self.blocks, *found)) if found else self
 
     def with_blocks(self, changed: dict[int, Block]) -> "DesignMatrix":
         """With other columns for some candidates, by their number."""
@@ -123,6 +126,11 @@ class DesignMatrix:
             if block.candidate.follows_model
         }
         return moved.with_blocks(follow)
+
+
+def _scanned_shape(candidate: Candidate) -> tuple[object, ...]:
+    """What a scan chooses: the law, its place and its shape."""
+    return type(candidate), place_of(candidate), candidate.shape
 
 
 def build_design_matrix(

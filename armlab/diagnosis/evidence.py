@@ -21,7 +21,7 @@ from armlab.diagnosis.blocks import (
 from armlab.diagnosis.data import rows_in
 from armlab.diagnosis.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.pushes import Stretch, reason_no_contact
+from armlab.diagnosis.pushes import make_stretch, reason_no_contact
 from armlab.diagnosis.refine import profile_without
 from armlab.diagnosis.search import Search, contained_groups, rival_formulas
 from armlab.diagnosis.solver import Fit, State
@@ -280,6 +280,7 @@ class Judge:
         block, joint = design.blocks[group], design.blocks[group].candidate.rows[0]
         push = block.values[:, 0] @ model.coefficients(model.fit)[model.solver.groups[group].columns]
         torque = design.observed.torque[:, joint] - model.residual_at(joint, model.fit) - push
+        windows = [block.candidate.columns(scene)[:, 0, 0] for scene in design.scenes]
         rest = profile_without(design, model.noise, model.solver, self.state.minus(group))
 
         def whiten(matrix: Array, joint: int) -> Array:
@@ -288,8 +289,7 @@ class Judge:
         def lead(law: Array) -> float:
             return rest.gain(block, whiten) - rest.gain(replace(block, values=law[:, None]), whiten)
 
-        stretch = Stretch(push, joint, torque, design.observed)
-        return reason_no_contact(stretch, lead, design.settings.tuning)
+        return reason_no_contact(make_stretch(design.observed, joint, windows, torque), lead, design.settings.tuning)
 
     def simpler(self, group: int) -> tuple[int, ...]:
         """See `contained_groups`."""

@@ -120,15 +120,19 @@ def scan_what_is_left(pruned: Pruned) -> Pruned:
     The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push.
     """
     before = pruned[0]
-    known = frozenset(range(len(before.design.blocks)))
-    model = with_design(before, scan_residual(before))
-    found = _search_again(model, known, fixed=True)
-    if found.state == model.state:
+    design, known = scan_residual(before), frozenset(range(len(before.design.blocks)))
+    if design is before.design:
         return pruned
-    better = refine_shapes(found.design, found.noise, found.solver, found.state, but=known)
-    refined = with_design(found, found.design.with_blocks(better))
-    again = _settle_links(_remove_failing(refined, known))
-    return again if again[0].fit.score > model.fit.score and _lasts(model, again[0]) else pruned
+    model = with_design(before, design)
+    found = _search_again(model, known, fixed=True)
+    if known.issuperset(found.state.groups):
+        return pruned
+    better = refine_shapes(design, found.noise, found.solver, found.state, but=known)
+    again = _settle_links(_remove_failing(with_design(found, design.with_blocks(better)) if better else found, known))
+    if again[0].fit.score > model.fit.score and _lasts(model, again[0]):
+        return again
+    step = Step("back to what passed before: what scans found beside it does not last", before.fit.score)
+    return replace(before, steps=(*again[0].steps, step)), pruned[1], pruned[2]
 
 
 def _lasts(before: FittedModel, after: FittedModel) -> bool:

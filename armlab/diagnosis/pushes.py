@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, rows_in
@@ -14,15 +15,47 @@ POWERS = (0, 1, 2)  # of what is beyond the range: a limit, a spring, a spring t
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A stretch of time in which something is said to push a joint (from 0).
+    """A stretch of time in which something is said to push a joint, at every sample of all runs, (samples,).
 
-    push: (rows,), its torque; torque: (rows,), what the model says of the joint without it, N m (N).
+    window: the push at a coefficient of one, not filtered. position, velocity; torque: what the model says of the joint
+    without the push, N m (N). moving: whether the joint moves. filtered: columns (samples, columns) through the filter
+    of the torque, (rows, columns).
     """
 
-    push: Array
-    joint: int
+    window: Array
+    position: Array
+    velocity: Array
     torque: Array
-    observed: Observed
+    moving: NDArray[np.bool_]
+    rate_hz: float
+    filtered: Callable[[Array], Array]
+
+
+def make_stretch(observed: Observed, joint: int, windows: list[Array], torque: Array) -> Stretch:
+    """A stretch of a joint (from 0). windows: one a run, (samples,). torque: (rows,), of the rows that were kept."""
+    moving = rows_in(observed.used(joint), observed.rows)
+    parts, start = list[tuple[Array, Array]](), 0
+    for signals in observed.signals:
+        stop = start + len(signals.torque)
+        between = [np.interp(signals.run.time, signals.time, each[start:stop]) for each in (torque, moving)]
+        parts.append((between[0], between[1]))
+        start = stop
+    edges = np.cumsum([len(each) for each in windows])[:-1]
+
+    def filtered(columns: Array) -> Array:
+        runs = zip(observed.signals, np.split(columns, edges), strict=True)
+        return np.concatenate([signals.filter(run) for signals, run in runs])
+
+    motions = [signals.motion for signals in observed.signals]
+    return Stretch(
+        window=np.concatenate(windows),
+        position=np.concatenate([each.position[:, joint] for each in motions]),
+        velocity=np.concatenate([each.velocity[:, joint] for each in motions]),
+        torque=np.concatenate([each[0] for each in parts]),
+        moving=np.concatenate([each[1] for each in parts]) > 0.5,
+        rate_hz=observed.signals[0].run.rate_hz,
+        filtered=filtered,
+    )
 
 
 def reason_no_contact(stretch: Stretch, lead: Callable[[Array], float], tuning: Tuning) -> str | None:
@@ -33,31 +66,36 @@ def reason_no_contact(stretch: Stretch, lead: Callable[[Array], float], tuning: 
     where that end was reached but once, in this stretch, the push has to be clearly likelier than a function of what is
     beyond.
     """
-    push, joint, observed, bounds = stretch.push, stretch.joint, stretch.observed, tuning.evidence
-    pushed = np.abs(push) > bounds.push_level * np.abs(push).max()
-    moving = pushed & rows_in(observed.used(joint), len(push))
-    moving_s = float(np.sum(moving)) / observed.rate_hz
+    window, bounds = np.abs(stretch.window), tuning.evidence
+    pushed = window > bounds.push_level * window.max()
+    moving = pushed & stretch.moving
+    moving_s = float(np.sum(moving)) / stretch.rate_hz
     if moving_s <= bounds.min_push_s or moving.sum() <= bounds.min_push_moving_share * pushed.sum():
         return "the joint hardly moves during it"
-    if not np.any(push == 0):
+    if not np.any(window == 0):
         return "it goes on all the time"
     for name, laws in _laws_of_the_end(stretch, pushed, bounds.max_extreme_share):
-        if min(lead(law) for law in laws) < tuning.pruning.least_evidence:
+        if min(lead(stretch.filtered(law)) for law in laws) < tuning.pruning.least_evidence:
             return f"no other stretch has such a {name}"
     return None
 
 
-def _laws_of_the_end(stretch: Stretch, pushed: Array, largest: float) -> Iterator[tuple[str, tuple[Array, ...]]]:
+def _laws_of_the_end(
+    stretch: Stretch, pushed: NDArray[np.bool_], largest: float
+) -> Iterator[tuple[str, tuple[Array, ...]]]:
     """Position, speed or torque of which more than a share of the push is beyond all else, and laws of what is beyond.
 
-    Each law has columns (rows, POWERS), by direction or not.
+    Each law has columns (samples, POWERS), by direction or not.
     """
-    position, velocity = (stretch.observed.kept(each)[:, stretch.joint] for each in ("position", "velocity"))
-    others, way = stretch.push == 0, np.sign(velocity)
-    for name, values in (("position", position), ("speed", np.abs(velocity)), ("torque", np.abs(stretch.torque))):
+    others, way = stretch.window == 0, np.sign(stretch.velocity)
+    variables = (
+        ("position", stretch.position, way),
+        ("speed", np.abs(stretch.velocity), way),
+        ("torque", np.abs(stretch.torque), np.sign(stretch.torque)),
+    )
+    for name, values, sign in variables:
         low, high = values[others].min(), values[others].max()
         beyond = np.maximum(values - high, 0) + np.maximum(low - values, 0)
         if np.mean(beyond[pushed] > 0) > largest:
             powers = np.column_stack([np.where(beyond > 0, (beyond / beyond.max()) ** power, 0.0) for power in POWERS])
-            sign = np.sign(stretch.torque) if name == "torque" else way
             yield name, (powers, powers * sign[:, None])

@@ -2,11 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from string import Formatter
 from types import MappingProxyType
-from typing import ClassVar, Literal, Self
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -265,12 +264,6 @@ class Candidate(ABC):
     @abstractmethod
     def with_shape(self, shape: tuple[float, ...]) -> "Candidate":
         """The same law at the same place with other nonlinear parameters."""
-
-    def looked_for_again(self) -> Self:
-        """The same law, chosen from twice as many alternatives."""
-        again = copy(self)
-        object.__setattr__(again, "looks", 2 * self.looks)
-        return again
 
     @abstractmethod
     def parameters(self, coefficients: Array) -> dict[str, Value]:

@@ -71,9 +71,9 @@ def test_encoders_hide_what_is_fast_and_not_what_is_slow(monkeypatch: pytest.Mon
     fine, coarse = (_answers(bits, monkeypatch, slow) for bits in (40, 14))
     assert fine.multiple_recorded == pytest.approx(fine.multiple, rel=0.05)
     assert coarse.multiple_recorded == pytest.approx(coarse.multiple, rel=0.1)
-    fast = Ripple(1, 0.1, 10.0, "sine", {"order": 200.0, "phase": 0.0})
+    fast = Ripple(1, 0.01, 10.0, "sine", {"order": 200.0, "phase": 0.0})
     fine, coarse = (_answers(bits, monkeypatch, fast) for bits in (40, 14))
     assert fine.multiple_recorded == pytest.approx(fine.multiple, rel=0.1)
     assert coarse.multiple_recorded < 0.6 * coarse.multiple
-    assert coarse.seen <= fine.seen
-    assert coarse.right_name <= fine.right_name
+    assert coarse.seen < 0.6 * fine.seen
+    assert coarse.right_name < 0.6 * fine.right_name

@@ -55,7 +55,7 @@ def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) 
     _, page = write_oracle([answer], tmp_path, tmp_path / "out")
     text = page.read_text(encoding="utf-8")
     assert "| payload | 1 | 2.0 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
-    assert "| **below** | 1 | 2.0 | 93 % |" in text
+    assert "| **of the library, below 3 limits, recorded** | 1 | 2.0 | 93 % |" in text
     pd.DataFrame([{**row, "case": "b"}]).to_csv(tmp_path / "effects.csv", index=False)
     with pytest.raises(InputError, match="the score of another set"):
         write_oracle([answer], tmp_path, tmp_path / "again")

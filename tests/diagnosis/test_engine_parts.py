@@ -326,4 +326,3 @@ def test_a_second_look_adds_what_a_scan_finds_then_and_leaves_what_was_there(ben
     more = [each.candidate for each in again.blocks[len(first.blocks) :]]
     assert {(each.effect, each.joint) for each in more} == {("external_contact", 1)}
     assert more[0].shape == pytest.approx((200 / cases.RATE_HZ, 300 / cases.RATE_HZ), abs=0.2)
-    assert all(each.looks == 2 * first.blocks[-1].candidate.looks for each in more)

@@ -1,15 +1,13 @@
 """When a name is withdrawn, when what is left is its own form, and what was no push."""
 
 from collections.abc import Mapping
-from types import SimpleNamespace
-from typing import Any, cast
 
 import engine_cases as cases
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from armlab.common.arrays import Array
-from armlab.diagnosis.data import Observed, Segment
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.pushes import Stretch, reason_no_contact
@@ -63,53 +61,67 @@ def test_what_a_named_law_leaves_of_itself_is_no_finding() -> None:
     assert not is_form_error(_left(0.4), {4: _evidence(5.0, joint=0)}, TUNING.unknown)
 
 
-TIME = np.arange(0, 20, 0.01)
-INSIDE = (TIME > 5) & (TIME < 6)
-PUSH = np.where(INSIDE, 3.0 * np.sin(np.pi * (TIME - 5)), 0.0)
+RATE_HZ = 200.0
+TIME = np.arange(0, 20, 1 / RATE_HZ)
+LOW_PASS = butter(4, 20.0, fs=RATE_HZ, output="sos")
 
 
-def _observed(position: Array, velocity: Array) -> Observed:
-    kept = {"position": position[:, None], "velocity": velocity[:, None]}
-    whole = (Segment(0, "identify", 0, len(position)),)
-    made: Any = SimpleNamespace(rate_hz=100.0, used=lambda joint: whole, kept=kept.__getitem__)
-    return cast(Observed, made)
+def _filtered(columns: Array) -> Array:
+    return np.asarray(sosfiltfilt(LOW_PASS, columns, axis=0)[::4])
 
 
-def _reason(push: Array, measured: Array, position: Array, torque: Array) -> str | None:
-    """What speaks against a push where `measured` is what acts, in white noise of 0.1 N m."""
+def _half_sine(start: float, end: float) -> Array:
+    return np.where((start < TIME) & (end > TIME), np.sin(np.pi * (TIME - start) / (end - start)), 0.0)
+
+
+def _box(start: float, end: float) -> Array:
+    return np.where((start < TIME) & (end > TIME), 1.0, 0.0)
+
+
+def _reason(window: Array, acts: Array, position: Array, torque: Array) -> str | None:
+    """What speaks against a push in a window where `acts` is what acts, 3 N m at its peak, in noise of 0.1 N m."""
+    stretch = Stretch(window, position, np.cos(TIME), torque, np.full(len(TIME), True), RATE_HZ, _filtered)
+    measured = _filtered(3.0 * acts[:, None])[:, 0]
 
     def explained(columns: Array) -> float:
-        fitted = columns @ np.linalg.lstsq(columns, measured)[0]
-        return float(fitted @ measured) / (2 * 0.1**2)
-
-    observed = _observed(position, np.cos(TIME))
+        return float(measured @ columns @ np.linalg.lstsq(columns, measured)[0]) / (2 * 0.1**2)
 
     def lead(law: Array) -> float:
-        return explained(push[:, None]) - explained(law)
+        return explained(_filtered(window[:, None])) - explained(law)
 
-    return reason_no_contact(Stretch(push, 0, torque, observed), lead, TUNING)
+    return reason_no_contact(stretch, lead, TUNING)
+
+
+def _beyond(start: float, end: float) -> Array:
+    """A state that goes beyond all else between two instants, as far before their middle as after it."""
+    return np.where((start < TIME) & (end > TIME), 1 + _half_sine(start, end) ** 2, np.sin(TIME))
 
 
 def test_a_push_in_a_state_that_came_often_is_one() -> None:
-    assert _reason(PUSH, PUSH, np.sin(TIME), np.sin(2 * TIME)) is None
+    push = _half_sine(5, 6)
+    assert _reason(push, push, np.sin(TIME), np.sin(2 * TIME)) is None
 
 
-def test_a_push_is_one_at_an_end_of_the_range_that_was_reached_once_if_no_law_of_that_end_fits() -> None:
-    early = np.where(INSIDE, 1 + np.sin(np.pi * (TIME - 5)) ** 2, np.sin(TIME))  # beyond as far before as after
-    late = np.where((TIME > 5) & (TIME < 5.5), PUSH, 0.0)  # a push on the way there alone
-    assert _reason(late, late, early, np.sin(TIME)) is None
+@pytest.mark.parametrize("where", ["position", "torque"])
+def test_a_push_at_an_end_of_the_range_that_was_reached_once_is_one_if_no_law_of_that_end_fits(where: str) -> None:
+    push, once = _half_sine(4.6, 6.0), _beyond(5.2, 6.0)
+    states = (once, np.sin(TIME)) if where == "position" else (np.sin(TIME), once)
+    assert _reason(push, push, *states) is None
+    assert _reason(push, (once - 1) * _box(5.2, 6.0), *states) == f"no other stretch has such a {where}"
 
 
-def test_what_follows_the_position_beyond_all_other_stretches_is_no_push() -> None:
-    reach = np.where(INSIDE, 1 + np.sin(np.pi * (TIME - 5)), np.sin(TIME))
-    assert _reason(PUSH, 3.0 * (reach - 1) * INSIDE, reach, np.sin(TIME)) == "no other stretch has such a position"
-    assert _reason(PUSH, 3.0 * (reach - 1) * INSIDE, np.sin(TIME), reach) == "no other stretch has such a torque"
+@pytest.mark.parametrize("power", [0, 1, 2])
+def test_a_law_of_what_is_beyond_all_other_stretches_is_no_push(power: int) -> None:
+    once = _beyond(5.0, 6.0)
+    law = (once - 1) ** power * _box(5.0, 6.0)
+    for window in (_half_sine(5.0, 6.0), _box(5.0, 6.0)):
+        assert _reason(window, law, once, np.sin(TIME)) == "no other stretch has such a position"
 
 
 def test_a_push_that_never_ends_is_none() -> None:
-    assert _reason(np.full(len(TIME), 3.0), PUSH, np.sin(TIME), TIME) == "it goes on all the time"
+    assert _reason(np.ones(len(TIME)), _half_sine(5, 6), np.sin(TIME), TIME) == "it goes on all the time"
 
 
 def test_a_short_push_is_a_reversal() -> None:
-    short = np.where((TIME > 5) & (TIME < 5.1), 3.0, 0.0)
+    short = _box(5.0, 5.1)
     assert _reason(short, short, np.sin(TIME), np.sin(TIME)) == "the joint hardly moves during it"
