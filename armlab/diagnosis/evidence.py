@@ -289,7 +289,11 @@ class Judge:
         def lead(law: Array) -> float:
             return rest.gain(block, whiten) - rest.gain(replace(block, values=law[:, None]), whiten)
 
-        return reason_no_contact(make_stretch(design.observed, joint, windows, torque), lead, design.settings.tuning)
+        inside = (model.solver.groups[each].candidate for each in self.state.groups)
+        remembers = any(each.is_friction_of(joint + 1) and each.of_time for each in inside)
+        tuning = design.settings.tuning
+        creep = tuning.data.creep_ratio if remembers else None
+        return reason_no_contact(make_stretch(design.observed, joint, windows, torque, creep), lead, tuning)
 
     def simpler(self, group: int) -> tuple[int, ...]:
         """See `contained_groups`."""

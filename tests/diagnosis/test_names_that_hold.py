@@ -78,9 +78,10 @@ def _box(start: float, end: float) -> Array:
     return np.where((start < TIME) & (end > TIME), 1.0, 0.0)
 
 
-def _reason(window: Array, acts: Array, position: Array, torque: Array) -> str | None:
+def _reason(window: Array, acts: Array, position: Array, torque: Array, unsettled_s: float = 0.0) -> str | None:
     """What speaks against a push in a window where `acts` is what acts, 3 N m at its peak, in noise of 0.1 N m."""
-    stretch = Stretch(window, position, np.cos(TIME), torque, np.full(len(TIME), True), RATE_HZ, _filtered)
+    moving = np.full(len(TIME), True)
+    stretch = Stretch(window, position, np.cos(TIME), torque, moving, unsettled_s > TIME, RATE_HZ, _filtered)
     measured = _filtered(3.0 * acts[:, None])[:, 0]
 
     def explained(columns: Array) -> float:
@@ -125,3 +126,9 @@ def test_a_push_that_never_ends_is_none() -> None:
 def test_a_short_push_is_a_reversal() -> None:
     short = _box(5.0, 5.1)
     assert _reason(short, short, np.sin(TIME), np.sin(TIME)) == "the joint hardly moves during it"
+
+
+def test_a_push_before_friction_with_a_memory_has_settled_is_none() -> None:
+    push, often = _half_sine(1.0, 2.0), (np.sin(TIME), np.sin(2 * TIME))
+    assert _reason(push, push, *often, unsettled_s=3.0) == "the friction of the joint may have been bent before"
+    assert _reason(push, push, *often, unsettled_s=1.2) is None
