@@ -1,5 +1,6 @@
 """Commands on concealed cases: make and score them, the proof, the value of each guard, and the closed loop."""
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -130,7 +131,8 @@ def conceal(
 @click.option("--development", is_flag=True, help="A set for development.")
 @click.option("--score", "scored", type=_FOLDER, help="Folder with the score of a diagnosis of the same set.")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
-@click.option("--out", type=OutputPath(), required=True, help="Folder for oracle.csv and oracle.md.")
+@click.option("--work", type=OutputPath(), help="Folder for answers; an interrupted command continues there.")
+@click.option("--out", type=OutputPath(), help="Folder for oracle.csv and oracle.md [default: that of --score].")
 @prints_lines
 def oracle(
     cases: int,
@@ -139,22 +141,35 @@ def oracle(
     development: bool,
     scored: Path | None,
     jobs: int,
-    out: Path,
+    work: Path | None,
+    out: Path | None,
 ) -> Iterator[str]:
     """Ask what anyone could name of a concealed set.
 
     Simulates the set again and compares every hidden effect with all laws, of the library and outside it (extra
-    `engines`).
+    `engines`). In the folder of a score, the distance to the oracle is added to its page.
     """
     from tqdm import tqdm
 
-    from armlab.concealed.naming_oracle_page import ask_about_set, write_oracle
+    from armlab.concealed.naming_oracle_page import ask_about_set, check_score, collect_answers, write_oracle
+    from armlab.concealed.score.scoring import PAGE_FILE, SCORE_FILE, write_page_again
     from armlab.concealed.sets import make_set_settings
 
+    out = out or scored
+    if out is None:
+        raise click.UsageError("--out or --score is needed, the folder for oracle.csv and oracle.md")
     settings = make_set_settings(cases, seed, tier, "mixed", development)
-    answers = [each for own in tqdm(ask_about_set(settings, jobs), total=cases, unit="case") for each in own]
-    for path in write_oracle(answers, scored, out):
+    if scored is not None:
+        check_score(settings, scored)
+    work = work or Path(".armlab/oracle") / str(seed)
+    for _ in tqdm(ask_about_set(settings, work, jobs), total=cases, unit="case", desc="asked"):
+        pass
+    for path in write_oracle(collect_answers(settings, work), scored, out):
         yield f"wrote {path}"
+    shutil.rmtree(work)
+    if (out / SCORE_FILE).is_file():
+        write_page_again(out)
+        yield f"{out / PAGE_FILE}: written again with the distance to the oracle"
 
 
 @click.command()

@@ -24,6 +24,7 @@ from scipy.stats import norm
 
 from armlab.common.arrays import Array
 from armlab.concealed.case_files import encoder_steps
+from armlab.concealed.effects.friction import EarlyFriction
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
 from armlab.concealed.encoder_noise import encoder_noise
@@ -53,6 +54,7 @@ from armlab.concealed.sizing import (
     oracle_grid,
 )
 
+LAWS: tuple[type[HiddenEffect], ...] = (*LIBRARY, *OUTSIDE, EarlyFriction)
 LOOKS, LINK_DRAWS = 3, 12  # draws at every place, and where the sum of draws counts
 SOUGHT, DRAWS, STEPS, ROUNDS = 6, 12, 8, 2  # laws that are sought further, by draws and by rounds of steps
 STEP_SHARE = 0.3  # of a number, standard deviation of a step about the best draw
@@ -199,7 +201,7 @@ def _distances(
     peak = np.max(
         [np.abs(track.load + law_torque(bench.others, track, 0)).max(axis=0) for track in bench.tracks], axis=0
     )
-    places = [(kind, int(joint)) for kind in (*LIBRARY, *OUTSIDE) for joint in kind.places(machine)]
+    places = [(kind, int(joint)) for kind in LAWS for joint in kind.places(machine)]
     looked = [each for each in (_first_look(bench, effect, own, place, peak, rng) for place in places) if each]
     looked.sort(key=lambda each: each[0])
     for left, kind, first in looked[:SOUGHT]:
@@ -227,7 +229,7 @@ def _first_look(
     if kind.where == "link":
         return _left_by_all(own, [bench.rows(each) for each in (first, *more)]), kind, first
     tried = [first] if first.has_parts else [first, *more]
-    left = [_left_by(own, bench.rows(each)) for each in tried]
+    left = [_left_by(own, bench, each) for each in tried]
     return min(left), kind, tried[int(np.argmin(left))]
 
 
@@ -240,11 +242,11 @@ def _draws(
 def _is_right(other: HiddenEffect, effect: HiddenEffect, bench: _Bench) -> bool:
     """Whether another law has the right name, or one that the score counts as right, or holds the right one.
 
-    A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred. Outside
-    the library no name of another law is right.
+    A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred. Of an
+    effect outside the library, the right answer is that it is there: any other law outside says so, too.
     """
     if type(effect) in OUTSIDE:
-        return other.effect == effect.effect and other.place == effect.place
+        return type(other) in OUTSIDE
     if other.place == effect.place and (
         other.effect in (effect.effect, *effect.equivalent) or _holds(type(other), type(effect))
     ):
@@ -260,11 +262,11 @@ def _holds(other: type[HiddenEffect], effect: type[HiddenEffect]) -> bool:
 
 def _left_by_best(bench: _Bench, own: Array, draws: Sequence[HiddenEffect], rng: np.random.Generator) -> float:
     """What the best of some laws leaves, and the best of steps about it."""
-    tried = [(_left_by(own, bench.rows(each)), each) for each in draws]
+    tried = [(_left_by(own, bench, each), each) for each in draws]
     for _ in range(ROUNDS):
         left, best = min(tried, key=lambda each: each[0])
         tried = [(left, best)]
-        tried += [(_left_by(own, bench.rows(each)), each) for each in (_stepped(best, rng) for _ in range(STEPS))]
+        tried += [(_left_by(own, bench, each), each) for each in (_stepped(best, rng) for _ in range(STEPS))]
     return min(each[0] for each in tried)
 
 
@@ -277,9 +279,12 @@ def _stepped(effect: HiddenEffect, rng: np.random.Generator) -> HiddenEffect:
     return replace(effect, shape=moved)
 
 
-def _left_by(own: Array, other: Array) -> float:
-    power = float(other @ other)
-    return float(own @ own) - (float(own @ other) ** 2 / power if power > 0 else 0.0)
+def _left_by(own: Array, bench: _Bench, other: HiddenEffect) -> float:
+    rows = bench.rows(other)
+    power, shared = float(rows @ rows), float(own @ rows)
+    if isinstance(other, EarlyFriction):  # which is never late
+        shared = max(shared, 0.0)
+    return float(own @ own) - (shared**2 / power if power > 0 else 0.0)
 
 
 def _left_by_all(own: Array, others: Sequence[Array]) -> float:

@@ -1,5 +1,6 @@
 """The table of the naming oracle: what anyone could name, effect by effect, and what the diagnosis named."""
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
@@ -10,27 +11,53 @@ from joblib import Parallel, delayed
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.concealed.folders import claim_folder
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
+from armlab.concealed.score.distance import ORACLE_PAGE, ORACLE_TABLE, format_share, join_with_score, read_effects
 from armlab.concealed.score.measures import MIN_NAMED_MULTIPLE
+from armlab.concealed.score.scoring import SCORE_FILE
 from armlab.concealed.sets import SetSettings
 from armlab.concealed.sizing import simulate_case
 
-TABLE_FILE, PAGE_FILE = "oracle.csv", "oracle.md"
-KEYS = ["case", "tier", "effect", "joint"]
-WHOLE_ARM = 0  # in the place of a joint, so that tables can be joined
+
+def check_score(settings: SetSettings, score: Path) -> None:
+    """Raises InputError for a folder that does not hold the score of a set of that seed and size."""
+    try:
+        found = json.loads((score / SCORE_FILE).read_text(encoding="utf-8"))
+        seed, cases = found["seed"], found["cases"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"{score} holds no score: {SCORE_FILE} is expected there") from None
+    if (seed, cases) != (settings.seed, settings.cases):
+        raise InputError(f"{score} is the score of another set: seed {seed}, {cases} cases")
 
 
-def ask_about_set(settings: SetSettings, jobs: int) -> Iterator[list[OracleAnswer]]:
-    """What the oracle says of the effects of each case of a set that are expected to be named."""
-    work = (delayed(_ask_about_case)(settings, number) for number in range(settings.cases))
-    yield from Parallel(n_jobs=jobs, return_as="generator")(work)
+def ask_about_set(settings: SetSettings, work: Path, jobs: int) -> Iterator[str]:
+    """Asks the oracle about the cases of a set that have no answer in the folder `work`; yields the name of each.
+
+    Raises InputError for a folder of another set.
+    """
+    claim_folder(settings, work)
+    missing = [number for number in range(settings.cases) if not _answer_file(settings, number, work).is_file()]
+    asked = (delayed(_ask_about_case)(settings, number, work) for number in missing)
+    yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(asked)
 
 
-def _ask_about_case(settings: SetSettings, number: int) -> list[OracleAnswer]:
-    plan = settings.plan(number)
-    if plan.kind in ("null", "decoy"):
-        return []
-    return list(ask_oracle(simulate_case(plan), MIN_NAMED_MULTIPLE))
+def collect_answers(settings: SetSettings, work: Path) -> list[OracleAnswer]:
+    """What the oracle says of the effects of a set that are expected to be named."""
+    files = [_answer_file(settings, number, work) for number in range(settings.cases)]
+    return [OracleAnswer(**each) for file in files for each in json.loads(file.read_text(encoding="utf-8"))]
+
+
+def _ask_about_case(settings: SetSettings, number: int, work: Path) -> str:
+    plan, file = settings.plan(number), _answer_file(settings, number, work)
+    hides_nothing = plan.kind in ("null", "decoy")
+    answers = [] if hides_nothing else [asdict(each) for each in ask_oracle(simulate_case(plan), MIN_NAMED_MULTIPLE)]
+    write_texts({file.name: json.dumps(answers) + "\n"}, work)
+    return plan.name
+
+
+def _answer_file(settings: SetSettings, number: int, work: Path) -> Path:
+    return work / f"{settings.plan(number).name}.json"
 
 
 def write_oracle(answers: Sequence[OracleAnswer], score: Path | None, out: Path) -> tuple[Path, ...]:
@@ -40,7 +67,7 @@ def write_oracle(answers: Sequence[OracleAnswer], score: Path | None, out: Path)
     """
     columns = [field.name for field in fields(OracleAnswer)]
     table = pd.DataFrame([asdict(each) for each in answers], columns=columns)
-    known = table if score is None else _beside_score(table, score)
+    known = table if score is None else join_with_score(table, read_effects(score), score)
     sections = [
         part
         for tier in sorted(set(known["tier"]))
@@ -55,19 +82,7 @@ def write_oracle(answers: Sequence[OracleAnswer], score: Path | None, out: Path)
         "often, and the median distance from it in standard deviations.",
         *sections,
     )
-    return write_texts({TABLE_FILE: table.to_csv(index=False), PAGE_FILE: page}, out)
-
-
-def _beside_score(table: pd.DataFrame, score: Path) -> pd.DataFrame:
-    path = score / "effects.csv"
-    if not path.is_file():
-        raise InputError(f"{score} holds no score: {path.name} is expected there")
-    found = pd.read_csv(path, dtype={"case": str}, keep_default_na=False, na_values=[""])
-    tables = [each.assign(joint=each["joint"].fillna(WHOLE_ARM).astype(int)) for each in (table, found)]
-    joined = tables[0].merge(tables[1][[*KEYS, "named_first", "named_class"]], on=KEYS, how="left")
-    if joined["named_first"].isna().any():
-        raise InputError(f"{score} is the score of another set: give --seed and --cases of that set")
-    return joined
+    return write_texts({ORACLE_TABLE: table.to_csv(index=False), ORACLE_PAGE: page}, out)
 
 
 def _effects_table(table: pd.DataFrame) -> str:
@@ -93,7 +108,7 @@ def _effects_table(table: pd.DataFrame) -> str:
 
 def _row(name: str, own: pd.DataFrame) -> tuple[str, ...]:
     def share(column: str) -> str:
-        return f"{100 * float(own[column].astype(float).mean()):.0f} %" if column in own else "-"
+        return format_share(own[column]) if column in own else "-"
 
     hardest = str(own["rival"].mode()[0]).replace("_", " ")
     return (

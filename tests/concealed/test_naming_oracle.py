@@ -1,5 +1,6 @@
 """The oracle of names: it names what is large and unlike anything else, and mistakes what another law imitates."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,19 +8,24 @@ import pandas as pd
 import pytest
 
 from armlab.common.errors import InputError
-from armlab.concealed.effects.channels import Gain
-from armlab.concealed.effects.friction import Viscous
+from armlab.concealed.effects.channels import Gain, Skew
+from armlab.concealed.effects.friction import Coulomb, Viscous
+from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
-from armlab.concealed.naming_oracle_page import write_oracle
+from armlab.concealed.naming_oracle_page import ask_about_set, check_score, collect_answers, write_oracle
 from armlab.concealed.plan import draw_plan
+from armlab.concealed.score.distance import distance_table, read_oracle_table, remove_oracle
+from armlab.concealed.score.scoring import SCORE_FILE
+from armlab.concealed.sets import make_set_settings
 from armlab.concealed.sizing import limit_noncentrality, simulate_case
 
 PLAN_INDEX = next(index for index in range(60) if draw_plan(1003, index, "clean", True, True).machine.name == "scara")
 
 
-def answer_to(hidden: object) -> OracleAnswer:
+def answer_to(*hidden: HiddenEffect) -> OracleAnswer:
+    """What the oracle says of the last one."""
     plan = draw_plan(1003, PLAN_INDEX, "clean", only_nulls=True, development=True)
-    (answer,) = ask_oracle(simulate_case(plan, (hidden,)), 0.0)  # type: ignore[arg-type]
+    *_, answer = ask_oracle(simulate_case(plan, hidden), 0.0)
     return answer
 
 
@@ -46,18 +52,54 @@ def test_a_law_that_holds_the_right_one_as_a_limit_is_no_rival() -> None:
     assert found.rival not in ("stribeck_friction", "friction_curve", "asymmetric_friction", "friction_drift")
 
 
-def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) -> None:
-    answer = OracleAnswer(
-        "a", "clean", "payload", "compact", 2, False, 5.0, 2.0, 0.9, "rotor_inertia", 2, 3.0, 0.93, 1.0
+def test_a_channel_is_mistaken_for_friction_that_begins_early_only_where_it_is_early() -> None:
+    friction = Coulomb(0, 3.0, 100.0, "sign", {"width": 0.02})
+    early, late = (
+        answer_to(friction, Skew(0, 2e-3, 1.0, "shift", {"direction": direction})) for direction in (-1.0, 1.0)
     )
-    row = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_first": False, "named_class": True}
-    pd.DataFrame([row]).to_csv(tmp_path / "effects.csv", index=False)
-    _, page = write_oracle([answer], tmp_path, tmp_path / "out")
+    assert early.rival == "early_friction"
+    assert late.rival != "early_friction"
+
+
+ANSWER = OracleAnswer("a", "clean", "payload", "compact", 2, False, 5.0, 2.0, 0.9, "rotor_inertia", 2, 3.0, 0.93, 1.0)
+EFFECT = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_first": False, "named_class": True}
+
+
+def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) -> None:
+    pd.DataFrame([EFFECT]).to_csv(tmp_path / "effects.csv", index=False)
+    _, page = write_oracle([ANSWER], tmp_path, tmp_path / "out")
     text = page.read_text(encoding="utf-8")
     assert "| payload | 1 | 2.0 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
     assert "| **of the library, below 3 limits, recorded** | 1 | 2.0 | 93 % |" in text
-    pd.DataFrame([{**row, "case": "b"}]).to_csv(tmp_path / "effects.csv", index=False)
-    with pytest.raises(InputError, match="the score of another set"):
-        write_oracle([answer], tmp_path, tmp_path / "again")
+    pd.DataFrame([{**EFFECT, "case": "b"}]).to_csv(tmp_path / "effects.csv", index=False)
+    with pytest.raises(InputError, match="of another set"):
+        write_oracle([ANSWER], tmp_path, tmp_path / "again")
     with pytest.raises(InputError, match="holds no score"):
-        write_oracle([answer], tmp_path / "out", tmp_path / "again")
+        write_oracle([ANSWER], tmp_path / "out", tmp_path / "again")
+
+
+def test_a_score_shows_its_distance_to_the_oracle(tmp_path: Path) -> None:
+    write_oracle([ANSWER], None, tmp_path)
+    known = read_oracle_table(tmp_path, pd.DataFrame([EFFECT]))
+    assert known is not None
+    assert "right name or class of four, above 3 limits | 100 % | 100 % | 100 % | 1 |" in distance_table(known)
+    with pytest.raises(InputError, match="of another set"):
+        read_oracle_table(tmp_path, pd.DataFrame([{**EFFECT, "joint": 1}]))
+    remove_oracle(tmp_path)
+    assert read_oracle_table(tmp_path, pd.DataFrame([EFFECT])) is None
+
+
+def test_an_interrupted_command_asks_only_what_has_no_answer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    settings = make_set_settings(6, 1003, "clean", "mixed", True)
+    monkeypatch.setattr("armlab.concealed.naming_oracle_page.simulate_case", lambda plan: plan)
+    monkeypatch.setattr(
+        "armlab.concealed.naming_oracle_page.ask_oracle", lambda plan, _: [replace(ANSWER, case=plan.name)]
+    )
+    first = next(ask_about_set(settings, tmp_path / "work", 1))
+    rest = list(ask_about_set(settings, tmp_path / "work", 1))
+    assert sorted([first, *rest]) == sorted(settings.plan(number).name for number in range(6))
+    hiding = [plan.name for plan in map(settings.plan, range(6)) if plan.kind not in ("null", "decoy")]
+    assert [each.case for each in collect_answers(settings, tmp_path / "work")] == hiding
+    (tmp_path / SCORE_FILE).write_text('{"seed": 1004, "cases": 6}', encoding="utf-8")
+    with pytest.raises(InputError, match="another set: seed 1004"):
+        check_score(settings, tmp_path)

@@ -254,6 +254,26 @@ class Drift(HiddenEffect):
         return np.asarray(self.size * (self.shape["final"] + cold) * velocity)
 
 
+class EarlyFriction(HiddenEffect):
+    """tau = F (sgn(v(t + L)) - sgn(v(t))): friction that turns before the joint does. size: F, N m.
+
+    A joint that sticks does that. No case hides it by itself: the second engine and real joints have it.
+    """
+
+    effect, forms = "early_friction", ("lead",)
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:
+        """Leads L of 1 to 20 ms, s."""
+        level = torque_share(0.03, machine, joint)
+        lead = float(np.exp(rng.uniform(np.log(1e-3), np.log(2e-2))))
+        return cls(joint, level, 7 * level, cls.draw_form(rng), {"lead": lead})
+
+    def torque(self, track: Track, run: int) -> Array:
+        sign = smooth_sign(track.velocity[:, self.joint])
+        return np.asarray(self.size * (np.interp(track.time + self.shape["lead"], track.time, sign) - sign))
+
+
 def recursion(kept: Array, added: Array) -> Array:
     """States of x[k] = kept[k] x[k-1] + added[k] from rest, (steps,)."""
     state, states = 0.0, []

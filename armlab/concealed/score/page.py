@@ -6,6 +6,7 @@ from typing import Any
 import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.concealed.score.distance import HOW_TO_READ_DISTANCES, distance_table
 from armlab.concealed.score.gallery import CASES_PER_GROUP, GALLERY_PAGE, tally_outcomes
 from armlab.concealed.score.measures import (
     MEASURE_TEXTS,
@@ -62,13 +63,20 @@ CAPTIONS = {
 }
 
 
-def render_page(table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, drawn: list[str]) -> str:
-    """The score of a set. missed: see `misses`. drawn: names of the figures, without suffix."""
+def render_page(
+    table: ScoreRows, result: dict[str, Any], missed: pd.DataFrame, drawn: list[str], oracle: pd.DataFrame | None = None
+) -> str:
+    """The score of a set.
+
+    missed: see `misses`. drawn: names of the figures, without suffix. oracle: see `read_oracle_table`.
+    """
     tiers = {tier: [Measure(**each) for each in found] for tier, found in result["tiers"].items()}
     kind = "Development set, not judged." if result["development"] else "Judged set."
     seal = f"{kind} {result['cases']} cases, seed {result['seed']}, manifest SHA-256 `{result['manifest']}`."
     seal += "" if result["development"] else " All judged runs: [log](../log.md)."
     parts = [seal, "## Wanted and found", _wanted_table(tiers), HOW_TO_READ]
+    if oracle is not None:
+        parts += ["## How far could anyone get?", distance_table(oracle), HOW_TO_READ_DISTANCES]
     parts += [
         "## What became of each",
         tally_outcomes(table),

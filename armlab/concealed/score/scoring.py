@@ -11,6 +11,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import all_or_none, write_texts
 from armlab.concealed.formats import SetManifest
 from armlab.concealed.score.cases import JudgedCase, read_cases
+from armlab.concealed.score.distance import read_oracle_table, remove_oracle
 from armlab.concealed.score.figures import draw_figures
 from armlab.concealed.score.gallery import remove_other_pictures, write_gallery
 from armlab.concealed.score.measures import (
@@ -45,6 +46,7 @@ def score_set(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> di
         drawn = [path.stem for path in draw_figures(table, draft)]
         (draft / PAGE_FILE).write_text(render_page(table, result, missed, drawn), encoding="utf-8")
     remove_other_pictures(out, shown)
+    remove_oracle(out)
     return result
 
 
@@ -57,7 +59,8 @@ def write_page_again(folder: Path) -> dict[str, Any]:
         result = json.loads((folder / SCORE_FILE).read_text(encoding="utf-8"))
         table = ScoreRows(*(_read_table(folder / f"{name}.csv") for name in ROW_TABLES))
         drawn = [name for name in CAPTIONS if (folder / f"{name}.svg").is_file()]
-        page = render_page(table, result, _read_table(folder / MISSES_FILE), drawn)
+        oracle = read_oracle_table(folder, table.effects)
+        page = render_page(table, result, _read_table(folder / MISSES_FILE), drawn, oracle)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{folder} holds no whole score ({error}): score its set again with --verdicts") from None
     write_texts({PAGE_FILE: page}, folder)

@@ -1,0 +1,80 @@
+"""How far a score is from what anyone could name: the table that the oracle of names wrote beside it."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from armlab.common.errors import InputError
+from armlab.common.markdown import markdown_table
+from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE
+
+ORACLE_TABLE, ORACLE_PAGE = "oracle.csv", "oracle.md"
+KEYS = ["case", "tier", "effect", "joint"]
+WHOLE_ARM = 0  # in the place of a joint, so that tables can be joined
+SHARES = {  # of effects above three limits: measure, whether outside the library, of the diagnosis, of the oracle
+    "right_name": (False, "named_first", "right_name"),
+    "right_name_or_class": (False, "named_class", "right_class"),
+    "unknown_outside": (True, "named_first", "right_name"),
+}
+HOW_TO_READ_DISTANCES = (
+    "The same effects before an observer who knows the noise and the equations of all laws, of the library and outside "
+    "it, and has positions as the encoders round them: [effect by effect](oracle.md). *Below*: of effects that this "
+    f"observer has below {MIN_NAMED_MULTIPLE:g} limits."
+)
+
+
+def read_oracle_table(folder: Path, effects: pd.DataFrame) -> pd.DataFrame | None:
+    """The oracle's table in the folder of a score beside what was named; None where there is none.
+
+    effects: those of the score. Raises InputError for the table of another set.
+    """
+    path = folder / ORACLE_TABLE
+    if not path.is_file():
+        return None
+    return join_with_score(pd.read_csv(path, dtype={"case": str}), effects, path)
+
+
+def read_effects(score: Path) -> pd.DataFrame:
+    """The table of hidden effects in the folder of a score. Raises InputError where there is none."""
+    path = score / "effects.csv"
+    if not path.is_file():
+        raise InputError(f"{score} holds no score: {path.name} is expected there")
+    return pd.read_csv(path, dtype={"case": str}, keep_default_na=False, na_values=[""])
+
+
+def join_with_score(table: pd.DataFrame, effects: pd.DataFrame, source: Path) -> pd.DataFrame:
+    """The oracle's rows with what was named of each effect; InputError with the source for another set."""
+    tables = [each.assign(joint=each["joint"].fillna(WHOLE_ARM).astype(int)) for each in (table, effects)]
+    joined = tables[0].merge(tables[1][[*KEYS, "named_first", "named_class"]], on=KEYS, how="left")
+    if joined["named_first"].isna().any():
+        raise InputError(f"{source} is of another set: give --seed, --tier and --cases of the set that was scored")
+    return joined
+
+
+def remove_oracle(folder: Path) -> None:
+    """Removes what the oracle wrote beside an earlier score."""
+    for name in (ORACLE_TABLE, ORACLE_PAGE):
+        (folder / name).unlink(missing_ok=True)
+
+
+def distance_table(known: pd.DataFrame) -> str:
+    """What was named of what the oracle names, and of what it sees, in each tier. known: see `read_oracle_table`."""
+    tiers = sorted(set(known["tier"]))
+    heads = ["measure", *(f"{tier}: {what}" for tier in tiers for what in ("diagnosis", "oracle", "below", "of"))]
+    rows = [[MEASURE_TEXTS[id].title, *_distances(known, id, tiers)] for id in SHARES]
+    return markdown_table(heads, rows, numbers=range(1, len(heads)))
+
+
+def _distances(known: pd.DataFrame, id: str, tiers: list[str]) -> list[str]:
+    outside, diagnosis, oracle = SHARES[id]
+    cells = []
+    for tier in tiers:
+        own = known[(known["tier"] == tier) & (known["outside"].astype(bool) == outside)]
+        below = own["multiple_recorded"] <= MIN_NAMED_MULTIPLE
+        cells += [*(format_share(own[column]) for column in (diagnosis, oracle)), format_share(below), str(len(own))]
+    return cells
+
+
+def format_share(values: pd.Series) -> str:
+    """The mean of shares or of what is true, in per cent."""
+    return f"{100 * float(values.astype(float).mean()):.0f} %" if len(values) else "-"
