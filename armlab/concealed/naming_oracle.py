@@ -55,6 +55,7 @@ from armlab.concealed.sizing import (
 )
 
 LAWS: tuple[type[HiddenEffect], ...] = (*LIBRARY, *OUTSIDE, EarlyFriction)
+AWAY_S = 0.025  # a period of 40 Hz: what is nearer to a reversal counts as at the reversal
 LOOKS, LINK_DRAWS = 3, 12  # draws at every place, and where the sum of draws counts
 SOUGHT, DRAWS, STEPS, ROUNDS = 6, 12, 8, 2  # laws that are sought further, by draws and by rounds of steps
 STEP_SHARE = 0.3  # of a number, standard deviation of a step about the best draw
@@ -71,7 +72,8 @@ LIMITS = {  # what a law is at an end of the range of its numbers, beside what i
 class OracleAnswer:
     """What the oracle says of one hidden effect. multiple: its size in detection limits.
 
-    multiple_recorded: the same of an oracle that has recorded positions. seen: the probability that this one finds it.
+    multiple_recorded: the same of an oracle that has recorded positions; multiple_away: of one that has nothing within
+    25 ms of a reversal of each joint. seen: the probability that the one with recorded positions finds it.
     rival: the law that is hardest to tell from it, at its place (from 1, None for the whole arm), and distance: d.
     right_name, right_class: probabilities.
     """
@@ -84,6 +86,7 @@ class OracleAnswer:
     outside: bool
     multiple: float
     multiple_recorded: float
+    multiple_away: float
     seen: float
     rival: str
     rival_joint: int | None
@@ -96,7 +99,8 @@ class OracleAnswer:
 class _Bench:
     """Where laws are compared: coarse tracks of a case, and rows without what is free.
 
-    others: effects beside the one that is asked. motion_known, oracle: know the motion, or have recorded positions.
+    others: effects beside the one that is asked. motion_known, oracle: know the motion, or have recorded positions;
+    away: has recorded positions away from reversals.
     beside: plain friction that is free for it, (samples, joints, columns) a run, or None. absorbed_rotors: joints (from
     1) whose rotor no motion separates from the links.
     """
@@ -108,6 +112,7 @@ class _Bench:
     others: tuple[HiddenEffect, ...]
     motion_known: Oracle
     oracle: Oracle
+    away: Oracle
     beside: Sequence[Array] | None
     absorbed_rotors: tuple[int, ...]
 
@@ -143,7 +148,8 @@ def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
     bench = _make_bench(case, number)
     joints, torque = plan.machine.joints, bench.torque(effect)
     coarse = max(bench.motion_known.multiple(torque, bench.beside), 1e-150)
-    own = bench.oracle.rows_without_free(torque, bench.beside) * case.multiples[number] / coarse  # as in the recording
+    scale = case.multiples[number] / coarse  # from the coarse simulation to the recording
+    own = bench.oracle.rows_without_free(torque, bench.beside) * scale
     power = float(own @ own)
     seen = detection_power(power, joints)
     rng = plan.stream(f"oracle {number}")
@@ -159,6 +165,7 @@ def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
         outside=type(effect) in OUTSIDE,
         multiple=case.multiples[number],
         multiple_recorded=float(np.sqrt(power / limit_noncentrality(joints))),
+        multiple_away=bench.away.multiple(torque, bench.beside) * scale,
         seen=seen,
         rival=law,
         rival_joint=place,
@@ -188,6 +195,7 @@ def _make_bench(case: SimulatedCase, number: int) -> _Bench:
         others=others,
         motion_known=make_oracle(plan, tracks),
         oracle=make_oracle(plan, tracks, encoders),
+        away=make_oracle(plan, tracks, encoders, AWAY_S),
         beside=companion_columns(plan, effect, chosen),
         absorbed_rotors=absorbed,
     )

@@ -76,8 +76,9 @@ def write_oracle(answers: Sequence[OracleAnswer], score: Path | None, out: Path)
     page = markdown_page(
         "How far could anyone get?",
         f"Effects above {MIN_NAMED_MULTIPLE:g} detection limits, which are those of an observer who knows the motion. "
-        "*Limits, recorded*: their median for one who has positions as the encoders round them. *Oracle*: what such an "
-        "observer names who knows the noise and the equations of all laws, of the library and outside it. *Diagnosis*: "
+        "*Limits, recorded*: their median for one who has positions as the encoders round them; *away from reversals*: "
+        "for one who has nothing within 25 ms of a reversal of each joint. *Oracle*: what such an observer (with all "
+        "rows) names who knows the noise and the equations of all laws, of the library and outside it. *Diagnosis*: "
         "what was named blindly; outside the library, what was called unknown. *Hardest*: the law that is nearest most "
         "often, and the median distance from it in standard deviations.",
         *sections,
@@ -90,6 +91,7 @@ def _effects_table(table: pd.DataFrame) -> str:
         "effect",
         "cases",
         "limits, recorded",
+        "away from reversals",
         "oracle: name",
         "oracle: class of four",
         "diagnosis: name",
@@ -114,7 +116,7 @@ def _row(name: str, own: pd.DataFrame) -> tuple[str, ...]:
     return (
         name,
         str(len(own)),
-        f"{own['multiple_recorded'].median():.1f}",
+        *(f"{own[column].median():.1f}" for column in ("multiple_recorded", "multiple_away")),
         *(share(column) for column in ("right_name", "right_class", "named_first", "named_class")),
         f"{hardest}, {own['distance'].median():.1f}",
     )

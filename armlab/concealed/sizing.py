@@ -242,13 +242,21 @@ def effect_multiples(plan: Plan, hidden: Sequence[HiddenEffect], tracks: Sequenc
     return tuple(effect_multiple(plan, oracle, hidden, number, tracks) for number in range(len(hidden)))
 
 
-def make_oracle(plan: Plan, tracks: Sequence[Track], encoders: Sequence[EncoderNoise] = ()) -> Oracle:
+def make_oracle(
+    plan: Plan, tracks: Sequence[Track], encoders: Sequence[EncoderNoise] = (), away_s: float | None = None
+) -> Oracle:
     """Knows the noise; in the realistic tier base parameters and friction of every joint are free.
 
-    encoders: noise of the positions of each run that identifies; without them the oracle knows the motion.
+    encoders: noise of the positions of each run that identifies; without them the oracle knows the motion. away_s: the
+    rows of a joint that are nearer to one of its reversals count nothing; None leaves only standstills out.
     """
     runs = identification_tracks(plan, tracks)
     resting = tuple(standstills(track, oracle_grid(track)) for track in runs)
+    if away_s is not None:
+        resting = tuple(
+            still | near_reversals(track, oracle_grid(track), away_s)
+            for still, track in zip(resting, runs, strict=True)
+        )
     oracle = Oracle(plan.noise, plan.rate_hz, resting, tuple(encoders))
     if not plan.realistic:
         return oracle
@@ -261,6 +269,14 @@ def standstills(track: Track, grid: Array) -> NDArray[np.bool_]:
     reach = 1.5 * (grid[1] - grid[0])
     first, last = (np.searchsorted(track.time, grid + side * reach) for side in (-1, 1))
     return np.asarray(still[last] > still[first])
+
+
+def near_reversals(track: Track, grid: Array, reach_s: float) -> NDArray[np.bool_]:
+    """Rows (samples, joints) at the instants of a grid, s, that are within a time of a reversal of the joint."""
+    turns = np.diff(np.sign(track.velocity), axis=0) != 0
+    count = np.vstack([np.zeros((2, track.joints)), np.cumsum(turns, axis=0)])
+    first, last = (np.searchsorted(track.time, grid + side * reach_s) for side in (-1, 1))
+    return np.asarray(count[last] > count[first])
 
 
 def effect_multiple(

@@ -58,10 +58,13 @@ def test_a_channel_is_mistaken_for_friction_that_begins_early_only_where_it_is_e
         answer_to(friction, Skew(0, 2e-3, 1.0, "shift", {"direction": direction})) for direction in (-1.0, 1.0)
     )
     assert early.rival == "early_friction"
+    assert early.multiple_away < 0.5 * early.multiple_recorded  # most of it is the step of friction at reversals
     assert late.rival != "early_friction"
 
 
-ANSWER = OracleAnswer("a", "clean", "payload", "compact", 2, False, 5.0, 2.0, 0.9, "rotor_inertia", 2, 3.0, 0.93, 1.0)
+ANSWER = OracleAnswer(
+    "a", "clean", "payload", "compact", 2, False, 5.0, 2.0, 1.5, 0.9, "rotor_inertia", 2, 3.0, 0.93, 1.0
+)
 EFFECT = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_first": False, "named_class": True}
 
 
@@ -69,8 +72,8 @@ def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) 
     pd.DataFrame([EFFECT]).to_csv(tmp_path / "effects.csv", index=False)
     _, page = write_oracle([ANSWER], tmp_path, tmp_path / "out")
     text = page.read_text(encoding="utf-8")
-    assert "| payload | 1 | 2.0 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
-    assert "| **of the library, below 3 limits, recorded** | 1 | 2.0 | 93 % |" in text
+    assert "| payload | 1 | 2.0 | 1.5 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
+    assert "| **of the library, below 3 limits, recorded** | 1 | 2.0 | 1.5 | 93 % |" in text
     pd.DataFrame([{**EFFECT, "case": "b"}]).to_csv(tmp_path / "effects.csv", index=False)
     with pytest.raises(InputError, match="of another set"):
         write_oracle([ANSWER], tmp_path, tmp_path / "again")
