@@ -151,7 +151,12 @@ def oracle(
     """
     from tqdm import tqdm
 
-    from armlab.concealed.naming_oracle_page import ask_about_set, check_score, collect_answers, write_oracle
+    from armlab.concealed.naming_oracle_page import (
+        ask_about_set,
+        collect_answers,
+        read_scored_effects,
+        write_oracle,
+    )
     from armlab.concealed.score.scoring import PAGE_FILE, SCORE_FILE, write_page_again
     from armlab.concealed.sets import make_set_settings
 
@@ -159,12 +164,11 @@ def oracle(
     if out is None:
         raise click.UsageError("--out or --score is needed, the folder for oracle.csv and oracle.md")
     settings = make_set_settings(cases, seed, tier, "mixed", development)
-    if scored is not None:
-        check_score(settings, scored)
+    effects = None if scored is None else read_scored_effects(settings, scored)
     work = work or Path(".armlab/oracle") / str(seed)
     for _ in tqdm(ask_about_set(settings, work, jobs), total=cases, unit="case", desc="asked"):
         pass
-    for path in write_oracle(collect_answers(settings, work), scored, out):
+    for path in write_oracle(collect_answers(settings, work), effects, out):
         yield f"wrote {path}"
     shutil.rmtree(work)
     if (out / SCORE_FILE).is_file():

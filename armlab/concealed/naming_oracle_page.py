@@ -13,22 +13,24 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.folders import claim_folder
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
-from armlab.concealed.score.distance import ORACLE_PAGE, ORACLE_TABLE, format_share, join_with_score, read_effects
+from armlab.concealed.score.distance import ORACLE_PAGE, ORACLE_TABLE, format_share, join_with_score
 from armlab.concealed.score.measures import MIN_NAMED_MULTIPLE
+from armlab.concealed.score.rows import read_table
 from armlab.concealed.score.scoring import SCORE_FILE
 from armlab.concealed.sets import SetSettings
 from armlab.concealed.sizing import simulate_case
 
 
-def check_score(settings: SetSettings, score: Path) -> None:
-    """Raises InputError for a folder that does not hold the score of a set of that seed and size."""
+def read_scored_effects(settings: SetSettings, score: Path) -> pd.DataFrame:
+    """The table of hidden effects in the folder of a score. Raises InputError unless it is that of the set."""
     try:
         found = json.loads((score / SCORE_FILE).read_text(encoding="utf-8"))
-        seed, cases = found["seed"], found["cases"]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise InputError(f"{score} holds no score: {SCORE_FILE} is expected there") from None
+        seed, cases, effects = found["seed"], found["cases"], read_table(score / "effects.csv")
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{score} holds no whole score ({error}): {SCORE_FILE} and effects.csv are needed") from None
     if (seed, cases) != (settings.seed, settings.cases):
         raise InputError(f"{score} is the score of another set: seed {seed}, {cases} cases")
+    return effects
 
 
 def ask_about_set(settings: SetSettings, work: Path, jobs: int) -> Iterator[str]:
@@ -60,14 +62,14 @@ def _answer_file(settings: SetSettings, number: int, work: Path) -> Path:
     return work / f"{settings.plan(number).name}.json"
 
 
-def write_oracle(answers: Sequence[OracleAnswer], score: Path | None, out: Path) -> tuple[Path, ...]:
-    """Writes oracle.csv and oracle.md. score: folder of the score of a diagnosis of the same set.
+def write_oracle(answers: Sequence[OracleAnswer], effects: pd.DataFrame | None, out: Path) -> tuple[Path, ...]:
+    """Writes oracle.csv and oracle.md. effects: what a diagnosis named of the same set, see `read_scored_effects`.
 
-    Raises InputError for the score of another set.
+    Raises InputError for effects of another set.
     """
     columns = [field.name for field in fields(OracleAnswer)]
     table = pd.DataFrame([asdict(each) for each in answers], columns=columns)
-    known = table if score is None else join_with_score(table, read_effects(score), score)
+    known = table if effects is None else join_with_score(table, effects)
     sections = [
         part
         for tier in sorted(set(known["tier"]))

@@ -9,10 +9,10 @@ import pytest
 
 from armlab.common.errors import InputError
 from armlab.concealed.effects.channels import Gain, Skew
-from armlab.concealed.effects.friction import Coulomb, Viscous
+from armlab.concealed.effects.friction import Coulomb, EarlyFriction, Viscous
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
-from armlab.concealed.naming_oracle_page import ask_about_set, check_score, collect_answers, write_oracle
+from armlab.concealed.naming_oracle_page import ask_about_set, collect_answers, read_scored_effects, write_oracle
 from armlab.concealed.plan import draw_plan
 from armlab.concealed.score.distance import distance_table, read_oracle_table, remove_oracle
 from armlab.concealed.score.scoring import SCORE_FILE
@@ -52,14 +52,16 @@ def test_a_law_that_holds_the_right_one_as_a_limit_is_no_rival() -> None:
     assert found.rival not in ("stribeck_friction", "friction_curve", "asymmetric_friction", "friction_drift")
 
 
-def test_a_channel_is_mistaken_for_friction_that_begins_early_only_where_it_is_early() -> None:
+def test_friction_that_begins_early_is_a_rival_of_early_channels_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armlab.concealed.naming_oracle.LAWS", (Viscous, EarlyFriction))
     friction = Coulomb(0, 3.0, 100.0, "sign", {"width": 0.02})
     early, late = (
         answer_to(friction, Skew(0, 2e-3, 1.0, "shift", {"direction": direction})) for direction in (-1.0, 1.0)
     )
-    assert early.rival == "early_friction"
+    assert (early.rival, early.rival_joint) == ("early_friction", 1)
+    assert late.rival == "viscous_friction"
+    assert early.distance < 0.5 * late.distance
     assert early.multiple_away < 0.5 * early.multiple_recorded  # most of it is the step of friction at reversals
-    assert late.rival != "early_friction"
 
 
 ANSWER = OracleAnswer(
@@ -69,16 +71,12 @@ EFFECT = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_
 
 
 def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) -> None:
-    pd.DataFrame([EFFECT]).to_csv(tmp_path / "effects.csv", index=False)
-    _, page = write_oracle([ANSWER], tmp_path, tmp_path / "out")
+    _, page = write_oracle([ANSWER], pd.DataFrame([EFFECT]), tmp_path)
     text = page.read_text(encoding="utf-8")
     assert "| payload | 1 | 2.0 | 1.5 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
     assert "| **of the library, below 3 limits, recorded** | 1 | 2.0 | 1.5 | 93 % |" in text
-    pd.DataFrame([{**EFFECT, "case": "b"}]).to_csv(tmp_path / "effects.csv", index=False)
-    with pytest.raises(InputError, match="of another set"):
-        write_oracle([ANSWER], tmp_path, tmp_path / "again")
-    with pytest.raises(InputError, match="holds no score"):
-        write_oracle([ANSWER], tmp_path / "out", tmp_path / "again")
+    with pytest.raises(InputError, match="of different sets"):
+        write_oracle([ANSWER], pd.DataFrame([{**EFFECT, "case": "b"}]), tmp_path)
 
 
 def test_a_score_shows_its_distance_to_the_oracle(tmp_path: Path) -> None:
@@ -86,7 +84,7 @@ def test_a_score_shows_its_distance_to_the_oracle(tmp_path: Path) -> None:
     known = read_oracle_table(tmp_path, pd.DataFrame([EFFECT]))
     assert known is not None
     assert "right name or class of four, above 3 limits | 100 % | 100 % | 100 % | 1 |" in distance_table(known)
-    with pytest.raises(InputError, match="of another set"):
+    with pytest.raises(InputError, match="of different sets"):
         read_oracle_table(tmp_path, pd.DataFrame([{**EFFECT, "joint": 1}]))
     remove_oracle(tmp_path)
     assert read_oracle_table(tmp_path, pd.DataFrame([EFFECT])) is None
@@ -103,6 +101,16 @@ def test_an_interrupted_command_asks_only_what_has_no_answer(tmp_path: Path, mon
     assert sorted([first, *rest]) == sorted(settings.plan(number).name for number in range(6))
     hiding = [plan.name for plan in map(settings.plan, range(6)) if plan.kind not in ("null", "decoy")]
     assert [each.case for each in collect_answers(settings, tmp_path / "work")] == hiding
-    (tmp_path / SCORE_FILE).write_text('{"seed": 1004, "cases": 6}', encoding="utf-8")
+
+
+def test_the_score_of_another_set_is_refused_before_the_work(tmp_path: Path) -> None:
+    settings = make_set_settings(6, 1003, "clean", "mixed", True)
+    with pytest.raises(InputError, match="holds no whole score"):
+        read_scored_effects(settings, tmp_path)
+    pd.DataFrame([EFFECT]).to_csv(tmp_path / "effects.csv", index=False)
+    for seed in (1003, 1004):
+        (tmp_path / SCORE_FILE).write_text(f'{{"seed": {seed}, "cases": 6}}', encoding="utf-8")
+        if seed == settings.seed:
+            assert len(read_scored_effects(settings, tmp_path)) == 1
     with pytest.raises(InputError, match="another set: seed 1004"):
-        check_score(settings, tmp_path)
+        read_scored_effects(settings, tmp_path)

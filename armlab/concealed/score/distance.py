@@ -17,9 +17,9 @@ SHARES = {  # of effects above three limits: measure, whether outside the librar
     "unknown_outside": (True, "named_first", "right_name"),
 }
 HOW_TO_READ_DISTANCES = (
-    "The same effects before an observer who knows the noise and the equations of all laws, of the library and outside "
-    "it, and has positions as the encoders round them: [effect by effect](oracle.md). *Below*: of effects that this "
-    f"observer has below {MIN_NAMED_MULTIPLE:g} limits."
+    "*Oracle*: what an observer would name of the same effects who knows the noise and the equations of all laws, and "
+    "has positions as the encoders round them ([effect by effect](oracle.md)). *Below*: share of the effects that are "
+    f"smaller than {MIN_NAMED_MULTIPLE:g} limits for this observer."
 )
 
 
@@ -31,23 +31,15 @@ def read_oracle_table(folder: Path, effects: pd.DataFrame) -> pd.DataFrame | Non
     path = folder / ORACLE_TABLE
     if not path.is_file():
         return None
-    return join_with_score(pd.read_csv(path, dtype={"case": str}), effects, path)
+    return join_with_score(pd.read_csv(path, dtype={"case": str}), effects)
 
 
-def read_effects(score: Path) -> pd.DataFrame:
-    """The table of hidden effects in the folder of a score. Raises InputError where there is none."""
-    path = score / "effects.csv"
-    if not path.is_file():
-        raise InputError(f"{score} holds no score: {path.name} is expected there")
-    return pd.read_csv(path, dtype={"case": str}, keep_default_na=False, na_values=[""])
-
-
-def join_with_score(table: pd.DataFrame, effects: pd.DataFrame, source: Path) -> pd.DataFrame:
-    """The oracle's rows with what was named of each effect; InputError with the source for another set."""
+def join_with_score(table: pd.DataFrame, effects: pd.DataFrame) -> pd.DataFrame:
+    """The oracle's rows with what was named of each effect. Raises InputError where they are of different sets."""
     tables = [each.assign(joint=each["joint"].fillna(WHOLE_ARM).astype(int)) for each in (table, effects)]
     joined = tables[0].merge(tables[1][[*KEYS, "named_first", "named_class"]], on=KEYS, how="left")
     if joined["named_first"].isna().any():
-        raise InputError(f"{source} is of another set: give --seed, --tier and --cases of the set that was scored")
+        raise InputError("the oracle and the score are of different sets: give --seed, --tier and --cases of the score")
     return joined
 
 

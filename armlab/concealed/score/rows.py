@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -52,6 +53,11 @@ class ScoreRows:
     effects: pd.DataFrame
     claims: pd.DataFrame
     parameters: pd.DataFrame
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """A table of a score; `null` is a kind of cases, not a missing number."""
+    return pd.read_csv(path, dtype={"case": str}, keep_default_na=False, na_values=[""])
 
 
 def make_rows(cases: list[JudgedCase]) -> ScoreRows:

@@ -5,8 +5,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, cast
 
-import pandas as pd
-
 from armlab.common.errors import InputError
 from armlab.common.files import all_or_none, write_texts
 from armlab.concealed.formats import SetManifest
@@ -23,7 +21,7 @@ from armlab.concealed.score.measures import (
 )
 from armlab.concealed.score.outcomes import list_misses
 from armlab.concealed.score.page import CAPTIONS, format_measure, render_page
-from armlab.concealed.score.rows import ScoreRows, make_rows
+from armlab.concealed.score.rows import ScoreRows, make_rows, read_table
 from armlab.concealed.sets import read_checked_manifest
 
 SCORE_FILE, PAGE_FILE, MISSES_FILE = "score.json", "score.md", "misses.csv"
@@ -57,19 +55,14 @@ def write_page_again(folder: Path) -> dict[str, Any]:
     """
     try:
         result = json.loads((folder / SCORE_FILE).read_text(encoding="utf-8"))
-        table = ScoreRows(*(_read_table(folder / f"{name}.csv") for name in ROW_TABLES))
+        table = ScoreRows(*(read_table(folder / f"{name}.csv") for name in ROW_TABLES))
         drawn = [name for name in CAPTIONS if (folder / f"{name}.svg").is_file()]
         oracle = read_oracle_table(folder, table.effects)
-        page = render_page(table, result, _read_table(folder / MISSES_FILE), drawn, oracle)
+        page = render_page(table, result, read_table(folder / MISSES_FILE), drawn, oracle)
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{folder} holds no whole score ({error}): score its set again with --verdicts") from None
     write_texts({PAGE_FILE: page}, folder)
     return cast(dict[str, Any], result)
-
-
-def _read_table(path: Path) -> pd.DataFrame:
-    """A table of a score; `null` is a kind of cases, not a missing number."""
-    return pd.read_csv(path, dtype={"case": str}, keep_default_na=False, na_values=[""])
 
 
 def compute_score(
