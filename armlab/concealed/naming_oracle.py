@@ -290,7 +290,7 @@ def _stepped(effect: HiddenEffect, rng: np.random.Generator) -> HiddenEffect:
 def _left_by(own: Array, bench: _Bench, other: HiddenEffect) -> float:
     rows = bench.rows(other)
     power, shared = float(rows @ rows), float(own @ rows)
-    if isinstance(other, EarlyFriction):  # which is never late
+    if other.takes_energy:
         shared = max(shared, 0.0)
     return float(own @ own) - (shared**2 / power if power > 0 else 0.0)
 

@@ -14,6 +14,7 @@ class Coulomb(HiddenEffect):
     """tau = F sgn(v); other form: tau = F (2 / pi) atan(v / w), a soft turn-over. size: F, N m."""
 
     effect, forms = "coulomb_friction", ("sign", "soft")
+    takes_energy = True
     units: ClassVar = {"level": "N.m"}
     blurred = ("level",)
 
@@ -37,6 +38,7 @@ class Viscous(HiddenEffect):
     """tau = c v; other form: tau = c (1 + 0.1 sin(2 q + p)) v, uneven over the turn. size: c, N m s/rad."""
 
     effect, forms = "viscous_friction", ("linear", "uneven")
+    takes_energy = True
     units: ClassVar = {"coefficient": "N.m.s/rad"}
     blurred = ("coefficient",)
 
@@ -58,6 +60,7 @@ class NonlinearViscous(HiddenEffect):
     """tau = c sgn(v) |v|^n; other form: tau = c asinh(v / v0), Eyring's law of thin oil films. size: c."""
 
     effect, forms = "nonlinear_viscous_friction", ("power", "eyring")
+    takes_energy = True
     units: ClassVar = {"coefficient": "N.m/(rad/s)^exponent", "exponent": "1"}
 
     @classmethod
@@ -86,6 +89,7 @@ class Stribeck(HiddenEffect):
     """
 
     effect, forms = "stribeck_friction", ("gauss", "exponent", "rational")
+    takes_energy = True
     units: ClassVar = {"level": "N.m", "static_level": "N.m", "velocity": "rad/s", "exponent": "1"}
     companions, blurred = ("coulomb", "viscous"), ("level", "static_level")
 
@@ -178,6 +182,7 @@ class LoadDependent(HiddenEffect):
     """tau = m |tau_load| sgn(v); other form: |tau_load| fades in above a knee. size: m."""
 
     effect, forms = "load_dependent_friction", ("share", "fading in")
+    takes_energy = True
     units: ClassVar = {"coefficient": "1"}
     companions = ("coulomb", "viscous")
 
@@ -202,6 +207,7 @@ class Presliding(HiddenEffect):
     """
 
     effect, forms = "presliding_hysteresis", ("dahl", "lugre", "maxwell slip")
+    takes_energy = True
     units: ClassVar = {"level": "N.m", "stiffness": "N.m/rad"}
     companions, blurred = ("coulomb", "viscous"), ("level", "stiffness")
 
@@ -232,6 +238,7 @@ class Drift(HiddenEffect):
     """
 
     effect, forms = "friction_drift", ("time", "heat")
+    takes_energy = True
     units: ClassVar = {"initial": "N.m.s/rad", "final": "N.m.s/rad", "time_constant": "s"}
     companions, blurred = ("viscous", "coulomb"), ("initial", "final")
 
@@ -261,6 +268,7 @@ class EarlyFriction(HiddenEffect):
     """
 
     effect, forms = "early_friction", ("lead",)
+    takes_energy = True
 
     @classmethod
     def draw(cls, rng: np.random.Generator, machine: Machine, joint: int) -> Self:

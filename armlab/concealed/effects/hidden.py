@@ -29,7 +29,8 @@ class HiddenEffect:
     Of the class. effect: its id. forms: its laws, the obvious one first. where: at one joint; at two joints, where the
     torque of one follows the motion of the other; at a link; or in the whole robot. units: unit of each parameter at
     a joint that turns. companions: plain friction of the same joint that the oracle fits beside it. blurred:
-    parameters that cannot be separated from the plain friction of a background.
+    parameters that cannot be separated from the plain friction of a background. takes_energy: friction, of which a
+    negative size is no law.
 
     size: what grows until the effect is as visible as wanted; in the unit of its main parameter. max_size: the size
     beyond which the effect would be absurd. form: which law. shape: the other numbers of the law.
@@ -41,6 +42,7 @@ class HiddenEffect:
     units: ClassVar[Mapping[str, str]] = {}
     companions: ClassVar[tuple[str, ...]] = ()
     blurred: ClassVar[tuple[str, ...]] = ()
+    takes_energy: ClassVar[bool] = False
     joint: int
     size: float
     max_size: float
