@@ -50,17 +50,23 @@ def encoder_noise(arm: Arm, track: Track, step: Array, rate_hz: float) -> Encode
     return EncoderNoise(np.column_stack(columns) + rotors, step, rate_hz)
 
 
-def whiten_with_encoders(columns: Array, noise: Noise, encoders: EncoderNoise, rate_hz: float) -> Array:
-    """Columns of all joints, filtered so that noise of torque and encoders would be white with unit variance.
+def whitening_filter(samples: int, noise: Noise, encoders: EncoderNoise, rate_hz: float) -> Array:
+    """What makes noise of torque and encoders white with unit variance, of runs of that many samples at rate_hz.
 
-    columns: (samples, joints, columns) at rate_hz; noise: of a sample at that rate. Returns the same shape. The filter
-    has no phase; at the ends it sees the signal mirrored.
+    noise: of the torque of a sample. Returns (frequencies, joints, joints), without phase.
     """
-    samples = len(columns)
     frequency = np.asarray(np.fft.rfftfreq(2 * samples, 1 / rate_hz), dtype=np.float64)
     power = encoders.power(frequency, rate_hz)
     power += noise.power(frequency, rate_hz)[:, :, None] * np.eye(power.shape[1])
     size, axes = np.linalg.eigh(power)
-    root = (axes / np.sqrt(size)[:, None, :]) @ axes.transpose(0, 2, 1)
+    return np.asarray((axes / np.sqrt(size)[:, None, :]) @ axes.transpose(0, 2, 1))
+
+
+def whiten_with_encoders(columns: Array, whitening: Array) -> Array:
+    """Columns of all joints through a `whitening_filter`, which sees them mirrored at the ends.
+
+    columns: (samples, joints, columns). Returns the same shape.
+    """
+    samples = len(columns)
     spectrum = np.fft.rfft(np.concatenate([columns, columns[::-1]]), axis=0)
-    return np.asarray(np.fft.irfft(root @ spectrum, 2 * samples, axis=0)[:samples])
+    return np.asarray(np.fft.irfft(whitening @ spectrum, 2 * samples, axis=0)[:samples])

@@ -34,12 +34,12 @@ from armlab.concealed.plan import Plan
 from armlab.concealed.score.cases import CONTAINED_EFFECTS, is_indistinguishable
 from armlab.concealed.simulate import (
     Controller,
+    RunWithout,
     absorbed_rotors,
     arm_with_effects,
     coarse_track,
     draw_controller,
     effect_torque,
-    law_torque,
     reference_track,
     simulate_runs,
 )
@@ -97,7 +97,7 @@ class OracleAnswer:
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """Where laws are compared: coarse tracks of a case, and rows without what is free.
+    """Where laws are compared: coarse runs of a case, and rows without what is free.
 
     others: effects beside the one that is asked. motion_known, oracle: know the motion, or have recorded positions;
     away: has recorded positions away from reversals.
@@ -108,7 +108,7 @@ class _Bench:
     plan: Plan
     controller: Controller
     wanted: Sequence[Track]
-    tracks: Sequence[Track]
+    runs: Sequence[RunWithout]
     others: tuple[HiddenEffect, ...]
     motion_known: Oracle
     oracle: Oracle
@@ -123,17 +123,14 @@ class _Bench:
     def torque(self, effect: HiddenEffect) -> list[Array]:
         """What an effect of any law adds to the recorded torque, (samples, joints) each run, N m."""
         hidden = tuple(each for each in self.others if each not in self.plan.background)
-        tracks = self.tracks
+        runs = self.runs
         if effect.has_parts:
             plan = replace(self.plan, engine="mujoco")  # which alone has parts
             played = simulate_runs(plan, (*hidden, effect), self.controller, self.wanted, self.wanted)
             tracks = identification_tracks(plan, played)
+            runs = [replace(run, track=track) for run, track in zip(runs, tracks, strict=True)]
         arms = arm_with_effects(self.plan, (*hidden, effect)), arm_with_effects(self.plan, hidden)
-        grids = [oracle_grid(track) for track in self.tracks]
-        return [
-            effect_torque(effect, self.others, arms, track, run, grid)
-            for run, (track, grid) in enumerate(zip(tracks, grids, strict=True))
-        ]
+        return [effect_torque(effect, arms, run) for run in runs]
 
 
 def ask_oracle(case: SimulatedCase, least: float) -> Iterator[OracleAnswer]:
@@ -191,7 +188,7 @@ def _make_bench(case: SimulatedCase, number: int) -> _Bench:
         plan=plan,
         controller=controller,
         wanted=wanted,
-        tracks=chosen,
+        runs=[RunWithout(track, others, run, oracle_grid(track)) for run, track in enumerate(chosen)],
         others=others,
         motion_known=make_oracle(plan, tracks),
         oracle=make_oracle(plan, tracks, encoders),
@@ -206,9 +203,7 @@ def _distances(
 ) -> Iterator[tuple[float, str, int | None]]:
     """The distance of each other law at each place, with its name and place."""
     machine = bench.plan.machine
-    peak = np.max(
-        [np.abs(track.load + law_torque(bench.others, track, 0)).max(axis=0) for track in bench.tracks], axis=0
-    )
+    peak = np.max([np.abs(run.motor).max(axis=0) for run in bench.runs], axis=0)
     places = [(kind, int(joint)) for kind in LAWS for joint in kind.places(machine)]
     looked = [each for each in (_first_look(bench, effect, own, place, peak, rng) for place in places) if each]
     looked.sort(key=lambda each: each[0])

@@ -12,6 +12,7 @@ Motion and torque therefore agree exactly.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import mujoco
 import numpy as np
@@ -184,34 +185,67 @@ def _make_track(made: Plant, controller: Controller, time: Array, states: Array,
     return Track(time, motion, load)
 
 
-def effect_torque(
-    effect: HiddenEffect, others: Sequence[HiddenEffect], arms: tuple[Arm, Arm], track: Track, run: int, grid: Array
-) -> Array:
-    """Recorded torque with the effect less what would be recorded without it on the same motion.
+@dataclass(frozen=True, eq=False)
+class RunWithout:
+    """A run as it is recorded without an effect, on the same motion.
 
-    arms: with and without the effect. grid: (samples,), s. Returns (samples, joints), N m.
+    others: what else takes torque from the motors. run: its number. grid: (samples,), s; a recorded torque is the mean
+    over the interval about its instant.
     """
-    joints, width = track.joints, float(grid[1] - grid[0])
-    centre = np.repeat(grid[:, None], joints, axis=1)
-    motor = track.load + law_torque(others, track, run)
+
+    track: Track
+    others: Sequence[HiddenEffect]
+    run: int
+    grid: Array
+
+    @cached_property
+    def centre(self) -> Array:
+        """Instants of the samples, (samples, joints), s."""
+        return np.repeat(self.grid[:, None], self.track.joints, axis=1)
+
+    @cached_property
+    def motor(self) -> Array:
+        """Torque of the motors, (steps, joints), N m."""
+        return self.track.load + law_torque(self.others, self.track, self.run)
+
+    @cached_property
+    def recorded(self) -> Array:
+        """Their recorded torque, (samples, joints), N m."""
+        return self.means(self.motor, self.centre)
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Motion at the samples."""
+        return self.track.at(self.grid).motion
+
+    def means(self, signal: Array, centre: Array) -> Array:
+        """Mean of a signal (steps, joints) over the interval of a sample about each instant (samples, joints)."""
+        return self.track.means(signal, centre, float(self.grid[1] - self.grid[0]))
+
+
+def effect_torque(effect: HiddenEffect, arms: tuple[Arm, Arm], without: RunWithout) -> Array:
+    """Recorded torque with the effect less what is recorded without it on the same motion.
+
+    arms: with and without the effect. Returns (samples, joints), N m.
+    """
+    track, joints = without.track, without.track.joints
     added = np.zeros_like(track.load)
-    law = effect.torque(track, run)
+    law = effect.torque(track, without.run)
     if law is not None:
         added[:, effect.joint] += law
     if effect.has_parts:
         added += track.load - rigid_torque(arms[0], track.motion)
-    share = track.means(added, centre, width)
-    sampled = track.at(grid).motion
+    share = without.means(added, without.centre)
+    sampled = without.motion
     if arms[0] is not arms[1]:
         share += rigid_torque(arms[0], sampled) - rigid_torque(arms[1], sampled)
     shift, lag = effect.shift(joints), effect.lag(joints)
     if shift.any():
         shifted = Motion(sampled.position + shift, sampled.velocity, sampled.acceleration)
         share += rigid_torque(arms[0], sampled) - rigid_torque(arms[0], shifted)
-    plain = track.means(motor, centre, width)
     if lag.any():
-        share += track.means(motor, centre - lag, width) - plain
-    return np.asarray(share + effect.read(plain) - plain)
+        share += without.means(without.motor, without.centre - lag) - without.recorded
+    return np.asarray(share + effect.read(without.recorded) - without.recorded)
 
 
 def free_columns(arm: Arm, track: Track, grid: Array, friction_only: bool = False) -> Array:

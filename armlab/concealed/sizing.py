@@ -25,12 +25,13 @@ from scipy.stats import chi2, ncx2
 from armlab.common.arrays import Array
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.library import LIBRARY
-from armlab.concealed.encoder_noise import EncoderNoise, whiten_with_encoders
+from armlab.concealed.encoder_noise import EncoderNoise, whiten_with_encoders, whitening_filter
 from armlab.concealed.engine import Track
 from armlab.concealed.noise import Noise
 from armlab.concealed.plan import Plan, draw_effects, target_multiple
 from armlab.concealed.simulate import (
     Controller,
+    RunWithout,
     arm_with_effects,
     coarse_track,
     draw_controller,
@@ -105,16 +106,16 @@ def detection_power(noncentrality: float, joints: int) -> float:
 class Oracle:
     """Whitens rows by the true noise and projects out what is free.
 
-    noise: of the recording's samples at rate_hz. resting: of each run, (samples, joints), where a joint stands still;
-    empty where none does. encoders: noise of the positions of each run; empty for an oracle that knows the motion. It
-    is common to the joints, so that the bridge over a joint at rest reaches rows of others, a little.
+    noise: of the rows. resting: of each run, (samples, joints), where a joint stands still; empty where none does.
+    encoder_filters: whiten the rows of each run that has noise of positions, see `whitening_filter`; empty for an
+    oracle that knows the motion. Such noise is common to the joints, so that the bridge over a joint at rest reaches
+    rows of others, a little.
     basis: (rows, columns), orthonormal, of the free columns.
     """
 
     noise: Noise
-    rate_hz: float
     resting: tuple[NDArray[np.bool_], ...] = ()
-    encoders: tuple[EncoderNoise, ...] = ()
+    encoder_filters: tuple[Array, ...] = ()
     basis: Array | None = None
 
     def with_free_columns(self, columns: Sequence[Array]) -> "Oracle":
@@ -139,21 +140,15 @@ class Oracle:
 
     def _rows(self, columns: Sequence[Array]) -> Array:
         """Whitened rows (rows, columns) of all runs, (samples, joints, columns) each."""
-        thinned = Noise(
-            self.noise.kind,
-            self.noise.white * np.sqrt(min(ORACLE.rate_hz / self.rate_hz, 1.0)),  # of a mean over several samples
-            self.noise.coloured,
-            self.noise.corner_hz,
-        )
         resting = self.resting or tuple(np.zeros(run.shape[:2], dtype=bool) for run in columns)
         out = []
         for number, (run, rest) in enumerate(zip(columns, resting, strict=True)):
             bridged = [_bridged(run[:, joint], rest[:, joint]) for joint in range(run.shape[1])]
-            if self.encoders:
-                whole = whiten_with_encoders(np.stack(bridged, 1), thinned, self.encoders[number], ORACLE.rate_hz)
+            if self.encoder_filters:
+                whole = whiten_with_encoders(np.stack(bridged, 1), self.encoder_filters[number])
                 white = list(whole.transpose(1, 0, 2))
             else:
-                white = [thinned.whitened(each, joint, ORACLE.rate_hz) for joint, each in enumerate(bridged)]
+                white = [self.noise.whitened(each, joint, ORACLE.rate_hz) for joint, each in enumerate(bridged)]
             out += [np.where(rest[:, joint, None], 0.0, each) for joint, each in enumerate(white)]
         return np.vstack(out)
 
@@ -250,17 +245,27 @@ def make_oracle(
     encoders: noise of the positions of each run that identifies; without them the oracle knows the motion. away_s: the
     rows of a joint that are nearer to one of its reversals count nothing; None leaves only standstills out.
     """
-    runs = identification_tracks(plan, tracks)
+    runs, noise = identification_tracks(plan, tracks), row_noise(plan)
     resting = tuple(standstills(track, oracle_grid(track)) for track in runs)
     if away_s is not None:
         resting = tuple(
             still | near_reversals(track, oracle_grid(track), away_s)
             for still, track in zip(resting, runs, strict=True)
         )
-    oracle = Oracle(plan.noise, plan.rate_hz, resting, tuple(encoders))
+    filters = (
+        whitening_filter(len(still), noise, each, ORACLE.rate_hz)
+        for still, each in zip(resting, encoders, strict=False)  # none where the motion is known
+    )
+    oracle = Oracle(noise, resting, tuple(filters))
     if not plan.realistic:
         return oracle
     return oracle.with_free_columns([free_columns(plan.true_arm, track, oracle_grid(track)) for track in runs])
+
+
+def row_noise(plan: Plan) -> Noise:
+    """Noise of the rows of a detection limit, each a mean over several samples of a recording."""
+    share = min(ORACLE.rate_hz / plan.rate_hz, 1.0)
+    return replace(plan.noise, white=plan.noise.white * np.sqrt(share))
 
 
 def standstills(track: Track, grid: Array) -> NDArray[np.bool_]:
@@ -286,7 +291,10 @@ def effect_multiple(
     effect, rest = hidden[number], (*hidden[:number], *hidden[number + 1 :])
     arms, runs = (arm_with_effects(plan, hidden), arm_with_effects(plan, rest)), identification_tracks(plan, tracks)
     others = (*plan.background, *rest)
-    shares = [effect_torque(effect, others, arms, track, run, oracle_grid(track)) for run, track in enumerate(runs)]
+    shares = [
+        effect_torque(effect, arms, RunWithout(track, others, run, oracle_grid(track)))
+        for run, track in enumerate(runs)
+    ]
     return oracle.multiple(shares, companion_columns(plan, effect, runs))
 
 

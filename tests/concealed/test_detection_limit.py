@@ -40,7 +40,7 @@ def _statistics(size: float, noise: Noise) -> np.ndarray:
 
 def test_an_effect_of_one_limit_is_found_nine_times_out_of_ten() -> None:
     effect, free = _columns()
-    oracle = Oracle(NOISE, ORACLE.rate_hz).with_free_columns([free[..., None]])
+    oracle = Oracle(NOISE).with_free_columns([free[..., None]])
     limit = 1 / oracle.multiple([effect])
     critical = chi2.isf(ORACLE.family_wise_level / candidate_count(JOINTS), 1)
     assert np.mean(_statistics(limit, NOISE) > critical) == pytest.approx(0.9, abs=0.04)
@@ -62,7 +62,7 @@ def test_whitened_noise_is_white_with_unit_variance() -> None:
 
 def test_a_free_column_equal_to_the_effect_leaves_nothing_to_find() -> None:
     effect, _ = _columns()
-    assert Oracle(NOISE, ORACLE.rate_hz).with_free_columns([effect[..., None]]).multiple([effect]) < 1e-6
+    assert Oracle(NOISE).with_free_columns([effect[..., None]]).multiple([effect]) < 1e-6
 
 
 def test_noncentrality_grows_with_the_library() -> None:
@@ -92,12 +92,10 @@ def test_where_a_joint_stands_still_its_torque_tells_nothing() -> None:
     effect, free = _columns()
     resting = np.zeros((SAMPLES, JOINTS), dtype=bool)
     resting[500:510, 0] = True
-    oracle = Oracle(NOISE, ORACLE.rate_hz, (resting,)).with_free_columns([free[..., None]])
+    oracle = Oracle(NOISE, (resting,)).with_free_columns([free[..., None]])
     changed, pulse = effect.copy(), np.zeros((SAMPLES, JOINTS))
     changed[500:510, 0] += 7.0
     pulse[500:510, 0] = 1.0
     assert oracle.multiple([changed]) == pytest.approx(oracle.multiple([effect]))
     assert oracle.multiple([pulse]) == pytest.approx(0.0, abs=1e-9)
-    assert oracle.multiple([effect]) < Oracle(NOISE, ORACLE.rate_hz).with_free_columns([free[..., None]]).multiple(
-        [effect]
-    )
+    assert oracle.multiple([effect]) < Oracle(NOISE).with_free_columns([free[..., None]]).multiple([effect])

@@ -10,7 +10,7 @@ from armlab.concealed.case_files import encoder_steps
 from armlab.concealed.effects.friction import Viscous
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.effects.springs import Ripple
-from armlab.concealed.encoder_noise import EncoderNoise, encoder_noise, whiten_with_encoders
+from armlab.concealed.encoder_noise import EncoderNoise, encoder_noise, whiten_with_encoders, whitening_filter
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
 from armlab.concealed.noise import Noise
 from armlab.concealed.simulate import rigid_torque
@@ -32,7 +32,8 @@ def test_noise_of_torque_and_encoders_is_white_after_the_filter() -> None:
     rounding = encoders.step / np.sqrt(12) * rng.standard_normal((samples, 2))
     frequency = np.fft.rfftfreq(samples, 1 / rate)
     bent = np.fft.irfft(-((2 * np.pi * frequency[:, None]) ** 2) * np.fft.rfft(rounding, axis=0), samples, axis=0)
-    white = whiten_with_encoders((torque + bent @ encoders.inertia.T)[..., None], noise, encoders, rate)[..., 0]
+    whitening = whitening_filter(samples, noise, encoders, rate)
+    white = whiten_with_encoders((torque + bent @ encoders.inertia.T)[..., None], whitening)[..., 0]
     assert np.cov(white.T) == pytest.approx(np.eye(2), abs=0.02)
     power = welch(white, rate, nperseg=1000, axis=0)[1] * rate / 2
     assert power[5:-5] == pytest.approx(np.ones_like(power[5:-5]), abs=0.4)

@@ -14,6 +14,7 @@ from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.engine import Track
 from armlab.concealed.pairs.plan import PAIRS, PairPlan, SidePlan, draw_change
 from armlab.concealed.simulate import (
+    RunWithout,
     arm_with_effects,
     coarse_track,
     draw_controller,
@@ -22,7 +23,7 @@ from armlab.concealed.simulate import (
     reference_track,
     simulate_runs,
 )
-from armlab.concealed.sizing import ORACLE, Oracle, SimulatedCase, SizedEffects
+from armlab.concealed.sizing import ORACLE, Oracle, SimulatedCase, SizedEffects, row_noise
 
 SIDES = ("old", "new")
 
@@ -72,7 +73,7 @@ def change_multiple(
     plan, tracks = pair.new, (*old, *new)
     grids = [np.arange(0.0, track.time[-1] - ORACLE.end_s, 1 / ORACLE.rate_hz) for track in tracks]
     pairs = list(zip(tracks, grids, strict=True))
-    oracle = Oracle(plan.noise, plan.rate_hz).with_free_columns(
+    oracle = Oracle(row_noise(plan)).with_free_columns(
         [free_columns(plan.true_arm, track, grid) for track, grid in pairs]
     )
     shares = [_change_torque(plan, change, track, grid) for track, grid in pairs]
@@ -83,7 +84,8 @@ def change_multiple(
 def _change_torque(plan: SidePlan, change: tuple[HiddenEffect, ...], track: Track, grid: Array) -> Array:
     """What a change adds to the recorded torque of a run, (samples, joints), N m."""
     arms = arm_with_effects(plan, change), arm_with_effects(plan, ())
-    parts = [effect_torque(effect, plan.background, arms, track, 0, grid) for effect in change]
+    without = RunWithout(track, plan.background, 0, grid)
+    parts = [effect_torque(effect, arms, without) for effect in change]
     return np.asarray(np.sum(parts, axis=0))
 
 
