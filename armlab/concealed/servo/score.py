@@ -112,7 +112,7 @@ def score_motion(work: Path, names: Sequence[str], results: Path) -> MotionScore
         f"## Effects above {LEAST_MULTIPLE:g} detection limits",
         markdown_table(("what is hidden", "cases", "right name", "right class"), _rows_of_kinds(outcomes)),
         "## Numbers\n\nError: reported less true, over the width of the 95 % interval; wanted below 0.25.",
-        markdown_table(("number", "reported", "interval holds", "mean error"), _rows_of_numbers(outcomes)),
+        markdown_table(("number", "reported", "interval holds", "median error"), _rows_of_numbers(outcomes)),
         "## Misses and wrong claims",
         markdown_table(("case", "law, controller", "hidden (limits)", "said"), _rows_of_misses(outcomes)),
     )
@@ -176,9 +176,9 @@ def _rows_of_numbers(outcomes: Sequence[MotionOutcome]) -> list[tuple[str, ...]]
         numbers = [number for each in cases for number in each.numbers]
         for name in sorted({(each.effect, each.parameter) for each in numbers}):
             own = [each for each in numbers if (each.effect, each.parameter) == name]
-            mean = float(np.mean([each.error for each in own]))
+            median = float(np.median([each.error for each in own]))
             rows.append(
-                (f"{name[0]} {name[1]}{label}", str(len(own)), str(sum(each.held for each in own)), f"{mean:.2f}")
+                (f"{name[0]} {name[1]}{label}", str(len(own)), str(sum(each.held for each in own)), f"{median:.2f}")
             )
     return rows
 
