@@ -35,6 +35,15 @@ def test_gravity_comes_off_at_the_joints_of_motor_channels(tmp_path: Path, other
     np.testing.assert_allclose(load_recording(folder).runs[0].torque, expected, rtol=0, atol=1e-9)
 
 
+def test_a_sign_beside_exchanged_channels_is_that_of_its_own_joint(tmp_path: Path) -> None:
+    right = load_recording(recording_in(tmp_path / "right", frame(0, 4))).runs[0]
+    folder = recording_in(tmp_path / "wrong", frame(0, 4))
+    inject(folder, (Injected("channel_swap", joints=(1, 2), form="position and torque"), Injected("torque_sign", 2)))
+    found = load_recording(folder).runs[0]
+    np.testing.assert_allclose(found.torque[:, 0], -right.torque[:, 1])
+    np.testing.assert_allclose(found.torque[:, 1], right.torque[:, 0])
+
+
 @pytest.mark.parametrize(("seconds", "still", "why"), [(8, ["tau2"], "joint 2"), (1.5, [], "short")])
 def test_a_reading_that_cannot_be_asked_is_not_called_right(
     tmp_path: Path, seconds: float, still: list[str], why: str

@@ -33,6 +33,7 @@ EFFECTS = (
     "channel_skew",
 )
 NEED_LINKS = ("gravity_compensated_torque", "inertia_reference", "link_data_error")
+PUT_ORDER = {"gravity_compensated_torque": 0, "channel_swap": 2}  # others are put in between
 NEED_PAIRS = ("channel_swap", "channel_skew")
 POSITION_COLUMNS = ("position", "velocity", "reference_position", "reference_velocity")
 
@@ -125,10 +126,11 @@ class _Files:
 def inject(folder: Path, mistakes: tuple[Injected, ...], true_arm: Arm | None = None) -> None:
     """Puts mistakes into the files of a folder. true_arm: whose gravity a compensated torque leaves out.
 
-    Gravity comes off first, while the files still say how they are to be read.
+    Gravity comes off first, while the files still say how they are to be read. Channels are exchanged last, so that the
+    place of another mistake is the joint whose channel has it.
     """
     files = _read(folder)
-    for mistake in sorted(mistakes, key=lambda each: each.effect != "gravity_compensated_torque"):
+    for mistake in sorted(mistakes, key=lambda each: PUT_ORDER.get(each.effect, 1)):
         _put(files, mistake, true_arm)
     _write(files)
 
