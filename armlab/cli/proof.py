@@ -174,6 +174,7 @@ def oracle(
     if (out / SCORE_FILE).is_file():
         write_page_again(out)
         yield f"{out / PAGE_FILE}: written again with the distance to the oracle"
+        yield from _write_summary_again(out.parent)
 
 
 @click.command()
@@ -195,10 +196,20 @@ def score(folder: Path, verdicts: Path | None, manifest: str | None, out: Path |
             raise click.UsageError("--manifest and --out need --verdicts, the folder with a verdict.json a case")
         document = write_page_again(folder)
         yield f"{folder / PAGE_FILE}: written again, nothing was judged anew"
+        yield from _write_summary_again(folder.parent)
         return document
     document = score_set(folder, verdicts, manifest, out or verdicts / "score")
     yield from format_lines(document)
     return document
+
+
+def _write_summary_again(results: Path) -> Iterator[str]:
+    """Of a folder of judged results, which has a log; other folders have no summary."""
+    from armlab.concealed.log_page import LOG_FILE
+    from armlab.concealed.summary_page import write_summary
+
+    if (results / LOG_FILE).is_file():
+        yield f"wrote {write_summary(results)}"
 
 
 @click.command("calibrate")

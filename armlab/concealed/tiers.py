@@ -11,11 +11,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Literal, get_args
 
+from armlab.concealed.log_page import LOG_FILE
 from armlab.concealed.prove import FINISHED_MARK, QUICK_NAME, QUICK_SEED, Proof, judged_seed, prove
 from armlab.concealed.real.prove import RealSet, prove_real
 from armlab.concealed.servo.prove import MotionSet, prove_motion
 from armlab.concealed.setup.plan import PUBLIC
 from armlab.concealed.setup.prove import SetupSet, prove_setup
+from armlab.concealed.summary_page import write_summary
 
 TierName = Literal["torque", "setup", "motion", "real"]
 TIERS: tuple[TierName, ...] = get_args(TierName)
@@ -33,12 +35,14 @@ def prove_tiers(proof: Proof, tiers: Sequence[TierName], work: Path, results: Pa
         folder = work / tier
         if tier == "torque":
             yield from prove(proof, folder, results, jobs)
-            continue
-        if proof.commit is None and (folder / FINISHED_MARK).is_file():
-            shutil.rmtree(folder)  # as for torque: a finished proof that is not judged starts again from nothing
-        yield from _prove_other(proof, tier, folder, results / tier, jobs)
-        if folder.is_dir():  # a tier that was skipped has none
-            (folder / FINISHED_MARK).touch()
+        else:
+            if proof.commit is None and (folder / FINISHED_MARK).is_file():
+                shutil.rmtree(folder)  # as for torque: a finished proof that is not judged starts again from nothing
+            yield from _prove_other(proof, tier, folder, results / tier, jobs)
+            if folder.is_dir():  # a tier that was skipped has none
+                (folder / FINISHED_MARK).touch()
+        if proof.commit is not None and (results / LOG_FILE).is_file():  # other folders than the judged one have no log
+            yield f"wrote {write_summary(results)}"
 
 
 def _prove_other(proof: Proof, tier: TierName, work: Path, results: Path, jobs: int) -> Iterator[str]:

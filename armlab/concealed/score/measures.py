@@ -22,6 +22,7 @@ WANTED_BOUNDS = {
     "at least 80 %": (0.8, 1.0),
     "at least 85 %": (0.85, 1.0),
     "at least 90 %": (0.9, 1.0),
+    "at least 95 %": (0.95, 1.0),
     "at least 98 %": (0.98, 1.0),
     "90-98 %": (0.9, 0.98),
     "at least 0.9": (0.9, np.inf),
@@ -31,7 +32,12 @@ WANTED_BOUNDS = {
     "within 70-90 %": (0.7, 0.9),
     "within 90-100 %": (0.9, 1.0),
 }
-NAMES_WANTED = {"clean": "at least 90 %", "realistic": "at least 85 %"}  # right name or class
+NAMES_WANTED = {  # right name or class
+    "clean": "at least 90 %",
+    "realistic": "at least 85 %",
+    "motion": "at least 85 %",
+    "setup": "at least 95 %",
+}
 WITHIN = "within "  # of a bound that the interval of a figure has to reach
 RELIABILITY_BINS = {  # of the stated probability: from, and below
     "right_when_doubtful": (0.5, 0.7),

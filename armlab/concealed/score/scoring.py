@@ -48,6 +48,11 @@ def score_set(folder: Path, verdicts: Path, sealed: str | None, out: Path) -> di
     return result
 
 
+def read_rows(folder: Path) -> ScoreRows:
+    """The tables of a score. OSError where one is missing."""
+    return ScoreRows(*(read_table(folder / f"{name}.csv") for name in ROW_TABLES))
+
+
 def write_page_again(folder: Path) -> dict[str, Any]:
     """Writes score.md of a score again, from score.json and the tables beside it; returns what score.json holds.
 
@@ -55,7 +60,7 @@ def write_page_again(folder: Path) -> dict[str, Any]:
     """
     try:
         result = json.loads((folder / SCORE_FILE).read_text(encoding="utf-8"))
-        table = ScoreRows(*(read_table(folder / f"{name}.csv") for name in ROW_TABLES))
+        table = read_rows(folder)
         drawn = [name for name in CAPTIONS if (folder / f"{name}.svg").is_file()]
         oracle = read_oracle_table(folder, table.effects)
         page = render_page(table, result, read_table(folder / MISSES_FILE), drawn, oracle)

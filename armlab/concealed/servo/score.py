@@ -8,11 +8,13 @@ of its drives is true, too: gains where kp is unknown; damping and torque limits
 
 import json
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from pydantic import TypeAdapter
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
@@ -20,11 +22,12 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import read_json
 from armlab.concealed.folders import SETTINGS_FILE
 from armlab.concealed.score.cases import UNKNOWN_NAME, read_complaint
-from armlab.concealed.score.measures import Measure
+from armlab.concealed.score.measures import NAMES_WANTED, Measure, share_measure
 from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
 from armlab.concealed.score.weighed import WeighedFinding, check_development, read_names
 from armlab.concealed.sealed_set import Share
 
+MOTION_FILE = "motion.json"
 MAX_CLASS = 4  # names
 LEAST_MULTIPLE = 3.0  # detection limits of an effect that counts
 SHOWN_COUNTS, SHOWN_RATE_HZ = 4096, 50.0  # of which bias is shown alone
@@ -119,8 +122,24 @@ def score_motion(work: Path, names: Sequence[str], results: Path) -> MotionScore
     content = {"measures": [{**asdict(share), "wanted": aim} for share, aim in measures]}
     content |= {"probabilities": [asdict(each) for each in stated]}
     content |= {"cases": [asdict(each) for each in outcomes]}
-    write_texts({"motion.md": page, "motion.json": json.dumps(content, indent=1) + "\n"}, results)
+    write_texts({"motion.md": page, MOTION_FILE: json.dumps(content, indent=1) + "\n"}, results)
     return MotionScore(measures, stated)
+
+
+def read_motion_measures(folder: Path) -> list[Measure]:
+    """The measures that all tiers have, from motion.json in a folder."""
+    found = read_json(folder / MOTION_FILE)
+    outcomes = TypeAdapter(list[MotionOutcome]).validate_python(found["cases"])
+    nulls = [bool(each.wrong) for each in outcomes if each.kind == "null"]
+    known = [each for each in outcomes if each.kind != "null" and each.knowledge == "known"]
+    right = share_measure(
+        "right_name_or_class", pd.Series([own.in_class for each in known for own in each.hidden if own.visible])
+    )
+    return [
+        share_measure("false_claims_on_nulls", pd.Series(nulls)),
+        replace(right, wanted=NAMES_WANTED["motion"]),
+        *stated_measures([claim for each in outcomes for claim in each.stated]),
+    ]
 
 
 def _measure(outcomes: Sequence[MotionOutcome]) -> list[tuple[Share, str]]:

@@ -7,21 +7,24 @@ other way round.
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
+from pydantic import TypeAdapter
 from scipy.stats import fisher_exact
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.cases import read_complaint
-from armlab.concealed.score.measures import Measure
+from armlab.concealed.score.measures import NAMES_WANTED, Measure, share_measure
 from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
 from armlab.concealed.sealed_set import Share
 from armlab.concealed.setup.plan import SetupCase
 
+SETUP_FILE = "setup.json"
 MAX_CLASS = 3  # names
 GRAVITY_DEG = 3.0
 CHANCE = "hidden physics: probability of such a difference by chance"
@@ -99,8 +102,25 @@ def score_setup(work: Path, names: Sequence[str], results: Path) -> SetupScore:
         markdown_table(heads, missed) if missed else "None.",
     )
     content = json.dumps([asdict(each) for each in outcomes], indent=1) + "\n"
-    write_texts({"setup.md": page, "setup.json": content}, results)
+    write_texts({"setup.md": page, SETUP_FILE: content}, results)
     return score
+
+
+def read_setup_measures(folder: Path) -> dict[str, list[Measure]]:
+    """The measures that all tiers have, of simulated and of real recordings, from setup.json in a folder."""
+    cases = json.loads((folder / SETUP_FILE).read_text(encoding="utf-8"))
+    outcomes = TypeAdapter(list[SetupOutcome]).validate_python(cases)
+    out = {}
+    for name in ("simulated", "real"):
+        own = [each for each in outcomes if (each.source == "real") == (name == "real")]
+        nulls = [each.false > 0 for each in own if each.source == "null"]
+        seen = [right for each in own for right, sight in zip(each.right, each.seen, strict=True) if sight]
+        out[name] = [
+            share_measure("false_claims_on_nulls", pd.Series(nulls, dtype=bool)),
+            replace(share_measure("right_name_or_class", pd.Series(seen)), wanted=NAMES_WANTED["setup"]),
+            *stated_measures([claim for each in own for claim in each.stated]),
+        ]
+    return out
 
 
 def _measure(outcomes: Sequence[SetupOutcome]) -> list[Share]:

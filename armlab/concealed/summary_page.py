@@ -1,0 +1,143 @@
+"""One page about the last judged run of every tier: what was wanted, and what was found.
+
+It is made from what the tiers have written below the folder of the results. A tier that is not there has no column.
+"""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from armlab.common.errors import InputError
+from armlab.common.files import write_texts
+from armlab.common.markdown import markdown_page, markdown_table
+from armlab.concealed.log_page import LOG_FILE, LOG_PAGE
+from armlab.concealed.real.score import CASES_TABLE, read_tables, real_measures
+from armlab.concealed.score.distance import SHARES, format_share, read_oracle_table
+from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure, engine_table
+from armlab.concealed.score.page import format_measure
+from armlab.concealed.score.scoring import SCORE_FILE, read_rows
+from armlab.concealed.servo.score import MOTION_FILE, read_motion_measures
+from armlab.concealed.setup.score import SETUP_FILE, read_setup_measures
+
+SUMMARY_PAGE = "summary.md"
+SHOWN = (
+    "false_claims_on_nulls",
+    "wrong_names_beyond_background",
+    "right_name_or_class",
+    "right_joint",
+    "unknown_outside",
+    "right_when_doubtful",
+    "right_when_likely",
+    "right_when_sure",
+    "stated_when_sure",
+    "brier_skill",
+    "log_skill",
+)
+HOW_TO_READ = f"""\
+A value, its 95 % interval, and the number that it was counted on. **Bold**: not as wanted; of a bin of probabilities,
+its interval does not reach the bin. *Clean* and *realistic*: torques that two engines simulated, names expected above
+{MIN_NAMED_MULTIPLE:g} detection limits ([score](mixed/score.md)), and 300 cases each with nothing hidden
+([nulls](nulls/score.md)). *Reading*: mistakes in how a recording is read ([simulated and real](setup/setup.md)).
+*Motion*: commands and positions without torque ([score](motion/motion.md)). *Real*: something known concealed in real
+recordings ([score](real/real.md)), where no limit is known and no share of names is wanted. *Oracle*: what an observer
+would name of the same effects who knows the noise and the equations of all laws, and has positions as encoders round
+them ([effect by effect](mixed/oracle.md)). *Too small*: effects that are below {MIN_NAMED_MULTIPLE:g} limits for this
+observer. All judged runs: [log]({LOG_PAGE})."""
+Columns = Mapping[str, Mapping[str, Measure]]
+
+
+def write_summary(results: Path) -> Path:
+    """Writes the page into the folder of the results of a judged proof, beside its log.
+
+    Raises InputError for a folder without a log.
+    """
+    if not (results / LOG_FILE).is_file():
+        raise InputError(f"{results} holds no {LOG_FILE}: it should be the folder of the results of a judged proof")
+    columns = {name: {each.id: each for each in measures} for name, measures in _columns(results)}
+    rows = [row for id in SHOWN for row in (_row(id, columns), *_oracle_rows(id, columns, results))]
+    page = markdown_page(
+        "What was wanted and found",
+        "The last judged run of each tier.",
+        markdown_table(("measure", "wanted", *columns), [_commits(results, columns), *rows]),
+        HOW_TO_READ,
+        *_engines(results),
+    )
+    (written,) = write_texts({SUMMARY_PAGE: page}, results)
+    return written
+
+
+def _columns(results: Path) -> Iterator[tuple[str, list[Measure]]]:
+    if (results / "mixed" / SCORE_FILE).is_file():
+        nulls = _torque(results / "nulls")
+        for tier, measures in _torque(results / "mixed").items():
+            more = {each.id: each for each in nulls.get(tier, []) if each.id == "false_claims_on_nulls"}
+            yield tier, [more.get(each.id, each) for each in measures]
+    if (results / "setup" / SETUP_FILE).is_file():
+        yield from ((f"reading, {source}", each) for source, each in read_setup_measures(results / "setup").items())
+    if (results / "motion" / MOTION_FILE).is_file():
+        yield "motion", read_motion_measures(results / "motion")
+    if (results / "real" / CASES_TABLE).is_file():
+        yield "real", [each.measure for each in real_measures(read_tables(results / "real"))]
+
+
+def _torque(folder: Path) -> dict[str, list[Measure]]:
+    if not (folder / SCORE_FILE).is_file():
+        return {}
+    tiers = json.loads((folder / SCORE_FILE).read_text(encoding="utf-8"))["tiers"]
+    return {tier: [Measure(**each) for each in found] for tier, found in tiers.items()}
+
+
+def _row(id: str, columns: Columns) -> list[str]:
+    found = {name: measures[id] for name, measures in columns.items() if id in measures}
+    wanted: dict[str, list[str]] = {}
+    for name, each in found.items():
+        if each.wanted:
+            wanted.setdefault(each.wanted, []).append(name.split(",")[0])
+    several = len(wanted) > 1
+    aims = "; ".join(f"{aim} ({', '.join(dict.fromkeys(names))})" if several else aim for aim, names in wanted.items())
+    return [MEASURE_TEXTS[id].title, aims or "-", *(_cell(found.get(name)) for name in columns)]
+
+
+def _cell(measure: Measure | None) -> str:
+    if measure is None or measure.value is None:
+        return "-"
+    text = f"{format_measure(measure)}, {measure.number}"
+    return f"**{text}**" if measure.is_met is False else text
+
+
+def _oracle_rows(id: str, columns: Columns, results: Path) -> Iterator[list[str]]:
+    """What the oracle names of what was asked, and what is too small for it, where it was asked."""
+    folder = results / "mixed"
+    if id not in SHARES or not columns.keys() & {"clean", "realistic"}:
+        return
+    known = read_oracle_table(folder, read_rows(folder).effects)
+    if known is None:
+        return
+    outside, _, oracle = SHARES[id]
+    asked = {name: known[(known["tier"] == name) & (known["outside"].astype(bool) == outside)] for name in columns}
+    small = {name: own["multiple_recorded"] <= MIN_NAMED_MULTIPLE for name, own in asked.items()}
+    yield ["&nbsp;&nbsp;the oracle", "-", *(format_share(asked[name][oracle]) for name in columns)]
+    yield ["&nbsp;&nbsp;too small", "-", *(format_share(small[name]) for name in columns)]
+
+
+def _commits(results: Path, columns: Columns) -> list[str]:
+    """The last commit that each column was judged on."""
+    lines = (results / LOG_FILE).read_text(encoding="utf-8").splitlines()
+    last = {entry["set"]: entry["commit"][:7] for entry in map(json.loads, lines)}
+    sets = {"clean": "mixed", "realistic": "mixed"}
+    names = (sets.get(name, "setup" if name.startswith("reading") else name) for name in columns)
+    return ["commit", "-", *(last.get(name, "-") for name in names)]
+
+
+def _engines(results: Path) -> Iterator[str]:
+    if not (results / "mixed" / SCORE_FILE).is_file():
+        return
+    table = engine_table(read_rows(results / "mixed"))
+    if len(table):
+        yield "## Second engine"
+        yield (
+            "Cases of the engine whose joints stick beside those of MuJoCo, without effects that have parts of their "
+            "own. *By chance*: probability of such a difference where both are alike (Fisher 1935)."
+        )
+        rows = [[*(str(cell) for cell in row[:-1]), f"{row[-1]:.2g}"] for row in table.itertuples(index=False)]
+        yield markdown_table(list(table.columns), rows)
