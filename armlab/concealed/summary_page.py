@@ -13,8 +13,8 @@ from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.log_page import LOG_FILE, LOG_PAGE
 from armlab.concealed.real.score import CASES_TABLE, read_tables, real_measures
 from armlab.concealed.score.distance import SHARES, format_share, read_oracle_table
-from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure, engine_table
-from armlab.concealed.score.page import format_measure
+from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure
+from armlab.concealed.score.page import engines_section, format_measure
 from armlab.concealed.score.scoring import SCORE_FILE, read_rows
 from armlab.concealed.servo.score import MOTION_FILE, read_motion_measures
 from armlab.concealed.setup.score import SETUP_FILE, read_setup_measures
@@ -55,12 +55,14 @@ def write_summary(results: Path) -> Path:
         raise InputError(f"{results} holds no {LOG_FILE}: it should be the folder of the results of a judged proof")
     columns = {name: {each.id: each for each in measures} for name, measures in _columns(results)}
     rows = [row for id in SHOWN for row in (_row(id, columns), *_oracle_rows(id, columns, results))]
+    torque = results / "mixed"
+    engines = engines_section(read_rows(torque)) if (torque / SCORE_FILE).is_file() else []
     page = markdown_page(
         "What was wanted and found",
         "The last judged run of each tier.",
         markdown_table(("measure", "wanted", *columns), [_commits(results, columns), *rows]),
         HOW_TO_READ,
-        *_engines(results),
+        *engines,
     )
     (written,) = write_texts({SUMMARY_PAGE: page}, results)
     return written
@@ -127,17 +129,3 @@ def _commits(results: Path, columns: Columns) -> list[str]:
     sets = {"clean": "mixed", "realistic": "mixed"}
     names = (sets.get(name, "setup" if name.startswith("reading") else name) for name in columns)
     return ["commit", "-", *(last.get(name, "-") for name in names)]
-
-
-def _engines(results: Path) -> Iterator[str]:
-    if not (results / "mixed" / SCORE_FILE).is_file():
-        return
-    table = engine_table(read_rows(results / "mixed"))
-    if len(table):
-        yield "## Second engine"
-        yield (
-            "Cases of the engine whose joints stick beside those of MuJoCo, without effects that have parts of their "
-            "own. *By chance*: probability of such a difference where both are alike (Fisher 1935)."
-        )
-        rows = [[*(str(cell) for cell in row[:-1]), f"{row[-1]:.2g}"] for row in table.itertuples(index=False)]
-        yield markdown_table(list(table.columns), rows)

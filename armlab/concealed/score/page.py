@@ -85,9 +85,7 @@ def render_page(
     parts += ["## Figures", *(f"{text}\n\n![{name}]({name}.svg)" for name, text in CAPTIONS.items() if name in drawn)]
     parts += ["## Misses, one by one", _misses_section(missed), "## All measures", _all_measures_table(tiers)]
     parts += ["## The cases", _frame_table(_count_kinds(table)), "## By arm", _frame_table(arm_table(table))]
-    engines = engine_table(table)
-    if len(engines):
-        parts += ["## Second engine", HOW_ENGINES_ARE_COMPARED, _frame_table(engines)]
+    parts += engines_section(table)
     for tier in tiers:
         names = effect_table(table, tier)
         if len(names):
@@ -97,6 +95,12 @@ def render_page(
                 _frame_table(names),
             ]
     return markdown_page("Score on concealed effects", *parts)
+
+
+def engines_section(table: ScoreRows) -> list[str]:
+    """The second engine beside the first one; nothing where there is no case of it."""
+    engines = engine_table(table)
+    return ["## Second engine", HOW_ENGINES_ARE_COMPARED, _frame_table(engines)] if len(engines) else []
 
 
 def format_measure(each: Measure) -> str:
