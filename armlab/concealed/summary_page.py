@@ -5,7 +5,10 @@ It is made from what the tiers have written below the folder of the results. A t
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import pandas as pd
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
@@ -14,7 +17,7 @@ from armlab.concealed.log_page import LOG_FILE, LOG_PAGE
 from armlab.concealed.real.score import CASES_TABLE, read_tables, real_measures
 from armlab.concealed.score.distance import SHARES, format_share, read_oracle_table
 from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure
-from armlab.concealed.score.page import engines_section, format_measure
+from armlab.concealed.score.page import engines_section, format_aims, format_measure
 from armlab.concealed.score.scoring import SCORE_FILE, read_rows
 from armlab.concealed.servo.score import MOTION_FILE, read_motion_measures
 from armlab.concealed.setup.score import SETUP_FILE, read_setup_measures
@@ -23,6 +26,7 @@ SUMMARY_PAGE = "summary.md"
 SHOWN = (
     "false_claims_on_nulls",
     "wrong_names_beyond_background",
+    "wrong_names_of_named",
     "right_name_or_class",
     "right_joint",
     "unknown_outside",
@@ -33,16 +37,30 @@ SHOWN = (
     "brier_skill",
     "log_skill",
 )
+TITLES = {"right_name_or_class": "right name or class, of what is large enough"}  # which differs between tiers
 HOW_TO_READ = f"""\
-A value, its 95 % interval, and the number that it was counted on. **Bold**: not as wanted; of a bin of probabilities,
-its interval does not reach the bin. *Clean* and *realistic*: torques that two engines simulated, names expected above
-{MIN_NAMED_MULTIPLE:g} detection limits ([score](mixed/score.md)), and 300 cases each with nothing hidden
-([nulls](nulls/score.md)). *Reading*: mistakes in how a recording is read ([simulated and real](setup/setup.md)).
-*Motion*: commands and positions without torque ([score](motion/motion.md)). *Real*: something known concealed in real
-recordings ([score](real/real.md)), where no limit is known and no share of names is wanted. *Oracle*: what an observer
-would name of the same effects who knows the noise and the equations of all laws, and has positions as encoders round
-them ([effect by effect](mixed/oracle.md)). *Too small*: effects that are below {MIN_NAMED_MULTIPLE:g} limits for this
-observer. All judged runs: [log]({LOG_PAGE})."""
+Each cell: the value, its 95 % interval (Wilson's for shares, bootstrap for means and skills, as if claims were
+independent; those of one real recording are not), and the number that it was counted on. **Bold**: the value is not
+as wanted; of a bin of probabilities, its whole interval is outside the bin. Where an interval crosses the bound, the
+truth may be on its other side.
+
+- *Clean*, *realistic*: torques simulated by two engines ([score](mixed/score.md)); large enough is above
+  {MIN_NAMED_MULTIPLE:g} detection limits, a class has four names at most. Nulls, with nothing hidden, are a set of
+  their own ([nulls](nulls/score.md)).
+- *Reading*: mistakes in how a recording is read, put into simulated and real recordings ([score](setup/setup.md));
+  large enough is what can be seen, a class has three names at most.
+- *Motion*: commands and positions without torque ([score](motion/motion.md)), {MIN_NAMED_MULTIPLE:g} limits.
+- *Real*: something known concealed in real recordings ([score](real/real.md)); three times the error of the model is
+  large enough. No share of names is wanted, because this is no detection limit. Probabilities of `unknown` are not
+  counted there, because nobody knows what else there is.
+
+A *claim* is a finding; *beyond background*: without friction and wrong links that every case has. A claim is right,
+too, where it names a part of what is hidden, or what no motion separates from it. A class of more than four names is
+wrong. *Skill*: one less the score (Brier, or the mean of -log of the probability of what is true, which is bounded at
+0.001) over the score of one constant probability, the share that was right among the same claims. Above 0 is better
+than this constant. *Oracle*: what an observer would name of the same effects who knows the noise and the equations of
+all laws, and has positions as encoders round them ([effect by effect](mixed/oracle.md)). *Too small*: effects that
+are below {MIN_NAMED_MULTIPLE:g} limits for this observer. All judged runs: [log]({LOG_PAGE})."""
 Columns = Mapping[str, Mapping[str, Measure]]
 
 
@@ -55,14 +73,12 @@ def write_summary(results: Path) -> Path:
         raise InputError(f"{results} holds no {LOG_FILE}: it should be the folder of the results of a judged proof")
     columns = {name: {each.id: each for each in measures} for name, measures in _columns(results)}
     rows = [row for id in SHOWN for row in (_row(id, columns), *_oracle_rows(id, columns, results))]
-    torque = results / "mixed"
-    engines = engines_section(read_rows(torque)) if (torque / SCORE_FILE).is_file() else []
     page = markdown_page(
         "What was wanted and found",
         "The last judged run of each tier.",
         markdown_table(("measure", "wanted", *columns), [_commits(results, columns), *rows]),
         HOW_TO_READ,
-        *engines,
+        *_engines(results),
     )
     (written,) = write_texts({SUMMARY_PAGE: page}, results)
     return written
@@ -75,7 +91,7 @@ def _columns(results: Path) -> Iterator[tuple[str, list[Measure]]]:
             more = {each.id: each for each in nulls.get(tier, []) if each.id == "false_claims_on_nulls"}
             yield tier, [more.get(each.id, each) for each in measures]
     if (results / "setup" / SETUP_FILE).is_file():
-        yield from ((f"reading, {source}", each) for source, each in read_setup_measures(results / "setup").items())
+        yield from ((f"reading {source}", each) for source, each in read_setup_measures(results / "setup").items())
     if (results / "motion" / MOTION_FILE).is_file():
         yield "motion", read_motion_measures(results / "motion")
     if (results / "real" / CASES_TABLE).is_file():
@@ -91,13 +107,8 @@ def _torque(folder: Path) -> dict[str, list[Measure]]:
 
 def _row(id: str, columns: Columns) -> list[str]:
     found = {name: measures[id] for name, measures in columns.items() if id in measures}
-    wanted: dict[str, list[str]] = {}
-    for name, each in found.items():
-        if each.wanted:
-            wanted.setdefault(each.wanted, []).append(name.split(",")[0])
-    several = len(wanted) > 1
-    aims = "; ".join(f"{aim} ({', '.join(dict.fromkeys(names))})" if several else aim for aim, names in wanted.items())
-    return [MEASURE_TEXTS[id].title, aims or "-", *(_cell(found.get(name)) for name in columns)]
+    aims = format_aims(found)
+    return [TITLES.get(id, MEASURE_TEXTS[id].title), aims, *(_cell(found.get(name)) for name in columns)]
 
 
 def _cell(measure: Measure | None) -> str:
@@ -129,3 +140,12 @@ def _commits(results: Path, columns: Columns) -> list[str]:
     sets = {"clean": "mixed", "realistic": "mixed"}
     names = (sets.get(name, "setup" if name.startswith("reading") else name) for name in columns)
     return ["commit", "-", *(last.get(name, "-") for name in names)]
+
+
+def _engines(results: Path) -> list[str]:
+    """The second engine beside the first one, with the nulls of the set that has many."""
+    folders = [each for each in (results / "mixed", results / "nulls") if (each / SCORE_FILE).is_file()]
+    if not folders:
+        return []
+    tables = [read_rows(folder) for folder in folders]
+    return engines_section(replace(tables[0], cases=pd.concat([each.cases for each in tables])))

@@ -132,7 +132,7 @@ def test_the_page_puts_what_is_wanted_beside_what_was_found_and_names_the_misses
         "| right name or class of four, above 3 limits | at least 90 % | 0 % (0 to 79.3) | 1 | **not met**, surely |"
     )
     assert above in text
-    assert "| false claims on nulls | at most 2 % | 0 % (0 to 79.3) | 1 | met, perhaps |" in text
+    assert "| nulls with a false claim | at most 2 % | 0 % (0 to 79.3) | 1 | met, perhaps |" in text
     assert "| missed | c0 | clean | irb120-arm | coulomb friction | x | 2 | 8 |" in text
     assert "Development set" in text
     assert "(gap.svg)" in text

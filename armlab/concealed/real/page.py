@@ -43,14 +43,15 @@ strength of {MIN_STRENGTH:g} is no detection limit: the error of the model is ph
 noise. Therefore no share of names is wanted."""
 HOW_TO_READ = """\
 A *wrong name* is a new claim of which neither the first name nor its class of four at most is right. Names that no
-motion separates count as one. Another law of friction, where friction is withheld, is neither right nor wrong: the laws
-of the model are themselves a choice. What only takes away what the control names, or is held by a law that the control
-names there (friction that differs by direction holds Coulomb friction, viscous friction and an offset), needs no new
-name and is counted apart. What is `unknown` is no name. *Right among names*: new claims with a name, by the
+motion separates count as one. Another law of friction, where friction is withheld, is neither right nor wrong: the
+laws of the model are themselves a choice. What only takes away what the control names, or is held by a law that the
+control names there (friction that differs by direction holds Coulomb friction, viscous friction and an offset), needs
+no new name and is counted apart. What is `unknown` is no name. *Right among names*: new claims with a name, by the
 probability that they state. The weights of the probabilities are learnt on simulated sets and on development cases of
-the other real recordings: the one that is judged is left out. *Skill*: against a constant probability, the share of
-right names. Intervals are 95 %: Wilson's for shares, as if claims were independent, and bootstrap for skills. *Met*:
-the figure is as wanted; of a bin, its interval reaches it."""
+the other real recordings: the one that is judged is left out. *Skill*: one less the score over that of one constant
+probability, the share of right names; above 0 is better than this constant. Intervals are 95 %: Wilson's for shares,
+as if claims were independent, and bootstrap for skills. *Met*: the figure is as wanted; of a bin, its interval
+reaches it."""
 RELIABILITY_CAPTION = """\
 Share of new names that are right against the probability that they state. Bars: Wilson, 95 %; the number is that of the
 claims; on the line, probabilities hold."""

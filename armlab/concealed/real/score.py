@@ -126,6 +126,7 @@ def real_measures(tables: RealTables) -> list[TitledMeasure]:
         _unwanted(share_measure("right_name", named[0])),
         _unwanted(share_measure("right_name_all_sizes", named[1])),
         share_measure("wrong_names_beyond_background", is_wrong_name(claims)),
+        share_measure("wrong_names_of_named", is_wrong_name(tables.named_claims)),
         share_measure("wrong_first_names", is_wrong_first_name(tables.named_claims)),
         *_reliability(tables.named_claims),
         share_measure("missing_verdicts", cases["refused"].notna()),

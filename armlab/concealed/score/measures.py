@@ -11,7 +11,7 @@ from scipy.stats import fisher_exact
 
 from armlab.common.arrays import Array
 from armlab.common.statistics import wilson_interval
-from armlab.concealed.score.cases import RIGHT_CATEGORIES
+from armlab.concealed.score.cases import RIGHT_CATEGORIES, UNKNOWN_NAME
 from armlab.concealed.score.rows import ScoreRows
 
 CONFIDENCE_LEVEL = 0.95
@@ -97,11 +97,12 @@ class MeasureText:
 
 ABOVE = f"above {MIN_NAMED_MULTIPLE:g} limits"
 MEASURE_TEXTS = {
-    "false_claims_on_nulls": MeasureText("false claims on nulls", "at most 2 %"),
-    "false_claims_on_decoys": MeasureText("false claims on decoys", "at most 2 %"),
-    "false_unknown": MeasureText("unknown said on nulls and decoys"),
+    "false_claims_on_nulls": MeasureText("nulls with a false claim", "at most 2 %"),
+    "false_claims_on_decoys": MeasureText("decoys with a false claim", "at most 2 %"),
+    "false_unknown": MeasureText("nulls and decoys with something `unknown`"),
     "wrong_names": MeasureText("wrong names among claims"),
     "wrong_names_beyond_background": MeasureText("wrong names among claims beyond background", "at most 5 %"),
+    "wrong_names_of_named": MeasureText("the same among those that have a name, not `unknown`"),
     "wrong_first_names": MeasureText("claims beyond background whose first name is wrong, classes included"),
     "false_of_any_kind": MeasureText("false claims beyond background, also `unknown` where everything has a name"),
     "parts_of_laws": MeasureText("names of a part of what is hidden, or of what no motion separates from it"),
@@ -109,8 +110,8 @@ MEASURE_TEXTS = {
     "right_when_likely": MeasureText("right among names of probability 0.7-0.9", "within 70-90 %"),
     "right_when_sure": MeasureText("right among names of probability 0.9-1", "within 90-100 %"),
     "stated_when_sure": MeasureText("probability stated of these (mean)"),
-    "brier_skill": MeasureText("Brier score of probabilities: share below that of the base rate", "above 0"),
-    "log_skill": MeasureText("log score of probabilities: share below that of the base rate", "above 0"),
+    "brier_skill": MeasureText("Brier skill of probabilities", "above 0"),
+    "log_skill": MeasureText("log skill of probabilities", "above 0"),
     "misplaced": MeasureText("misplaced among claims"),
     "right_name_or_class": MeasureText(f"right name or class of four, {ABOVE}", "at least 90 %"),
     "right_name": MeasureText(f"right first name, {ABOVE}"),
@@ -148,7 +149,7 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
         share_measure("false_claims_on_decoys", decoys["false_claims"] > 0),
         share_measure("false_unknown", pd.concat([nulls, decoys])["false_unknown"]),
         share_measure("wrong_names", wrong),
-        share_measure("wrong_names_beyond_background", wrong[beyond]),
+        *wrong_name_measures(claims[beyond]),
         share_measure("wrong_first_names", false_first[beyond]),
         share_measure("false_of_any_kind", (false_first | unneeded)[beyond]),
         share_measure("parts_of_laws", (claims["category"] == "identical")[beyond]),
@@ -174,6 +175,13 @@ def compute_measures(rows: ScoreRows, tier: str) -> list[Measure]:
 def is_wrong_name(claims: pd.DataFrame) -> "pd.Series[bool]":
     """Which claims are names, or classes of names, none of which is there."""
     return (claims["category"] == "wrong") & ~claims["class_right"].astype(bool)
+
+
+def wrong_name_measures(claims: pd.DataFrame) -> list[Measure]:
+    """Wrong names among claims beyond background, and among those of them that have a name."""
+    wrong = is_wrong_name(claims)
+    of_named = share_measure("wrong_names_of_named", wrong[claims["effect"] != UNKNOWN_NAME])
+    return [share_measure("wrong_names_beyond_background", wrong), of_named]
 
 
 def is_wrong_first_name(claims: pd.DataFrame) -> "pd.Series[bool]":

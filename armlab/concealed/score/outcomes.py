@@ -33,7 +33,7 @@ OUTCOME_GROUPS = {
     "silent": OutcomeGroup("Nothing hidden, and nothing claimed", True),
     "missed": OutcomeGroup("Not named", False),
     "not unknown": OutcomeGroup("Outside the library, and not called unknown", False),
-    "wrong claim": OutcomeGroup("Wrong claim beside something hidden", False),
+    "wrong claim": OutcomeGroup("Wrong, misplaced or needless claim beside something hidden", False),
     "false claim": OutcomeGroup("False claim where nothing is hidden", False),
     "false unknown": OutcomeGroup("Nothing hidden, and something left unexplained", False),
     "no verdict": OutcomeGroup("Nothing hidden, and no verdict", False),

@@ -1,5 +1,6 @@
 """The page of a score in Markdown: wanted and found measures first, then figures, tables and misses."""
 
+from collections.abc import Mapping
 from itertools import chain
 from typing import Any
 
@@ -30,7 +31,9 @@ expected above {MIN_NAMED_MULTIPLE:g} limits. *Clean*: only the hidden effects d
 every link is 3-10 % off, every joint has friction, the noise is coloured. *Null*: nothing is hidden. *Decoy*: only
 links are wrong. A *claim* is a finding. A claim of something that is there is right, friction of the background
 included, and so is one of a part of what is there or of what no motion separates from it (`docs/proof.md`). A class is
-wrong where none of its answers is right; a first name is wrong whatever the rest of its class is. Intervals are 95 %:
+wrong where none of its answers is right, or where they are more than four; a first name is wrong whatever the rest of
+its class is. *Skill*: one less the score of the stated probabilities (Brier, or mean -log of the probability of what is
+true, bounded at 0.001) over that of one constant, the share that was right among the same claims. Intervals are 95 %:
 Wilson's for shares (as if the effects of a case were independent), bootstrap for medians. *Met*: the figure is as
 wanted; of a bin of probabilities, its interval reaches the bin. *Surely*: so is its whole interval (or, if not met,
 none of it). *Perhaps*: the interval crosses the bound."""
@@ -150,7 +153,18 @@ def _wanted_table(tiers: dict[str, list[Measure]]) -> str:
 def _wanted_row(id: str, indent: str, tiers: dict[str, list[Measure]]) -> list[object]:
     found = [_find_measure(measures, id) for measures in tiers.values()]
     cells = chain.from_iterable((format_measure(each), each.number, judge_measure(each)) for each in found)
-    return [f"{indent}{MEASURE_TEXTS[id].title}", MEASURE_TEXTS[id].wanted, *cells]
+    aims = format_aims(dict(zip(tiers, found, strict=True)))
+    return [f"{indent}{MEASURE_TEXTS[id].title}", aims, *cells]
+
+
+def format_aims(measures: Mapping[str, Measure]) -> str:
+    """What is wanted of a figure in some tiers, by their names; tiers that want different things stand beside it."""
+    wanted: dict[str, list[str]] = {}
+    for tier, each in measures.items():
+        if each.wanted:
+            wanted.setdefault(each.wanted, []).append(tier)
+    alike = len(wanted) < 2
+    return "; ".join(aim if alike else f"{aim} ({', '.join(tiers)})" for aim, tiers in wanted.items()) or "-"
 
 
 def _all_measures_table(tiers: dict[str, list[Measure]]) -> str:

@@ -7,7 +7,7 @@ import pandas as pd
 
 from armlab.common.markdown import markdown_table
 from armlab.concealed.score.cases import UNKNOWN_NAME, Category
-from armlab.concealed.score.measures import MEASURE_TEXTS, Measure, is_wrong_name, reliability_measures, share_measure
+from armlab.concealed.score.measures import MEASURE_TEXTS, Measure, reliability_measures, wrong_name_measures
 from armlab.concealed.score.page import format_measure
 
 HEADING = "## Probabilities of names"
@@ -34,12 +34,13 @@ def stated_measures(claims: Sequence[StatedClaim]) -> list[Measure]:
     """Wrong names, the share that is right in each bin of probability, and skills."""
     table = pd.DataFrame(
         {
+            "effect": [each.effect for each in claims],
             "probability": pd.Series([each.probability for each in claims], dtype=float),
             "category": [each.category for each in claims],
             "class_right": [each.right or each.in_class for each in claims],
         }
     )
-    return [share_measure("wrong_names_beyond_background", is_wrong_name(table)), *reliability_measures(table)]
+    return [*wrong_name_measures(table), *reliability_measures(table)]
 
 
 def stated_table(measures: Sequence[Measure]) -> str:
