@@ -224,16 +224,32 @@ def _first_look(
     peak: Array,
     rng: np.random.Generator,
 ) -> tuple[float, type[HiddenEffect], HiddenEffect] | None:
-    """What a law at a place leaves by a few draws, and the best of them; None for what has the right name."""
+    """What a law at a place leaves by a few draws, and the best of them; None for what has the right name.
+
+    Nor is there a rival where every draw runs away in the coarse simulation.
+    """
     kind, joint = place
     first, *more = _draws(kind, joint, bench, peak, rng, LINK_DRAWS if kind.where == "link" else LOOKS)
     if _is_right(first, effect, bench):
         return None
     if kind.where == "link":
         return _left_by_all(own, [bench.rows(each) for each in (first, *more)]), kind, first
-    tried = [first] if first.has_parts else [first, *more]
-    left = [_left_by(own, bench, each) for each in tried]
-    return min(left), kind, tried[int(np.argmin(left))]
+    if first.has_parts:
+        return _look_at_parts(own, bench, (first, *more))
+    left = [_left_by(own, bench, each) for each in (first, *more)]
+    return min(left), kind, (first, *more)[int(np.argmin(left))]
+
+
+def _look_at_parts(
+    own: Array, bench: _Bench, draws: Sequence[HiddenEffect]
+) -> tuple[float, type[HiddenEffect], HiddenEffect] | None:
+    """What the first draw leaves that does not run away in the coarse simulation; None where all do."""
+    for each in draws:
+        try:
+            return _left_by(own, bench, each), type(each), each
+        except FloatingPointError:
+            continue
+    return None
 
 
 def _draws(

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from armlab.common.errors import InputError
+from armlab.concealed import naming_oracle
 from armlab.concealed.effects.channels import Gain, Skew
 from armlab.concealed.effects.friction import Coulomb, EarlyFriction, Viscous
 from armlab.concealed.effects.hidden import HiddenEffect
@@ -38,6 +40,23 @@ def test_a_large_effect_is_named_and_a_tiny_one_is_not() -> None:
     assert tiny.right_name < large.right_name
     assert large.right_class >= large.right_name
     assert tiny.distance < large.distance
+
+
+def test_a_rival_that_cannot_be_simulated_coarsely_is_drawn_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    simulated, runs = naming_oracle.simulate_runs, list[int]()
+
+    def run_away_at_first(*arguments: Any) -> Any:
+        runs.append(1)
+        if len(runs) == 1:
+            raise FloatingPointError("the simulated arm runs away")
+        return simulated(*arguments)
+
+    effect = Viscous(0, 2.0, 100.0, "linear", {"phase": 0.0})
+    case = simulate_case(draw_plan(1003, PLAN_INDEX, "clean", only_nulls=True, development=True), (effect,))
+    monkeypatch.setattr(naming_oracle, "simulate_runs", run_away_at_first)
+    (found,) = ask_oracle(case, 0.0)
+    assert len(runs) > 2
+    assert found.right_name > 0.99
 
 
 def test_a_gain_of_a_horizontal_arm_is_mistaken_for_what_scales_its_torque() -> None:
