@@ -105,7 +105,12 @@ def _effects_table(table: pd.DataFrame) -> str:
     for name, whole in (("of the library", table[~table["outside"]]), ("outside the library", table[table["outside"]])):
         above = whole["multiple_recorded"] > MIN_NAMED_MULTIPLE
         limits = f"{MIN_NAMED_MULTIPLE:g} limits, recorded"
-        parts = (name, whole), (f"{name}, above {limits}", whole[above]), (f"{name}, below {limits}", whole[~above])
+        parts = [(name, whole), (f"{name}, above {limits}", whole[above]), (f"{name}, below {limits}", whole[~above])]
+        far = whole["multiple_away"] > MIN_NAMED_MULTIPLE
+        parts += [
+            (f"{name}, {side} {MIN_NAMED_MULTIPLE:g} limits away from reversals", whole[chosen])
+            for side, chosen in (("above", far), ("below", ~far))
+        ]
         rows += [_row(f"**{part}**", own) for part, own in parts if len(own)]
     return markdown_table(heads, rows)
 

@@ -60,7 +60,10 @@ wrong. *Skill*: one less the score (Brier, or the mean of -log of the probabilit
 0.001) over the score of one constant probability, the share that was right among the same claims. Above 0 is better
 than this constant. *Oracle*: what an observer would name of the same effects who knows the noise and the equations of
 all laws, and has positions as encoders round them ([effect by effect](mixed/oracle.md)). *Too small*: effects that
-are below {MIN_NAMED_MULTIPLE:g} limits for this observer. All judged runs: [log]({LOG_PAGE})."""
+are below {MIN_NAMED_MULTIPLE:g} limits for this observer. *Large away from reversals*: above
+{MIN_NAMED_MULTIPLE:g} limits for one who has nothing within 25 ms of a reversal of each joint.
+
+All judged runs: [log]({LOG_PAGE})."""
 Columns = Mapping[str, Mapping[str, Measure]]
 
 
@@ -126,10 +129,13 @@ def _oracle_rows(id: str, columns: Columns, results: Path) -> Iterator[list[str]
     known = read_oracle_table(folder, read_rows(folder).effects)
     if known is None:
         return
-    outside, _, oracle = SHARES[id]
+    outside, diagnosis, oracle = SHARES[id]
     asked = {name: known[(known["tier"] == name) & (known["outside"].astype(bool) == outside)] for name in columns}
     small = {name: own["multiple_recorded"] <= MIN_NAMED_MULTIPLE for name, own in asked.items()}
     yield ["&nbsp;&nbsp;the oracle", "-", *(format_share(asked[name][oracle]) for name in columns)]
+    far = {name: own[own["multiple_away"] > MIN_NAMED_MULTIPLE] for name, own in asked.items()}
+    named = {name: f"{format_share(own[diagnosis])}, {len(own)}" if len(own) else "-" for name, own in far.items()}
+    yield ["&nbsp;&nbsp;the diagnosis, of what is large away from reversals", "-", *(named[name] for name in columns)]
     yield ["&nbsp;&nbsp;too small", "-", *(format_share(small[name]) for name in columns)]
 
 
