@@ -15,7 +15,7 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.log_page import LOG_FILE, LOG_PAGE
 from armlab.concealed.real.score import CASES_TABLE, read_tables, real_measures
-from armlab.concealed.score.distance import SHARES, format_share, read_oracle_table
+from armlab.concealed.score.distance import SHARES, Distance, read_oracle_table
 from armlab.concealed.score.measures import MEASURE_TEXTS, MIN_NAMED_MULTIPLE, Measure
 from armlab.concealed.score.page import engines_section, format_aims, format_measure
 from armlab.concealed.score.scoring import SCORE_FILE, read_rows
@@ -129,14 +129,11 @@ def _oracle_rows(id: str, columns: Columns, results: Path) -> Iterator[list[str]
     known = read_oracle_table(folder, read_rows(folder).effects)
     if known is None:
         return
-    outside, diagnosis, oracle = SHARES[id]
-    asked = {name: known[(known["tier"] == name) & (known["outside"].astype(bool) == outside)] for name in columns}
-    small = {name: own["multiple_recorded"] <= MIN_NAMED_MULTIPLE for name, own in asked.items()}
-    yield ["&nbsp;&nbsp;the oracle", "-", *(format_share(asked[name][oracle]) for name in columns)]
-    far = {name: own[own["multiple_away"] > MIN_NAMED_MULTIPLE] for name, own in asked.items()}
-    named = {name: f"{format_share(own[diagnosis])}, {len(own)}" if len(own) else "-" for name, own in far.items()}
-    yield ["&nbsp;&nbsp;the diagnosis, of what is large away from reversals", "-", *(named[name] for name in columns)]
-    yield ["&nbsp;&nbsp;too small", "-", *(format_share(small[name]) for name in columns)]
+    found = [Distance.of(known, id, name) for name in columns]
+    away = [f"{each.diagnosis_away}, {each.number_away}" if each.number_away else "-" for each in found]
+    yield ["&nbsp;&nbsp;the oracle", "-", *(each.oracle for each in found)]
+    yield ["&nbsp;&nbsp;the diagnosis, of what is large away from reversals", "-", *away]
+    yield ["&nbsp;&nbsp;too small", "-", *(each.below for each in found)]
 
 
 def _commits(results: Path, columns: Columns) -> list[str]:

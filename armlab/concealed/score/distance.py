@@ -1,5 +1,6 @@
 """How far a score is from what anyone could name: the table that the oracle of names wrote beside it."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -58,13 +59,37 @@ def distance_table(known: pd.DataFrame) -> str:
 
 
 def _distances(known: pd.DataFrame, id: str, tiers: list[str]) -> list[str]:
-    outside, diagnosis, oracle = SHARES[id]
-    cells = []
-    for tier in tiers:
+    found = [Distance.of(known, id, tier) for tier in tiers]
+    return [text for each in found for text in (each.diagnosis, each.oracle, each.below, str(each.number))]
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Of a share of a score in one tier, in per cent, - where nothing was asked: what was named, what the oracle names,
+    what is below three limits for it, and what was named of effects that are larger than that away from reversals.
+    """
+
+    number: int
+    diagnosis: str
+    oracle: str
+    below: str
+    number_away: int
+    diagnosis_away: str
+
+    @classmethod
+    def of(cls, known: pd.DataFrame, id: str, tier: str) -> "Distance":
+        """known: see `read_oracle_table`. id: a key of SHARES."""
+        outside, diagnosis, oracle = SHARES[id]
         own = known[(known["tier"] == tier) & (known["outside"].astype(bool) == outside)]
-        below = own["multiple_recorded"] <= MIN_NAMED_MULTIPLE
-        cells += [*(format_share(own[column]) for column in (diagnosis, oracle)), format_share(below), str(len(own))]
-    return cells
+        away = own[own["multiple_away"] > MIN_NAMED_MULTIPLE]
+        return cls(
+            number=len(own),
+            diagnosis=format_share(own[diagnosis]),
+            oracle=format_share(own[oracle]),
+            below=format_share(own["multiple_recorded"] <= MIN_NAMED_MULTIPLE),
+            number_away=len(away),
+            diagnosis_away=format_share(away[diagnosis]),
+        )
 
 
 def format_share(values: pd.Series) -> str:
