@@ -37,6 +37,7 @@ DRIVE_WORDS = {
     "ki_speed": "integral of the velocity",
     "offset": "offset of the command",
     "dead_band": "dead band",
+    "limit_slope": "fall of the torque limit with speed",
 }
 
 

@@ -28,6 +28,7 @@ PER_JOINT_KEYS = (
     "ki_speed",
     "delay",
     "torque_limit",
+    "limit_slope",
     "integral_limit",
     "offset",
     "dead_band",

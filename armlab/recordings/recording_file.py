@@ -84,9 +84,10 @@ class TransmissionEntry(Settings):
 class ControllerEntry(Settings):
     """The drive as the simulation has it: tau = kp (reference - position) + kd (reference velocity - velocity).
 
-    kp, ki_speed: N m/rad; kd: N m s/rad; ki: N m/(rad s); torque_limit, integral_limit: N m; one a joint, null where
-    unknown. ki_speed: of a cascade whose integral acts on the velocity, too: the integral grows by ki (reference -
-    position) - ki_speed velocity, and kp holds ki_speed.
+    kp, ki_speed: N m/rad; kd: N m s/rad; ki: N m/(rad s); torque_limit, integral_limit: N m; limit_slope: N m s/rad, by
+    which the torque limit falls with speed where the drive does work; one a joint, null where unknown. ki_speed: of a
+    cascade whose integral acts on the velocity, too: the integral grows by ki (reference - position) - ki_speed
+    velocity, and kp holds ki_speed.
     reference_velocity: zero, or the derivative of the reference. feedforward: what the drive adds, from the simulation.
     delay: s, of the command, of all joints or one a joint. read_delay: s, one a joint, where joints are read one after
     another. offset: rad (m), added to the command; dead_band: rad (m), whole width of the errors that the drive
@@ -102,6 +103,7 @@ class ControllerEntry(Settings):
     reference_velocity: Literal["zero", "derivative"] = "zero"
     feedforward: Literal["none", "gravity", "model"] = "none"
     torque_limit: PerJoint | None = None
+    limit_slope: PerJoint | None = None
     integral_limit: PerJoint | None = None
     delay: NotNegative | Annotated[tuple[NotNegative, ...], Len(min_length=1)] = 0.0
     offset: PerJoint | None = None

@@ -182,6 +182,14 @@ def test_a_name_among_four_is_a_right_class_and_among_five_is_none():
     assert four.wrong == ["viscous_friction@2"]
 
 
+@pytest.mark.parametrize(("falling", "wrong"), [(False, ["torque_saturation@1"]), (True, [])])
+def test_limits_of_all_joints_are_lower_where_the_supply_falls(falling, wrong):
+    hidden = {**TRUTH["injected"][0], "kind": "saturation", "effect": "torque_saturation", "falling": falling}
+    verdict = {"findings": [finding("torque_saturation", 1, limit=(1.0, 0.9, 1.1))]}
+    outcome = judge({**TRUTH, "injected": [hidden]}, verdict)
+    assert (outcome.wrong, outcome.hidden[0].named, outcome.numbers) == (wrong, False, [])
+
+
 def test_a_gain_is_no_wrong_claim_where_kp_is_unknown_but_a_single_wrong_number_is_counted():
     verdict = {"findings": [finding("controller_gain_error", 1, kp=(6.0, 5.8, 6.2))]}
     outcome = judge({**TRUTH, "knowledge": "partly"}, verdict)

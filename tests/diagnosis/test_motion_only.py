@@ -16,7 +16,8 @@ from armlab.cli.main import main
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough
-from armlab.diagnosis.motion.choose import choose_servo, learned_errors
+from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows, find_calm_windows
+from armlab.diagnosis.motion.choose import ChosenServo, Gain, choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.couple import coupled_windows
@@ -96,7 +97,8 @@ def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis
     named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
     held_out = split_runs(diagnosis.recording)[1]
     both, before = (diagnosis.simulation, diagnosis.simulation), diagnosis.replayed_before
-    servos, _, kept = replay_named(both, (spoilt, second), named, before, held_out)
+    alone = {0: (spoilt, named[0])}
+    _, kept, servos, _ = replay_named(both, (spoilt, second), named, lambda joint, _: alone[joint], before, held_out)
     assert kept == [[], named[1]]
     np.testing.assert_array_equal(servos.values[0], diagnosis.simulation.nominal.values[0])
 
@@ -313,17 +315,60 @@ def replayed_runs(run: MotionRun, simulation: ServoSimulation, servo: np.ndarray
 
 
 def test_another_kd_of_a_known_drive_has_its_own_name_where_its_limit_acts(soft: Path) -> None:
-    recording = load_motion_recording(soft)
-    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
-    keys: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
-    nominal = NEUTRAL.copy()
-    nominal[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.1, 0.01, 0.5
+    nominal = strong_servo()
     true = nominal.copy()
     true[place("kd")] = 0.6
-    replayed = replay_joint(windows, true)[0]
-    chosen = choose_servo(replace(windows, position=np.round(replayed / 1e-4) * 1e-4), nominal, 20)
+    chosen = choose_servo(moved_windows(soft, true), nominal, 20)
     assert list(chosen.gains) == [place("kd")]
     assert chosen.fit.values[place("kd")] == pytest.approx(0.6, rel=0.02)
+
+
+@pytest.mark.parametrize("slope", [0.02, 0.05])
+def test_a_limit_that_falls_with_speed_is_named_alone(soft: Path, slope: float) -> None:
+    nominal = strong_servo()
+    true = nominal.copy()
+    true[place("limit_slope")] = slope
+    chosen = choose_servo(moved_windows(soft, true), nominal, 20)
+    assert list(chosen.gains) == [place("limit_slope")]
+    assert chosen.fit.values[place("limit_slope")] == pytest.approx(slope, rel=0.1)
+
+
+def test_windows_where_no_limit_acts_refute_a_gain_that_a_limit_makes(soft: Path) -> None:
+    nominal, spoilt, true = (strong_servo(4.0) for _ in range(3))
+    true[place("limit")] = 3.0
+    windows = moved_windows(soft, true)
+    free = np.array(USUAL)
+    spoilt[place("kp")] = 7.5
+    odd, gain = np.zeros(0, dtype=np.intp), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3)
+    wrong = ChosenServo(nominal, fit_servo(windows, spoilt, free), free, {place("kp"): gain}, odd)
+    confirmed = confirm_in_calm_windows(windows, wrong, 20)
+    assert 0 < len(find_calm_windows(windows, nominal[None])) < windows.count
+    assert list(confirmed.gains) == [place("limit")]
+    assert confirmed.fit.values[place("limit")] == pytest.approx(3.0, rel=0.02)
+
+
+def test_windows_where_no_limit_acts_keep_a_gain_that_is_true(soft: Path) -> None:
+    nominal, true = strong_servo(4.0), strong_servo(4.0)
+    true[place("kp")] = 7.5
+    windows = moved_windows(soft, true)
+    chosen = choose_servo(windows, nominal, 20)
+    assert confirm_in_calm_windows(windows, chosen, 20) is chosen
+    assert list(chosen.gains) == [place("kp")]
+
+
+def strong_servo(limit: float = 0.5) -> np.ndarray:
+    """Numbers (parameters,) of a servo whose torque limit, N m, acts now and then."""
+    keys: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
+    servo = NEUTRAL.copy()
+    servo[[place(key) for key in keys]] = 8.0, 0.4, 0.1, 0.1, 0.01, limit
+    return servo
+
+
+def moved_windows(soft: Path, servo: np.ndarray) -> Windows:
+    """Windows of the first joint, as it moves with a servo, read in steps of 0.1 mrad."""
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    return replace(windows, position=np.round(replay_joint(windows, servo)[0] / 1e-4) * 1e-4)
 
 
 def test_drives_that_hold_commands_share_the_phase_that_explains_all_joints(soft: Path) -> None:

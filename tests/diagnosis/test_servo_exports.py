@@ -30,7 +30,7 @@ from problem.robot_file import load_arm
 SOURCES = yaml.safe_load((Path(__file__).parent / "simulator_fields.yaml").read_text())
 STEP_S = 0.001
 NUMBERS = {"kp": 8.0, "damping": 0.05, "friction": 0.08, "kd": 0.12, "armature": 0.011, "limit": 1.1, "delay": 0.0214}
-BEYOND_FIELDS = {"offset": 0.02, "dead_band": 0.03, "load_friction": 0.15, "static_excess": 0.04}
+BEYOND_FIELDS = {"limit_slope": 0.2, "offset": 0.02, "dead_band": 0.03, "load_friction": 0.15, "static_excess": 0.04}
 
 
 def make_servos(**numbers: float) -> Servos:
@@ -242,6 +242,7 @@ def test_each_file_says_what_it_does_not_hold(simulation: ServoSimulation, tmp_p
     for text in (*texts, ros_urdf_text(simulation, servos), "\n".join(lines_without_field(simulation, servos))):
         assert "shoulder: add 0.02 rad to the command" in text
         assert "dead band" in text
+        assert "shoulder: lower the torque limit by 0.2 N m s/rad times the speed" in text
         assert "elbow: add 0.15 |load| to the friction" in text
         assert "elbow: add 0.04 exp(-(velocity / 0.1 rad/s)^2) N m to the friction" in text
     assert all("the delay of 21.4 ms becomes 21 steps of 1 ms, 21 ms" in text for text in texts)

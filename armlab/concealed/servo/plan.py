@@ -38,7 +38,7 @@ class MotionRun:
 
 @dataclass(frozen=True)
 class ServoCase:
-    """A case of a set. Development sets leave out cascades and limits that fall with speed."""
+    """A case of a set. Development sets leave out cascades."""
 
     seed: int
     kind: Kind
@@ -136,7 +136,7 @@ class ServoCase:
         order = random_stream("servo order", self.seed, place).permutation(len(usable))
         kind = usable[order[self.index % len(usable)]] if attempt == 0 else str(rng.choice(usable))
         sign = float(rng.choice([-1, 1])) if KINDS[kind].both_ways else 1.0
-        falling = kind == "saturation" and not self.development and bool(rng.random() < 0.5)
+        falling = kind == "saturation" and bool(rng.random() < 0.5)
         joint = int(rng.integers(self.drawn[0].joints))
         return Hidden(kind, joint, sign, falling=falling, shape=float(rng.uniform(0.03, 0.15)))
 

@@ -3,7 +3,8 @@
 A finding stands for a class: its name, its rivals and its members. A hidden effect has its right name where a finding
 has its name, or one that no motion tells from it, at its joint; it has its right class where that name is in a class of
 four names at most. A claim is wrong where its first name is not true. What a simulation lacks because it says nothing
-of its drives is true, too: gains where kp is unknown; damping and torque limits as well where nothing is known.
+of its drives is true, too: gains where kp is unknown; damping and torque limits as well where nothing is known. So is a
+lower torque limit at any joint, where one that falls with the supply is hidden: all drives have the same supply.
 """
 
 import json
@@ -280,8 +281,10 @@ def _names(name: Name, hidden: dict[str, Any]) -> bool:
 
 
 def _is_true(name: Name, truth: dict[str, Any], lacking: Sequence[str]) -> bool:
-    parts = [(each["part"], each["joint"]) for each in truth["injected"]]
-    return name[0] in lacking or name in parts or any(_names(name, each) for each in truth["injected"])
+    hidden = truth["injected"]
+    parts = [(each["part"], each["joint"]) for each in hidden]
+    sagging = [each["effect"] for each in hidden if each["falling"]]  # the supply, and with it the limits of all drives
+    return name[0] in (*lacking, *sagging) or name in parts or any(_names(name, each) for each in hidden)
 
 
 def _compare(

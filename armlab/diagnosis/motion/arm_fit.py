@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows
 from armlab.diagnosis.motion.choose import ChosenServo, choose_servo, free_at_first
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import begin_integrals, fit_servo, settle, thin_windows, to_coordinates
@@ -135,6 +136,7 @@ def _choose(fit: ArmFit, joints: Sequence[int], progress: Callable[[str], None])
 
     def choose(number: int) -> ChosenServo | None:
         fitted = choose_servo(windows[number], nominal[number], looks, tuning, start=fit.starts[number])
+        fitted = confirm_in_calm_windows(windows[number], fitted, looks, tuning)
         return fitted if _explains(windows[number], fitted, tuning) else None
 
     chosen = list(fit.chosen)

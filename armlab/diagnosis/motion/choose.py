@@ -46,6 +46,7 @@ from armlab.diagnosis.motion.estimate import (
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import (
     INFINITE_LIMIT,
+    LIMITS,
     OPTIONAL,
     UNSTATED,
     USUAL,
@@ -117,6 +118,14 @@ class ChosenServo:
         gains = {other: gain for other, gain in self.gains.items() if other != number}
         return replace(self, fit=fit, free=judged, gains=gains)
 
+    def with_findings_alone(self, windows: Windows, tuning: MotionTuning = DEFAULT) -> "ChosenServo":
+        """The findings fitted anew, all other numbers as in the simulation; a number that it lacks stays free."""
+        values, free = self.named
+        lacking = np.isnan(self.nominal) & self.fit.free
+        values = np.where(lacking, self.fit.values, values)
+        sound = _without_odd(windows, self.odd).with_integral(self.fit.integral)
+        return replace(self, fit=fit_servo(sound, values, free | lacking, tuning.refit_evaluations))
+
     @property
     def named(self) -> tuple[Array, NDArray[np.bool_]]:
         """The numbers of the simulation with those in their place that may be findings; which these are."""
@@ -145,11 +154,12 @@ def choose_servo(
     few = thin_windows(_without_odd(windows, odd), tuning.max_judged_windows)
     grown = [(*_grow(few, fit, base, tuning), base) for fit, base in starts]
     best, judged, base = min(grown, key=lambda each: _cost(each[0], tuning))
-    single = _with_one_difference(few, nominal, tuning)
-    if single is not None and _cost(single, tuning) < _cost(best, tuning):
-        base = nominal
-        best, judged = _grow(few, single, base, tuning)
-    return _judge(windows, (best, judged), (base, odd), looks, tuning)
+    chosen = _judge(windows, (best, judged), (base, odd), looks, tuning)
+    single = _with_one_difference(few, nominal, tuning) if chosen.gains else None
+    if single is None:
+        return chosen
+    other = _judge(windows, _grow(few, single, nominal, tuning), (nominal, odd), looks, tuning)
+    return min(chosen, other, key=lambda each: _cost(each.fit, tuning))
 
 
 def judge_again(windows: Windows, chosen: ChosenServo, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
@@ -159,6 +169,16 @@ def judge_again(windows: Windows, chosen: ChosenServo, looks: int, tuning: Motio
     fit = fit_servo(few, chosen.fit.values, chosen.free, tuning.max_evaluations)
     judged = errors_on_other_half(few, fit.values, fit.free, tuning)
     return _judge(windows, (fit, judged), (chosen.nominal, chosen.odd), looks, tuning)
+
+
+def choose_limits(windows: Windows, chosen: ChosenServo, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
+    """The same findings, fitted anew in other windows, and the torque limits that are worth a place there."""
+    few = thin_windows(_without_odd(windows, chosen.odd), tuning.max_judged_windows)
+    free = np.zeros(len(chosen.nominal), dtype=bool)
+    free[list(chosen.gains)] = True
+    start = fit_servo(few.with_integral(chosen.fit.integral), chosen.named[0], free, tuning.max_evaluations)
+    grown = _grow(few, start, chosen.nominal, tuning, LIMITS)
+    return _judge(windows, grown, (chosen.nominal, chosen.odd), looks, tuning)
 
 
 def _judge(
@@ -285,14 +305,19 @@ def _states_limit(nominal: Array) -> bool:
     return not np.isnan(nominal[place("kp")]) or bool(fill_unknown(nominal)[place("limit")] < INFINITE_LIMIT)
 
 
-def _grow(windows: Windows, start: ServoFit, nominal: Array, tuning: MotionTuning) -> tuple[ServoFit, Array]:
-    """The fit from a start with all parameters that are worth a place; its errors on the other half, (samples,)."""
+def _grow(
+    windows: Windows,
+    start: ServoFit,
+    nominal: Array,
+    tuning: MotionTuning,
+    candidates: Sequence[int] = tuple(np.flatnonzero(np.array(OPTIONAL) | np.array(USUAL)).tolist()),
+) -> tuple[ServoFit, Array]:
+    """The fit from a start with all candidates that are worth a place; its errors on the other half, (samples,)."""
     windows = windows.with_integral(start.integral)
     base = fill_unknown(nominal)
     fit = fit_servo(windows, start.values, start.free, tuning.max_evaluations)
     judged = errors_on_other_half(windows, fit.values, fit.free, tuning)
-    optional = np.array(OPTIONAL) | np.array(USUAL)
-    waiting = np.flatnonzero(optional & ~fit.free).tolist()
+    waiting = [number for number in candidates if not fit.free[number]]
     while waiting:
         windows = windows.with_integral(fit.integral)
         promising = _most_promising(windows, fit, waiting, tuning)

@@ -299,22 +299,26 @@ def _conclude(
     given: the simulation to be judged; found: servos and payload. judged: windows of the held-out runs.
     """
     fit, payload = found
-    simulation, chosen, learned = fit.simulation, fit.chosen, fit.windows
+    simulation, learned = fit.simulation, fit.windows
     mass_error = np.inf if payload is None else payload.error
-    named = [
-        []
-        if each is None
-        else name_differences(number, each, simulation, (learned[number], judged[number]), mass_error, tuning)
-        for number, each in enumerate(chosen)
-    ]
-    if recording.controller is not None and recording.controller.rate_hz is not None:
-        sample = max(1 / run.rate_hz for run in held_out)
-        named = [[each for each in own if not each.is_shorter(sample)] for own in named]
+    holds = recording.controller is not None and recording.controller.rate_hz is not None
+    sample = max(1 / run.rate_hz for run in held_out) if holds else 0.0
     step = float(given.model().opt.timestep)
-    named = [[each for each in own if not each.is_lead_of(step)] for own in named]
+
+    def name(number: int, each: ChosenServo) -> list[ServoFinding]:
+        windows = learned[number], judged[number]
+        found = name_differences(number, each, simulation, windows, mass_error, tuning)
+        return [one for one in found if not (one.is_shorter(sample) or one.is_lead_of(step))]
+
+    def alone(number: int, each: ChosenServo) -> tuple[ChosenServo, list[ServoFinding]]:
+        fewer = each.with_findings_alone(learned[number], tuning)
+        return fewer, name(number, fewer)
+
+    named = [[] if each is None else name(number, each) for number, each in enumerate(fit.chosen)]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(given, None, held_out)) if known else ()
-    servos, after, named = replay_named((given, simulation), chosen, named, before, held_out, tuning)
+    simulations = given, simulation
+    chosen, named, servos, after = replay_named(simulations, fit.chosen, named, alone, before, held_out, tuning)
     findings = [finding for own in named for finding in own]
     if payload is not None:
         findings.append(_name_payload(payload, fit, judged, tuning))
@@ -352,19 +356,23 @@ def replay_named(
     simulations: tuple[ServoSimulation, ServoSimulation],
     chosen: Sequence[ChosenServo | None],
     named: Sequence[list[ServoFinding]],
+    alone: Callable[[int, ChosenServo], tuple[ChosenServo, list[ServoFinding]]],
     before: tuple[Replayed, ...],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning = DEFAULT,
-) -> tuple[Servos, tuple[Replayed, ...], list[list[ServoFinding]]]:
-    """The servos with what is named, their replay of the held-out runs, and the names of each joint that hold there.
+) -> tuple[list[ChosenServo | None], list[list[ServoFinding]], Servos, tuple[Replayed, ...]]:
+    """The servos and the names of each joint that hold in held-out runs, all numbers, and their replay.
 
-    A joint whose replay its names make worse, the worst first, gets back the numbers of the simulation. A whole run of
+    A joint whose replay is worse with its numbers, the worst first, gets back those of the simulation. Where it has a
+    single finding, that one is tried alone before: other numbers, which are none, may spoil the replay. A whole run of
     sticking joints goes a little another way with any other number: worse is what matters and exceeds the standard
     error over stretches, also with steps so short that the simulator's own error is small. Where the simulation as it
     is given ends at the encoder's steps, its own error is small enough.
-    simulations: as it is given, and with a payload that was found. before: replay of the first one.
+    simulations: as it is given, and with a payload that was found. before: replay of the first one. alone: a servo of a
+    joint with its findings alone, and what is named then.
     """
-    named, sound, (given, simulation) = list(named), set[int](), simulations
+    chosen, named, (given, simulation) = list(chosen), list(named), simulations
+    sound, fewer = set[int](), set[int]()
     exact_before: list[Replayed] = []
     while True:
         values = [_values_after(simulation, number, each, bool(named[number])) for number, each in enumerate(chosen)]
@@ -375,13 +383,17 @@ def replay_named(
         rises = np.where(judged, rises, 0.0)
         worst = int(np.argmax(rises))
         if rises[worst] <= 1:
-            return servos, after, named
+            return chosen, named, servos, after
         exact_before = exact_before or replay(given, None, held_out, EXACT_STEPS)
         exact_after = replay(simulation, servos, held_out, EXACT_STEPS)
-        if _is_at_floor(before, worst, tuning) or _rises(exact_before, exact_after, tuning)[worst] > 1:
+        own = chosen[worst]
+        if not _is_at_floor(before, worst, tuning) and _rises(exact_before, exact_after, tuning)[worst] <= 1:
+            sound.add(worst)
+        elif own is None or worst in fewer or len(own.gains) != 1:
             named[worst] = []
         else:
-            sound.add(worst)
+            chosen[worst], named[worst] = alone(worst, own)
+            fewer.add(worst)
 
 
 def _is_at_floor(replayed: Sequence[Replayed], joint: int, tuning: MotionTuning) -> bool:

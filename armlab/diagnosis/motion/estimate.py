@@ -106,6 +106,7 @@ def coordinate_scales(windows: Windows, values: Array) -> Array:
     critical = np.sqrt(float(values[place("kp")]) * (inertia + max(float(values[place("armature")]), 0.0)))
     torque = float(np.sqrt(np.mean(needed_torque(windows, 0.0)[-1] ** 2)))
     natural = {"damping": critical, "kd": critical, "armature": inertia, "friction": torque, "static_excess": torque}
+    natural["limit_slope"] = torque  # at 1 rad/s (m/s)
     for key, size in natural.items():
         scales[KEYS.index(key)] = np.clip(NATURAL_SHARE * size, 1e-3 * SCALE[KEYS.index(key)], HIGHEST[KEYS.index(key)])
     return np.where(LOGARITHMIC, LOGARITHMIC_SCALE, scales)

@@ -65,6 +65,12 @@ def lines_without_field(simulation: ServoSimulation, servos: Servos, with_field:
             yield f"{name}: add {offset:.4g} rad to the command (command offset)"
         if band:
             yield f"{name}: send the position itself where |command - position| is below {band / 2:.4g} rad (dead band)"
+        slope = float(servos.get("limit_slope")[row])
+        if slope:
+            yield (
+                f"{name}: lower the torque limit by {slope:.4g} N m s/rad times the speed at each step, where the "
+                "drive does work (torque limit)"
+            )
         if share:
             yield (
                 f"{name}: add {share:.4g} |load| to the friction at each step; load: torque that moves and holds the "

@@ -20,8 +20,8 @@
 
 /* In the order of PARAMETERS in servo.py. */
 typedef struct {
-    double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, static_excess,
-        stribeck_speed, ki, ki_speed, integral_limit, payload;
+    double kp, damping, friction, kd, armature, limit, limit_slope, delay, offset, dead_band, load_friction,
+        static_excess, stribeck_speed, ki, ki_speed, integral_limit, payload;
 } Servo;
 
 /* One joint in all windows. command: (windows, columns); measured, supply: (windows, steps), supply may be null; inertia,
@@ -113,6 +113,11 @@ INLINE Vector read_position(const Stretch *at, Vector position) {
     return ((position - at->encoder_phase) / at->encoder_step + ROUNDS - ROUNDS) * at->encoder_step + at->encoder_phase;
 }
 
+/* A torque within the limit of the drive, which may be less where the drive does work: `working`, at a velocity. */
+INLINE Vector clip_torque(Vector torque, Vector velocity, Vector limit, Vector working) {
+    return clip_each(torque, choose(torque * velocity > 0, working, limit));
+}
+
 /* The level of friction at a velocity, without that of the load. */
 INLINE Vector level_at(const Servo *servo, Vector velocity) {
     Vector level = {0};
@@ -186,6 +191,7 @@ INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const S
     const int64_t last = at->columns - 1;
     Vector before[PARTS], after[PARTS], mass[PARTS], load[PARTS], slope[PARTS], next[PARTS], supply[PARTS];
     Vector free[PARTS], slow[PARTS], torque[PARTS], later[PARTS], asked[PARTS], away[PARTS], error[PARTS];
+    Vector speed[PARTS], working[PARTS];
     const double place = (double)(at->history + step) - servo->delay / h, whole = floor(place), share = place - whole;
     const int64_t row = (int64_t)whole;
     take(at->command, lanes->commands, column_at(row, last), before);
@@ -234,7 +240,10 @@ INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const S
         free[part] = (mass[part] - slow[part]) * velocity + h * (supply[part] * pull - load[part]);
         free[part] /= mass[part] + slow[part];
         torque[part] = pull - 0.5 * servo->kd * (velocity + free[part]);
-        beyond |= size_of(torque[part]) + gain * size_of(later[part] - state->earlier[part]) > widest;
+        speed[part] = velocity + half * state->thrust[part] / (mass[part] - servo->armature);
+        working[part] = widest - servo->limit_slope * size_of(speed[part]);
+        working[part] = choose(working[part] > 0, working[part], none);
+        beyond |= size_of(torque[part]) + gain * size_of(later[part] - state->earlier[part]) > working[part];
     }
     if (beyond[0] | beyond[1] | beyond[2] | beyond[3])
         EACH_PART {
@@ -246,8 +255,9 @@ INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const S
             const Vector new = choose(changes, later[part], asked[part]);
             const Vector first = rest + gain * left_of(servo, old + away[part], band);
             const Vector second = rest + gain * left_of(servo, new + away[part], band);
-            const Mask over = (size_of(first) > widest) | (size_of(second) > widest);
-            const Vector begun = clip_each(first, widest), ended = clip_each(second, widest);
+            const Vector begun = clip_torque(first, speed[part], widest, working[part]);
+            const Vector ended = clip_torque(second, speed[part], widest, working[part]);
+            const Mask over = (first != begun) | (second != ended);
             const Vector held = supply[part] * (begun + choose(changes, done, none) * (ended - begun));
             const Vector outside = none + half * servo->damping;
             const Vector driven = (mass[part] - outside) * state->velocity[part] + h * (held - load[part]);

@@ -5,14 +5,16 @@ friction loss but without its slip at rest; it is of second order between events
 
     q_m = q + h v / 2
     i_m = clip(i + h (ki d(c - q_m) - ki_speed v) / 2, -integral_limit, integral_limit)
-    u   = s clip((kp - ki_speed) d(c - q_m) - kd (v + v*) / 2 + i_m, -limit, limit) - load - slope (q_m - q_m measured)
+    u   = s clip((kp - ki_speed) d(c - q_m) - kd (v + v*) / 2 + i_m, -most, most) - load - slope (q_m - q_m measured)
+    most = limit - limit_slope |v_m| where the drive does work, limit where it brakes
     v*  = v + h (u - damping (v + v*) / 2) / m,  m = inertia + armature
     F   = friction + static_excess exp(-(v / stribeck_speed)^2) + load_friction |load + a|
     v'  = sgn(v*) max(|v*| - h F / (m + h (damping + s kd) / 2), 0)
     q'  = q_m + h v' / 2
     i'  = clip(i + h (ki d(c - q_m) - ki_speed (v + v') / 2), -integral_limit, integral_limit)
 
-a is the torque that accelerated the link in the step before, inertia (v' - v) / h.
+a is the torque that accelerated the link in the step before, inertia (v' - v) / h. v_m is the velocity in the middle of
+the step, if the acceleration stays as in the step before.
 
 Where the command changes within a step, the torque is the mean of the clipped torques before and after the change. The
 commands there are the means of the steps around it, and the share of each follows from the mean of the step.

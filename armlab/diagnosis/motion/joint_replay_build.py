@@ -9,8 +9,8 @@ MOST_JOINTS = 16  # of an arm whose joints are replayed together
 
 DECLARED = """
 typedef struct {
-    double kp, damping, friction, kd, armature, limit, delay, offset, dead_band, load_friction, static_excess,
-        stribeck_speed, ki, ki_speed, integral_limit, payload;
+    double kp, damping, friction, kd, armature, limit, limit_slope, delay, offset, dead_band, load_friction,
+        static_excess, stribeck_speed, ki, ki_speed, integral_limit, payload;
 } Servo;
 typedef struct {
     int64_t windows, steps, columns, history, path_columns;

@@ -34,7 +34,7 @@ from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco
 
 WINDOWS = 24  # all of the SO-101's would take mujoco.sysid most of an hour on two processors
-NO_FIELD = ("dead_band", "load_friction", "static_excess")
+NO_FIELD = ("limit_slope", "dead_band", "load_friction", "static_excess")
 DIFFERENCE = 1e-3  # of a coordinate; with the default of 1.5e-8 the fit stopped after 3 iterations on 24 windows
 SAME_COST = 1.01  # times the last cost: what comes after it need not be charged
 

@@ -14,7 +14,7 @@ from armlab.diagnosis.motion.windows import held_command, smooth_motion, supply_
 from armlab.recordings.recording import MotionRun
 from problem.mjcf import import_mujoco
 
-BEYOND_FIELDS: tuple[Key, ...] = ("dead_band", "load_friction", "static_excess", "ki")  # of MuJoCo
+BEYOND_FIELDS: tuple[Key, ...] = ("limit_slope", "dead_band", "load_friction", "static_excess", "ki")  # of MuJoCo
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +137,14 @@ def _step_through(
     actuators = np.array([actuator_of(model, joint) for joint in simulation.joints])
     half, share, level = servos.get("dead_band") / 2, servos.get("load_friction"), servos.get("friction")
     excess, speed, velocity = servos.get("static_excess"), servos.get("stribeck_speed"), data.qvel.copy()
-    limit, kp, kd = servos.get("limit"), servos.get("kp"), servos.get("kd")
+    limit, slope, kp, kd = (servos.get(key) for key in ("limit", "limit_slope", "kp", "kd"))
     wound_up, gain = servos.get("integral_limit"), servos.get("ki") * model.opt.timestep
     of_speed = servos.get("ki_speed")
     integral = _resting_integral(data, simulation, servos, control[0][actuators])
     time = run.time[0] + model.opt.timestep * np.arange(len(control))
     factors = [supply_factor(run, row, time, simulation.supply) for row in range(len(joints))]
     supplies = [(row, factor) for row, factor in enumerate(factors) if factor is not None]
-    varies, has_dead_band = bool(share.any() or excess.any()), bool(half.any())
+    varies, has_dead_band, falls = bool(share.any() or excess.any()), bool(half.any()), bool(slope.any())
     path = np.empty((len(control), model.nq))
     position, bias, asked = data.qpos, data.qfrc_bias, data.ctrl  # views of what MuJoCo computes
     pushed, earlier = np.zeros(model.nv), np.zeros(model.nv)
@@ -163,11 +163,16 @@ def _step_through(
             static = excess * np.exp(-((velocity[joints] / speed) ** 2))
             model.dof_frictionloss[joints] = level + static + share * np.abs(carried[joints])
             earlier, velocity = data.qacc * (number > 0), data.qvel.copy()
+        if falls:
+            swift = slope * data.qvel[joints]
+            model.actuator_forcerange[actuators, 0] = -np.maximum(limit + np.minimum(swift, 0.0), 0.0)
+            model.actuator_forcerange[actuators, 1] = np.maximum(limit - np.maximum(swift, 0.0), 0.0)
         for row, factor in supplies:
             scaled = factor[number] * np.array([-kp[row], -kd[row]])
             model.actuator_gainprm[actuators[row], 0] = -scaled[0]
             model.actuator_biasprm[actuators[row], 1:3] = scaled
-            model.actuator_forcerange[actuators[row]] = factor[number] * limit[row] * np.array([-1.0, 1.0])
+            most = model.actuator_forcerange[actuators[row]] if falls else limit[row] * np.array([-1.0, 1.0])
+            model.actuator_forcerange[actuators[row]] = factor[number] * most
         mujoco.mj_step(model, data)
     return path
 

@@ -1,6 +1,7 @@
 """The law of a position servo at one joint, its parameters, and the effects that name them.
 
-    torque  = s clip((kp - ki_speed) e - kd qd + i, -limit, limit)
+    torque  = s clip((kp - ki_speed) e - kd qd + i, -most, most)
+    most    = limit - limit_slope |qd| where the drive does work, limit where it brakes
     e       = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
     i'      = ki e - ki_speed qd,  |i| <= integral_limit
     torque  = (inertia + armature) qdd + load + damping qd + level f
@@ -141,6 +142,21 @@ PARAMETERS: tuple[ServoParameter, ...] = (
         "|tau_{joint}| <= {value}",
         (),
         "forcerange",
+    ),
+    ServoParameter(
+        "limit_slope",
+        "torque_saturation",
+        "limit_slope",
+        "N.m.s/rad",
+        0.0,
+        0.0,
+        1e3,
+        0.1,
+        "optional",
+        "|tau_{joint}| <= limit - {value} |qd_{joint}| where the drive does work",
+        (),
+        "",
+        "record fast motion and slow motion with the same load",
     ),
     ServoParameter(
         "delay",
@@ -293,6 +309,7 @@ Key = Literal[
     "kd",
     "armature",
     "limit",
+    "limit_slope",
     "delay",
     "offset",
     "dead_band",
@@ -304,6 +321,7 @@ Key = Literal[
     "integral_limit",
     "payload",
 ]
+LIMITS = (KEYS.index("limit"), KEYS.index("limit_slope"))  # of the torque
 NEUTRAL = np.array([parameter.neutral for parameter in PARAMETERS])
 LOWEST = np.array([parameter.lowest for parameter in PARAMETERS])
 HIGHEST = np.array([parameter.highest for parameter in PARAMETERS])

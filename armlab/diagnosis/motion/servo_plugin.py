@@ -9,7 +9,8 @@ A copy of this file stands beside each verdict, with the numbers in `servos.json
 
 The law of a joint, with q and qd as MuJoCo has them and c the command that held at a time:
 
-    torque = s clip((kp - ki_speed) e - kd qd + i, -limit, limit)
+    torque = s clip((kp - ki_speed) e - kd qd + i, -most, most)
+    most   = limit - limit_slope |qd| where the drive does work, limit where it brakes
     e      = d(c(t - delay) + offset - q),  d(x) = sgn(x) max(|x| - dead_band / 2, 0)
     i'     = ki e - ki_speed qd,  |i| <= integral_limit
     friction loss = friction + static_excess exp(-(qd / stribeck_speed)^2) + load_friction |gear|
@@ -31,7 +32,7 @@ from typing import Any
 import numpy as np
 
 STICKING = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # solimp of a friction loss that holds at rest; MuJoCo's own slips
-DRIVE = ("kp", "kd", "ki", "ki_speed", "integral_limit", "limit", "delay", "offset", "dead_band")
+DRIVE = ("kp", "kd", "ki", "ki_speed", "integral_limit", "limit", "limit_slope", "delay", "offset", "dead_band")
 LAW = (*DRIVE, "friction", "load_friction", "static_excess", "stribeck_speed")
 NUMBERS = (*LAW, "damping", "armature")
 SAME_TIME_S = 1e-9  # below it two instants are one
@@ -108,7 +109,9 @@ class ServoPlugin:
         error -= np.clip(error, -law["dead_band"] / 2, law["dead_band"] / 2)
         self._integrate(data.time, model.opt.timestep, law["ki"] * error - law["ki_speed"] * velocity)
         drive = (law["kp"] - law["ki_speed"]) * error - law["kd"] * velocity + self.integral
-        drive = np.clip(drive, -law["limit"], law["limit"])
+        less = np.where(drive * velocity > 0, law["limit_slope"] * np.abs(velocity), 0.0)
+        most = np.maximum(law["limit"] - less, 0.0)
+        drive = np.clip(drive, -most, most)
         actuator = law["kp"] * (command - position) - law["kd"] * velocity
         actuator = np.clip(actuator, -law["limit"], law["limit"])
         data.qfrc_passive[self._dofs] += self.supply * drive - actuator

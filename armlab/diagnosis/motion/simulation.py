@@ -194,7 +194,7 @@ def _with_controller(nominal: Array, controller: ControllerEntry) -> Array:
     values, joints = nominal.copy(), len(nominal)
     given = {"kp": controller.kp, "kd": controller.kd, "limit": controller.torque_limit, "offset": controller.offset}
     given |= {"ki": controller.ki, "ki_speed": controller.ki_speed, "integral_limit": controller.integral_limit}
-    given |= {"dead_band": controller.dead_band}
+    given |= {"dead_band": controller.dead_band, "limit_slope": controller.limit_slope}
     for key, numbers in given.items():
         for row, value in enumerate(numbers or ()):
             if value is not None:

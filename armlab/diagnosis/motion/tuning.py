@@ -167,6 +167,20 @@ class MotionTuning:
         source="convention",
         least=0.0,
     )
+    calm_share: float = tuned(
+        0.6,
+        unit="of the torque limit",
+        meaning="that a drive may reach in a calm window, where no limit acts: it may be lower than stated",
+        most=1.0,
+    )
+    min_calm_windows: int = tuned(4, unit="windows", meaning="calm ones that can refute a number", least=2)
+    least_confirmed: float = tuned(
+        0.5,
+        unit="of what a number explains where a limit acts",
+        meaning="that it has to explain in calm windows, within two standard errors: half way from false to true",
+        source="convention",
+        most=1.0,
+    )
     odd_factor: float = tuned(
         4.0, unit="times the median error", meaning="a window that something else than the servo has moved", least=1.0
     )

@@ -254,6 +254,7 @@ def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:
     entry |= {"reference_velocity": "zero", "feedforward": "none", "torque_limit": limits}
     entry |= {"delay": np.maximum(delays, 0.0).tolist()}
     others = {"offset": servos.get("offset"), "dead_band": servos.get("dead_band"), "ki": servos.get("ki")}
+    others["limit_slope"] = servos.get("limit_slope")
     if servos.get("ki").any():
         bounds = servos.get("integral_limit").tolist()
         entry |= {"integral_limit": [each if each < INFINITE_LIMIT else None for each in bounds]}

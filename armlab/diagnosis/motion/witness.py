@@ -4,10 +4,10 @@ Its scale and sign are unknown, and some drives log its size alone, or the curre
 square of the torque. So it finds no number. But it knows the torque that each law of the drive makes of the recorded
 commands and positions, and how well it follows each is evidence that took no part in the diagnosis:
 
-    torque = s clip((kp - ki_speed) e - kd qd + i, -limit, limit)
+    torque = s clip((kp - ki_speed) e - kd qd + i, -most, most)
 
-with e and qd as measured. What of a damping is in the drive, and what in the joint, a motion tells only where the limit
-acts; a current tells it anywhere.
+most is the limit, less what it falls by with speed where the drive does work. e and qd are as measured. What of a
+damping is in the drive, and what in the joint, a motion tells only where the limit acts; a current tells it anywhere.
 """
 
 from collections.abc import Sequence
@@ -92,8 +92,10 @@ def drive_torque(run: MotionRun, simulation: ServoSimulation, row: int, values: 
         growth = np.diff(run.time, prepend=run.time[0]) * (ki * error - of_speed * velocity)
         for sample in range(1, len(error)):
             integral[sample] = np.clip(integral[sample - 1] + growth[sample], -most, most)
-    limit = float(values[place("limit")])
-    torque = np.clip((kp - of_speed) * error - kd * velocity + integral, -limit, limit)
+    asked = (kp - of_speed) * error - kd * velocity + integral
+    less = np.where(asked * velocity > 0, float(values[place("limit_slope")]) * np.abs(velocity), 0.0)
+    limit = np.maximum(float(values[place("limit")]) - less, 0.0)
+    torque = np.clip(asked, -limit, limit)
     supply = supply_factor(run, row, run.time, simulation.supply)
     return np.asarray(torque if supply is None else supply * torque)
 

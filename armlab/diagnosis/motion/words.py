@@ -21,6 +21,7 @@ NUMBER_WORDS = {
     "ki": " ki",
     "ki_speed": " of the velocity's integral",
     "integral_limit": " of the integral",
+    "limit_slope": " (falls with speed)",
     "static_excess": " (more at rest)",
 }
 MAX_LISTED_WORDS = 24  # of the findings with their places in the first sentence; more are named without
