@@ -15,16 +15,16 @@ from armlab.common.errors import InputError
 from armlab.recordings.check import check_recording
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading import search
-from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.answer import Answer, lapse, read_rightly
 from armlab.recordings.reading.corrected import correct_recording, corrected_texts
 from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.judge import Judge, is_accepted
+from armlab.recordings.reading.judge import Gain, Judge, is_accepted
 from armlab.recordings.reading.mistakes import clock_error, encoder_offset, late_torque, signs, take_back, units
 from armlab.recordings.reading.mistakes import spring as with_spring
 from armlab.recordings.reading.reading import Mistake, Reading, read_as_is
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.signs import compare_joint_names, compare_standstill
-from armlab.recordings.reading.singles import _is_quarter, search_singles
+from armlab.recordings.reading.singles import _is_quarter, search_singles, with_springs
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
 from problem.motion import Motion
@@ -163,6 +163,43 @@ def test_parts_of_one_mistake_become_one(tmp_path: Path) -> None:
     """Beside another unit of joint 1, joint 2 was first found with a wrong torque, then with a wrong direction."""
     change = both(scale(["q1"], 180 / np.pi), scale(["q2"], -1.0))
     assert set(names_of(answer_to(recording_with(tmp_path / "rig", change)))) == {"unit_error@1", "joint_direction@2"}
+
+
+@pytest.mark.parametrize(
+    ("near_sigmas", "free_sigmas", "margin", "expected"),
+    [(3.0, 5.0, 0.0, 0.1), (7.0, 3.0, 0.0, 0.1), (99.0, -2.0, 0.0, 0.5), (1.0, 1.0, 2.0, 0.1)],
+)
+def test_a_doubtful_gain_and_a_near_second_make_it_likely_that_no_name_is_right(
+    near_sigmas: float, free_sigmas: float, margin: float, expected: float
+) -> None:
+    gain, tuning = Gain(1.0, near_sigmas, 1.0, free_sigmas), replace(TUNING, lapse_odds=1.0)
+    assert lapse(gain, margin, tuning) == pytest.approx(expected)
+
+
+def test_the_margin_is_that_of_the_next_best_mistake_of_another_name(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig", shift("q2", 90.0))
+    channels = thin_channels(recording, TUNING)
+    assert channels is not None
+    judge = Judge(Fitter(channels, TUNING), recording)
+    start = judge.trial(read_as_is(recording, ARM.parameters))
+    found = search.find_mistakes(judge, start)
+    singles = with_springs(judge, start, search_singles(judge, start))
+    others = [each for each in singles if each.reading.mistakes[-1].label != "encoder_offset@2"]
+    second = min(others, key=lambda each: each.loss)
+    assert found.margins == pytest.approx([Gain.between(second, found.best).near_sigmas])
+
+
+def test_names_leave_a_probability_that_none_is_right(tmp_path: Path) -> None:
+    recording = recording_with(tmp_path / "rig", shift("q2", 90.0))
+    (sure,), (doubtful,) = (
+        read_rightly(recording, recording.arm.parameters, replace(TUNING, lapse_odds=odds)).findings
+        for odds in (1.0, 100.0)
+    )
+    (certain,) = read_rightly(recording, recording.arm.parameters, replace(TUNING, lapse_odds=0.0)).findings
+    named = [each.probability + sum(rival.probability for rival in each.rivals) for each in (certain, sure, doubtful)]
+    assert named[0] == pytest.approx(1.0)
+    assert 0.9 < named[1] < 1.0
+    assert (1 / named[2] - 1) / (1 / named[1] - 1) == pytest.approx(100.0)
 
 
 def test_each_mistake_has_its_rivals_where_the_last_step_leaves_one_out(

@@ -35,7 +35,8 @@ class SetupFinding:
     """One mistake. worst_joint: from 1, where the errors fall most; rms_before, rms_after: there, N m (N).
 
     share_before, share_after: the same over the torque's scatter, without and with this one taken back. sigmas: of
-    the fall between blocks of time. probability: of the name against its rivals. arm: for the names of its joints.
+    the fall between blocks of time. probability: of the name against its rivals, and against no name that was tried.
+    arm: for the names of its joints.
     """
 
     mistake: Mistake
@@ -198,7 +199,7 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
     by_links = best.near is not None and not is_told_by_geometry(gain, judge.tuning)
     chances = np.append(chances, chances.max() * judge.tuning.other_links_chance if by_links else 0.0)
-    chances = chances / chances.sum()
+    chances = chances / chances.sum() * (1 - lapse(gain, found.margins[place], judge.tuning))
     listed = [
         Rival(each.effect, each.joint, each.joints, describe(each, arm), float(chance))
         for (each, _), chance in zip(rivals, chances[1:-1], strict=True)
@@ -224,6 +225,16 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
         tuple(listed),
         "; ".join(list(measure)[:2]) if listed else None,
     )
+
+
+def lapse(gain: Gain, margin: float, tuning: ReadingTuning) -> float:
+    """The probability that none of the names is right, k / (k + (s (1 + g))^2).
+
+    s: standard errors by which the loss falls, in the view where it falls less surely, 1 at least. margin: g, those by
+    which the next best reading with another mistake in its place is worse, accepted or not.
+    """
+    strength = max(min(gain.near_sigmas, gain.free_sigmas), 1.0) * (1 + margin)
+    return tuning.lapse_odds / (tuning.lapse_odds + strength**2)
 
 
 def is_told_by_geometry(gain: Gain, tuning: ReadingTuning) -> bool:

@@ -18,7 +18,8 @@ from armlab.recordings.reading.tuning import ReadingTuning
 @dataclass(frozen=True, eq=False)
 class Found:
     """What a search found. start: as it is read; best: read rightly, with its mistakes. without: read with all of them
-    but one. rivals: of each mistake, other mistakes in its place that fit alike. undecided: joints (from 1) whose zeros
+    but one. rivals: of each mistake, other mistakes in its place that fit alike. margins: standard errors by which the
+    next best reading with another one in its place is worse, 0 at least. undecided: joints (from 1) whose zeros
     the data do not tell by quarters of a turn. tried: the best readings that were not accepted.
     """
 
@@ -26,6 +27,7 @@ class Found:
     best: Trial
     without: tuple[Trial, ...] = ()
     rivals: tuple[tuple[Trial, ...], ...] = ()
+    margins: tuple[float, ...] = ()
     undecided: tuple[int, ...] = ()
     tried: tuple[Trial, ...] = ()
     looks: int = 0
@@ -63,7 +65,8 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
     if best is not extended:
         beside = search_singles(judge, best)
     rivals = tuple(_rivals(judge, without[place], best, place, each) for place, each in enumerate(lists))
-    return Found(start, best, without, rivals, _undecided(beside, best, tuning), looks=judge.looks[0])
+    margins = tuple(_margin(best, place, each) for place, each in enumerate(lists))
+    return Found(start, best, without, rivals, margins, _undecided(beside, best, tuning), looks=judge.looks[0])
 
 
 def reading_floor(trial: Trial, tuning: ReadingTuning) -> float:
@@ -175,6 +178,14 @@ def _rivals(judge: Judge, without: Trial, best: Trial, place: int, singles: list
         if gain.near <= tuning.max_rival_gain and alike and name not in out and is_accepted(judge, without, each):
             out[name] = each
     return tuple(out.values())[1:]
+
+
+def _margin(best: Trial, place: int, singles: list[Trial]) -> float:
+    """Standard errors by which the next best reading with another mistake at one place is worse, accepted or not."""
+    own = _name(best.reading.mistakes[place])
+    others = [each for each in singles if _name(each.reading.mistakes[-1]) != own]
+    second = min(others, key=lambda each: each.loss, default=None)
+    return math.inf if second is None else max(float(Gain.between(second, best).near_sigmas), 0.0)
 
 
 def _name(mistake: Mistake) -> tuple[str, str]:
