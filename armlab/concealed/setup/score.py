@@ -22,11 +22,13 @@ from armlab.concealed.score.cases import read_complaint
 from armlab.concealed.score.measures import NAMES_WANTED, Measure, share_measure
 from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
 from armlab.concealed.sealed_set import Share
+from armlab.concealed.setup.lapse import likeliest_odds_ratio
 from armlab.concealed.setup.plan import SetupCase
 
 SETUP_FILE = "setup.json"
 MAX_CLASS = 3  # names
 GRAVITY_DEG = 3.0
+LAPSE = "odds that no name is right, times those that are stated"
 CHANCE = "hidden physics: probability of such a difference by chance"
 
 
@@ -71,10 +73,17 @@ class SetupScore:
         return stated_measures([claim for each in self.outcomes if each.source == "real" for claim in each.stated])
 
     @property
+    def odds_ratio(self) -> str:
+        """The likeliest odds of a lapse, times those that are stated."""
+        ratio = likeliest_odds_ratio([claim for each in self.outcomes for claim in each.stated])
+        return "-" if ratio is None else f"{ratio:.2g}"
+
+    @property
     def lines(self) -> Iterator[str]:
         """The measures as lines."""
         yield from (f"{each.name}: {each.text}" for each in self.shares)
         yield f"{CHANCE}: {physics_chance(self.outcomes):.2g}"
+        yield f"{LAPSE}: {self.odds_ratio}"
         yield from stated_lines(self.stated)
         yield from (f"real: {each}" for each in stated_lines(self.stated_real))
 
@@ -85,6 +94,7 @@ def score_setup(work: Path, names: Sequence[str], results: Path) -> SetupScore:
     shares = _measure(outcomes)
     score = SetupScore(shares, outcomes)
     rows = [*((each.name, each.text) for each in shares), (CHANCE, f"{physics_chance(outcomes):.2g}")]
+    rows.append((LAPSE, score.odds_ratio))
     missed = [
         (each.source, each.kind, "; ".join(each.mistakes), str(each.seen), "; ".join(each.named) or each.status)
         for each in outcomes
@@ -191,10 +201,20 @@ def _judge(work: Path, name: str) -> SetupOutcome:
 
 
 def _stated(finding: dict[str, Any], mistakes: Sequence[dict[str, Any]], single: bool) -> StatedClaim:
-    """A setup finding. single: an arm of one joint, where all joints are that joint."""
+    """A setup finding. single: an arm of one joint, where all joints are that joint.
+
+    The claim is right where its name is, or one that counts as it; so is its probability of all of these together.
+    """
     own = [(finding["effect"], _place(finding["joint"], finding.get("joints") or []))]
     right, in_class = (any(_is_named(each, names, single) for each in mistakes) for names in (own, _class_of(finding)))
-    return StatedClaim(finding["effect"], finding.get("probability"), right, in_class)
+    chance = finding.get("probability")
+    if chance is None:
+        return StatedClaim(finding["effect"], None, right, in_class)
+    rivals = (finding.get("class") or [])[1:]
+    # a class leaves out the form; of a direction, that of the position is the one that fits alike
+    alike = [each for each in rivals if _is_named({**each, "joints": [], "form": "position"}, own, single)]
+    together, named = (chance + sum(each["probability"] for each in names) for names in (alike, rivals))
+    return StatedClaim(finding["effect"], together, right, in_class, named)
 
 
 def _gravity_off(truth: dict[str, Any], setup: Sequence[dict[str, Any]]) -> float | None:
