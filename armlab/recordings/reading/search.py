@@ -50,7 +50,7 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
         if not _may_begin_pair(start, first, tuning):
             continue
         other, more = _extend(judge, first, search_singles(judge, first))
-        if other is not first and other.loss < best.loss - tuning.min_gain and is_accepted(judge, start, other):
+        if other is not first and _is_better(other, best, tuning) and is_accepted(judge, start, other):
             best, beside = other, more
     if best is start:
         return Found(start, start, tried=tuple(singles[: tuning.beam]), looks=judge.looks[0])
@@ -67,6 +67,12 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
     rivals = tuple(_rivals(judge, without[place], best, place, each) for place, each in enumerate(lists))
     margins = tuple(_margin(best, place, each) for place, each in enumerate(lists))
     return Found(start, best, without, rivals, margins, _undecided(beside, best, tuning), looks=judge.looks[0])
+
+
+def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
+    """Whether a reading explains clearly more, or as much with fewer mistakes."""
+    is_simpler = len(other.reading.mistakes) < len(best.reading.mistakes)
+    return other.loss < best.loss - tuning.min_gain or (is_simpler and other.loss <= best.loss + tuning.rival_gain)
 
 
 def reading_floor(trial: Trial, tuning: ReadingTuning) -> float:
