@@ -340,7 +340,7 @@ def test_windows_where_no_limit_acts_refute_a_gain_that_a_limit_makes(soft: Path
     free = np.array(USUAL)
     spoilt[place("kp")] = 7.5
     odd, gain = np.zeros(0, dtype=np.intp), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3)
-    wrong = ChosenServo(nominal, fit_servo(windows, spoilt, free), free, {place("kp"): gain}, odd)
+    wrong = ChosenServo(nominal, fit_servo(windows, spoilt, free), free, {place("kp"): gain}, odd, 0.0)
     confirmed = confirm_in_calm_windows(windows, wrong, 20)
     assert 0 < len(find_calm_windows(windows, nominal[None])) < windows.count
     assert list(confirmed.gains) == [place("limit")]

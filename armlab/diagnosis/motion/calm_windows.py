@@ -10,6 +10,8 @@ without them,
 is 1 where they are true, and 0 where they are not. Its standard error is that of correlated errors (estimate.py).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,8 +54,7 @@ def confirm_in_calm_windows(
     alone = choose_servo(still, chosen.nominal, looks, tuning, start=chosen.fit.values)
     if set(numbers) <= set(alone.gains) or not is_refuted(still, chosen.fit.values, alone.named[0], tuning):
         return chosen
-    fewer = ChosenServo(chosen.nominal, alone.fit, alone.free, alone.gains, chosen.odd)
-    return choose_limits(windows, fewer, looks, tuning)
+    return choose_limits(windows, replace(alone, nominal=chosen.nominal, odd=chosen.odd), looks, tuning)
 
 
 def is_refuted(calm: Windows, found: Array, fewer: Array, tuning: MotionTuning = DEFAULT) -> bool:

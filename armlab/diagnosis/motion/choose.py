@@ -46,6 +46,7 @@ from armlab.diagnosis.motion.estimate import (
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.servo import (
     INFINITE_LIMIT,
+    KEYS,
     LIMITS,
     OPTIONAL,
     UNSTATED,
@@ -55,6 +56,10 @@ from armlab.diagnosis.motion.servo import (
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
+FALL = place("limit_slope")
+# Beside a wrong damping within the limit of a drive, a limit that falls with speed looks as damping outside it does. So
+# it is tried alone, and beside what was chosen without it, and not on the way.
+GROWN = tuple(number for number in range(len(KEYS)) if (OPTIONAL[number] or USUAL[number]) and number != FALL)
 TESTS_OF_GAIN = 2  # ranks and the matched filter, of which the better one counts
 JUDGED_TOLERANCE = 1e-4  # of fits that are judged on the other half, where a gain of percents matters
 
@@ -81,7 +86,8 @@ class ChosenServo:
     nominal: numbers of the simulation, all damping outside the drive where the fit has it so. free: the parameters that
     were free when those that may be findings were judged; in `fit` the others have the numbers of the simulation where
     that explains as much. gains: what each parameter is worth that may be a finding, by its place in PARAMETERS. odd:
-    windows that the servo of all others does not explain (contact, a lost command), left out of the fit.
+    windows that the servo of all others does not explain (contact, a lost command), left out of the fit. cost: the
+    logarithm of its squared error on the other half, with the price of its numbers.
     """
 
     nominal: Array
@@ -89,6 +95,7 @@ class ChosenServo:
     free: NDArray[np.bool_]
     gains: dict[int, Gain]
     odd: NDArray[np.intp]
+    cost: float
 
     def with_damping_inside(self) -> "ChosenServo | None":
         """The same with the change of damping in kd, on which the torque limit acts; None where there is no change.
@@ -159,7 +166,11 @@ def choose_servo(
     if single is None:
         return chosen
     other = _judge(windows, _grow(few, single, nominal, tuning), (nominal, odd), looks, tuning)
-    return min(chosen, other, key=lambda each: _cost(each.fit, tuning))
+    chosen = min(chosen, other, key=lambda each: each.cost)
+    falling = _grow(few, chosen.fit, chosen.nominal, tuning, (FALL,))
+    if chosen.fit.free[FALL] or not falling[0].free[FALL]:
+        return chosen
+    return min(chosen, _judge(windows, falling, (chosen.nominal, odd), looks, tuning), key=lambda each: each.cost)
 
 
 def judge_again(windows: Windows, chosen: ChosenServo, looks: int, tuning: MotionTuning = DEFAULT) -> ChosenServo:
@@ -215,9 +226,12 @@ def _judge(
     fewer = fit_servo(sound.with_integral(fit.integral), start, free, tuning.max_evaluations)
     others = _total(errors_on_other_half(few, start, free, tuning))
     predicts = others * (1 - least_gain(fit.rms**2, fit.noise, tuning)) <= _total(judged)
+    left = _total(judged)
     if predicts and _cost(fewer, tuning) <= _cost(fit, tuning):
-        fit = fewer
-    return ChosenServo(nominal, fit, best.free, worth, odd)
+        fit, left = fewer, others
+    price = price_of_number(fit.rms**2, fit.noise, tuning)
+    cost = float(np.log(max(left, 1e-300)) + price * fit.free.sum())
+    return ChosenServo(nominal, fit, best.free, worth, odd, cost)
 
 
 def _without_odd(windows: Windows, odd: NDArray[np.intp]) -> Windows:
@@ -310,7 +324,7 @@ def _grow(
     start: ServoFit,
     nominal: Array,
     tuning: MotionTuning,
-    candidates: Sequence[int] = tuple(np.flatnonzero(np.array(OPTIONAL) | np.array(USUAL)).tolist()),
+    candidates: Sequence[int] = GROWN,
 ) -> tuple[ServoFit, Array]:
     """The fit from a start with all candidates that are worth a place; its errors on the other half, (samples,)."""
     windows = windows.with_integral(start.integral)
