@@ -246,19 +246,22 @@ def real_motion(results: Path, recordings: Path, peer: str | None, peer_windows:
 @click.option("--results", type=OutputPath(), default=Path("results/relations"), show_default=True)
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
 @click.option("--only", multiple=True, help="Name of a recording [default: all at hand].")
-@click.option("--quick", is_flag=True, help="The short relations alone.")
+@click.option("--part", type=click.Choice(["all", "quick", "null-pairs"]), default="all", show_default=True)
 @prints_lines
 def relations(
-    folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], quick: bool
+    folders: tuple[Path, ...], results: Path, recordings: Path, only: tuple[str, ...], part: str
 ) -> Iterator[str]:
     """Check relations that need no truth on real recordings.
 
     A recording against itself has no change, the found model explains its recording, other units change nothing, and
-    others. Writes relations.md; an interrupted command continues.
+    others. Writes relations.md; an interrupted command continues. Parts: the short relations, or those of stretches
+    that are independent of each other, between which nothing has changed (null-pairs.md).
     """
     from armlab.diagnosis.relations.bench import bench_relations
+    from armlab.diagnosis.relations.relations import NULL_PAIRS, QUICK, RELATIONS
 
-    return bench_relations(results, recordings, folders, only, quick, tell_progress)
+    names = {"all": tuple(RELATIONS), "quick": QUICK, "null-pairs": NULL_PAIRS}[part]
+    return bench_relations(results, recordings, folders, only, names, tell_progress)
 
 
 @click.command("real-concealed")

@@ -7,7 +7,7 @@ import pytest
 from told_recordings import frame, recording_in
 
 from armlab.diagnosis.relations.bench import bench_relations, relations_page
-from armlab.diagnosis.relations.relations import QUICK, RELATIONS, Desk, Outcome, check_relation
+from armlab.diagnosis.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, Outcome, check_relation
 from armlab.diagnosis.relations.variants import every_other_second, half, one_run, resampled, rewritten, thinned
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
@@ -73,4 +73,17 @@ def test_outcomes_are_kept_for_the_next_run(tmp_path: Path, monkeypatch: pytest.
     for _ in range(2):
         lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"]))
     assert asked == list(RELATIONS)
-    assert len(lines) == len(RELATIONS) + 1
+    assert len(lines) == len(RELATIONS) + 2
+
+
+def test_null_pairs_are_counted_on_a_page_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = recording_in(tmp_path / "arm", frame(0, 6), frame(1, 6))
+    answers = dict(zip(NULL_PAIRS, (True, False, None), strict=True))
+
+    def answer(name: str, recording: Recording, desk: Desk) -> Outcome:
+        return Outcome(recording.name, name, answers[name], "")
+
+    monkeypatch.setattr("armlab.diagnosis.relations.bench.check_relation", answer)
+    lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))
+    assert "2 answers, a change is named in 1 (95 % interval 9.5 to 91 %)" in lines[-2]
+    assert [path.name for path in (tmp_path / "results").glob("*.md")] == ["null-pairs.md"]

@@ -56,10 +56,12 @@ from armlab.diagnosis.motion.servo import (
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
-FALL = place("limit_slope")
+LIMIT_SLOPE = place("limit_slope")
 # Beside a wrong damping within the limit of a drive, a limit that falls with speed looks as damping outside it does. So
 # it is tried alone, and beside what was chosen without it, and not on the way.
-GROWN = tuple(number for number in range(len(KEYS)) if (OPTIONAL[number] or USUAL[number]) and number != FALL)
+GROWTH_CANDIDATES = tuple(
+    number for number in range(len(KEYS)) if (OPTIONAL[number] or USUAL[number]) and number != LIMIT_SLOPE
+)
 TESTS_OF_GAIN = 2  # ranks and the matched filter, of which the better one counts
 JUDGED_TOLERANCE = 1e-4  # of fits that are judged on the other half, where a gain of percents matters
 
@@ -167,8 +169,8 @@ def choose_servo(
         return chosen
     other = _judge(windows, _grow(few, single, nominal, tuning), (nominal, odd), looks, tuning)
     chosen = min(chosen, other, key=lambda each: each.cost)
-    falling = _grow(few, chosen.fit, chosen.nominal, tuning, (FALL,))
-    if chosen.fit.free[FALL] or not falling[0].free[FALL]:
+    falling = _grow(few, chosen.fit, chosen.nominal, tuning, (LIMIT_SLOPE,))
+    if chosen.fit.free[LIMIT_SLOPE] or not falling[0].free[LIMIT_SLOPE]:
         return chosen
     return min(chosen, _judge(windows, falling, (chosen.nominal, odd), looks, tuning), key=lambda each: each.cost)
 
@@ -324,7 +326,7 @@ def _grow(
     start: ServoFit,
     nominal: Array,
     tuning: MotionTuning,
-    candidates: Sequence[int] = GROWN,
+    candidates: Sequence[int] = GROWTH_CANDIDATES,
 ) -> tuple[ServoFit, Array]:
     """The fit from a start with all candidates that are worth a place; its errors on the other half, (samples,)."""
     windows = windows.with_integral(start.integral)

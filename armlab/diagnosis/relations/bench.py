@@ -12,14 +12,15 @@ from pathlib import Path
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report.words import join_words
-from armlab.diagnosis.relations.relations import NULL_PAIRS, QUICK, RELATIONS, Desk, Outcome, check_relation
+from armlab.common.statistics import wilson_interval
+from armlab.diagnosis.relations.relations import NULL_PAIRS, RELATIONS, Desk, Outcome, check_relation
 from armlab.diagnosis.stored import code_digest, recording_digest
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import PUBLIC_RECORDINGS, is_available, open_public_recording
 from armlab.recordings.recording import Recording
 
 STORE = "relations.jsonl"
-PAGE = "relations.md"
+PAGE, NULL_PAIRS_PAGE = "relations.md", "null-pairs.md"
 ANSWERS = {True: "held", False: "**broken**", None: "no answer"}
 
 
@@ -28,19 +29,19 @@ def bench_relations(
     recordings: Path,
     folders: Sequence[Path] = (),
     only: Sequence[str] = (),
-    quick: bool = False,
+    names: Sequence[str] = tuple(RELATIONS),
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
     """Lines on each outcome, and on the page that is written.
 
     recordings: where public recordings are, or will be fetched to, those of which the files are at hand. folders: of
-    further recordings. only: names of the recordings that are taken. quick: the short relations alone.
+    further recordings. only: names of the recordings that are taken. names: of the relations.
     """
     stored = _read(results / STORE)
     outcomes: list[Outcome] = []
     for recording in _at_hand(recordings, folders, only):
         desk = Desk()
-        for name in QUICK if quick else RELATIONS:
+        for name in names:
             key = _key(recording, name)
             if key not in stored:
                 progress(f"{recording.name}: {name}")
@@ -48,7 +49,9 @@ def bench_relations(
                 _append(results / STORE, key, stored[key])
             outcomes.append(stored[key])
             yield f"{recording.name}: {name}: {ANSWERS[stored[key].holds].strip('*')} ({stored[key].detail})"
-    yield from (f"wrote {path}" for path in write_texts({PAGE: relations_page(outcomes)}, results))
+    page = NULL_PAIRS_PAGE if set(names) == set(NULL_PAIRS) else PAGE
+    yield count_null_pairs(outcomes)
+    yield from (f"wrote {path}" for path in write_texts({page: relations_page(outcomes)}, results))
 
 
 def _at_hand(recordings: Path, folders: Sequence[Path], only: Sequence[str]) -> Iterator[Recording]:
@@ -93,11 +96,17 @@ def relations_page(outcomes: Sequence[Outcome]) -> str:
         "Relations that hold whatever is true of the robot, so that no answer is needed to check them "
         "(`armlab relations`). A broken one is a fault of the diagnosis or of the comparison."
     )
-    answered = [each for each in outcomes if each.relation in NULL_PAIRS and each.holds is not None]
-    count = (
-        f"Stretches that are independent of each other ({join_words(NULL_PAIRS)}): {len(answered)} answers, "
-        f"a change is named in {sum(each.holds is False for each in answered)}."
-    )
-    parts = [markdown_table(("relation", *recordings), rows), count, "## Details"]
+    parts = [markdown_table(("relation", *recordings), rows), count_null_pairs(outcomes), "## Details"]
     details = [(each.recording, each.relation, ANSWERS[each.holds], each.detail) for each in outcomes]
     return markdown_page("Relations", intro, *parts, markdown_table(("recording", "relation", "", "why"), details))
+
+
+def count_null_pairs(outcomes: Sequence[Outcome]) -> str:
+    """How often a change is named between stretches of one recording that are independent of each other."""
+    answered = [each for each in outcomes if each.relation in NULL_PAIRS and each.holds is not None]
+    named = sum(each.holds is False for each in answered)
+    low, high = wilson_interval(named, len(answered))
+    return (
+        f"Stretches that are independent of each other ({join_words(NULL_PAIRS)}): {len(answered)} answers, a change "
+        f"is named in {named} (95 % interval {100 * low:.2g} to {100 * high:.2g} %)."
+    )
