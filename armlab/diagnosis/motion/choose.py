@@ -156,6 +156,8 @@ def choose_servo(
     searched here.
 
     The usual parameters are fitted first; of the others, the one that is worth most joins, until none is worth it.
+    Where something is found, the same begins once more with the one number that explains most alone. The end that costs
+    less counts, and a limit that falls with speed may join it.
     """
     starts = _start_fits(windows, nominal, start, tuning)
     first = _cheapest(starts, tuning)
