@@ -103,7 +103,7 @@ class ControllerEntry(Settings):
     reference_velocity: Literal["zero", "derivative"] = "zero"
     feedforward: Literal["none", "gravity", "model"] = "none"
     torque_limit: PerJoint | None = None
-    limit_slope: PerJoint | None = None
+    limit_slope: Annotated[tuple[NotNegative | None, ...], Len(min_length=1)] | None = None
     integral_limit: PerJoint | None = None
     delay: NotNegative | Annotated[tuple[NotNegative, ...], Len(min_length=1)] = 0.0
     offset: PerJoint | None = None

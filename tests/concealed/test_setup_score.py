@@ -35,7 +35,7 @@ def test_a_probability_is_of_all_names_that_count_as_the_claimed_one(tmp_path: P
     (claim,) = _outcome(tmp_path, {"effect": "joint_direction", "joint": 2, "form": "position"}, names).stated
     assert claim.right
     assert claim.probability == pytest.approx(0.8)
-    assert claim.named == pytest.approx(0.9)
+    assert claim.all_names == pytest.approx(0.9)
 
 
 def test_the_same_name_at_another_joint_is_another_name(tmp_path: Path) -> None:

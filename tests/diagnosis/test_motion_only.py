@@ -21,7 +21,14 @@ from armlab.diagnosis.motion.choose import ChosenServo, Gain, choose_servo, lear
 from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.couple import coupled_windows
-from armlab.diagnosis.motion.diagnose import MotionDiagnosis, diagnose_motion, replay_named, replays_as_well, split_runs
+from armlab.diagnosis.motion.diagnose import (
+    MotionDiagnosis,
+    ServoFinding,
+    diagnose_motion,
+    replay_named,
+    replays_as_well,
+    split_runs,
+)
 from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
 from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
@@ -97,10 +104,36 @@ def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis
     named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
     held_out = split_runs(diagnosis.recording)[1]
     both, before = (diagnosis.simulation, diagnosis.simulation), diagnosis.replayed_before
-    alone = {0: (spoilt, named[0])}
-    _, kept, servos, _ = replay_named(both, (spoilt, second), named, lambda joint, _: alone[joint], before, held_out)
+    _, kept, servos, _ = replay_named(both, (spoilt, second), named, fail_if_called, before, held_out)
     assert kept == [[], named[1]]
     np.testing.assert_array_equal(servos.values[0], diagnosis.simulation.nominal.values[0])
+
+
+def fail_if_called(*_: object) -> tuple[ChosenServo, list[ServoFinding]]:
+    raise AssertionError("several findings of a joint are not tried one by one")
+
+
+def test_a_single_finding_whose_replay_is_worse_is_tried_alone_and_kept_where_it_holds(
+    diagnosis: MotionDiagnosis,
+) -> None:
+    first, second = diagnosis.chosen
+    assert first is not None
+    values = first.fit.values.copy()
+    values[place("kp")] = 0.01
+    spoilt = replace(first, fit=replace(first.fit, values=values))
+    named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
+    named[0] = named[0][:1]
+    held_out = split_runs(diagnosis.recording)[1]
+    both, before = (diagnosis.simulation, diagnosis.simulation), diagnosis.replayed_before
+    asked: list[tuple[int, ServoFinding, ChosenServo]] = []
+
+    def alone(joint: int, finding: ServoFinding, servo: ChosenServo) -> tuple[ChosenServo, list[ServoFinding]]:
+        asked.append((joint, finding, servo))
+        return first, named[0]
+
+    chosen, kept, _, _ = replay_named(both, (spoilt, second), named, alone, before, held_out)
+    assert asked == [(0, named[0][0], spoilt)]
+    assert (chosen, kept) == ([first, second], named)
 
 
 def test_intervals_are_narrow_and_near_the_truth(diagnosis: MotionDiagnosis) -> None:
@@ -356,6 +389,52 @@ def test_windows_where_no_limit_acts_keep_a_gain_that_is_true(soft: Path) -> Non
     assert list(chosen.gains) == [place("kp")]
 
 
+def test_a_finding_alone_keeps_its_kd_and_its_stribeck_speed(soft: Path) -> None:
+    nominal, true = strong_servo(100.0), strong_servo(100.0)
+    true[[place("kd"), place("static_excess"), place("stribeck_speed")]] = 0.6, 0.05, 0.03
+    windows = moved_windows(soft, true)
+    free, odd = np.zeros(len(nominal), dtype=bool), np.zeros(0, dtype=np.intp)
+    free[[place("damping"), place("static_excess")]] = True
+    outside = true.copy()
+    outside[[place("kd"), place("damping")]] = 0.4, 0.3
+    gains = dict.fromkeys(np.flatnonzero(free).tolist(), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3))
+    inside = ChosenServo(nominal, fit_servo(windows, outside, free), free, gains, odd, 0.0).with_damping_inside()
+    assert inside is not None
+    damped = inside.with_one_finding(place("damping"), windows).fit.values
+    assert (damped[place("damping")], damped[place("static_excess")]) == (0.1, 0.0)
+    assert damped[place("kd")] == pytest.approx(0.6, rel=0.2)
+    sticking = inside.with_one_finding(place("static_excess"), windows).fit.values
+    assert (sticking[place("kd")], sticking[place("stribeck_speed")]) == (0.4, 0.03)
+
+
+def test_a_limit_falls_with_speed_where_the_drive_does_work_and_not_where_it_brakes(soft: Path) -> None:
+    """Against the closed form of a push: m v' = limit - slope v forwards, m v' = limit backwards."""
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify")[:1], read_servo_simulation(recording))[0]
+    windows = windows.select(np.array([0]))
+    limit, slope, mass, first = 0.5, 0.2, 0.02, -2.0
+    servo = NEUTRAL.copy()
+    servo[[place("kp"), place("limit"), place("limit_slope")]] = 1.0, limit, slope
+    nothing = np.zeros_like(windows.load)
+    pushed = replace(
+        windows,
+        command=np.full_like(windows.command, 1e3),
+        inertia=np.full_like(windows.inertia, mass),
+        load=nothing,
+        slope=nothing,
+        measured=nothing,
+        first_velocity=np.array([first]),
+    )
+    time = windows.step_s * (windows.row + windows.fraction)
+    turned = -first * mass / limit  # when it stops going backwards
+    back = np.minimum(time, turned)
+    after = np.maximum(time - turned, 0.0)
+    settling = mass / slope
+    forwards = limit / slope * (after - settling * (1 - np.exp(-after / settling)))
+    expected = first * back + 0.5 * limit / mass * back**2 + forwards
+    np.testing.assert_allclose(replay_joint(pushed, servo)[0], expected, atol=2e-4)
+
+
 def strong_servo(limit: float = 0.5) -> np.ndarray:
     """Numbers (parameters,) of a servo whose torque limit, N m, acts now and then."""
     keys: tuple[Key, ...] = ("kp", "kd", "damping", "friction", "armature", "limit")
@@ -594,6 +673,14 @@ def test_a_controller_that_the_replay_lacks_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
     assert result.exit_code == 2
     assert "controller.velocity_filter_hz" in result.output
+
+
+def test_a_limit_that_rises_with_speed_is_refused(tmp_path: Path) -> None:
+    controller = {"type": "pd", "kp": [8.0, 8.0], "kd": [0.0, 0.0], "limit_slope": [0.1, -0.1]}
+    folder = write_recording(tmp_path / "rising", {}, seconds=4.0, controller=controller)
+    result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert "controller.limit_slope" in result.output
 
 
 def test_a_payload_at_the_tool_loads_arm_and_model_alike(soft: Path) -> None:

@@ -85,5 +85,5 @@ def test_null_pairs_are_counted_on_a_page_of_their_own(tmp_path: Path, monkeypat
 
     monkeypatch.setattr("armlab.diagnosis.relations.bench.check_relation", answer)
     lines = list(bench_relations(tmp_path / "results", tmp_path / "none", [folder], ["arm"], NULL_PAIRS))
-    assert "2 answers, a change is named in 1 (95 % interval 9.5 to 91 %)" in lines[-2]
+    assert "2 answers, a change is named in 1 (95 % interval 9.45 to 90.5 %)" in lines[-2]
     assert [path.name for path in (tmp_path / "results").glob("*.md")] == ["null-pairs.md"]

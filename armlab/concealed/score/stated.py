@@ -16,15 +16,15 @@ HEADING = "## Probabilities of names"
 @dataclass(frozen=True)
 class StatedClaim:
     """A claim beyond what every case has. effect: its name. probability: of that, None where none is stated. right:
-    whether it is there. in_class: whether one of its class of names is. named: probability of all its names together,
-    where that is less than 1 and counted.
+    whether it is there. in_class: whether one of its class of names is. all_names: probability of all its names
+    together, where that is less than 1 and counted.
     """
 
     effect: str
     probability: float | None
     right: bool
     in_class: bool
-    named: float | None = None
+    all_names: float | None = None
 
     @property
     def category(self) -> Category:

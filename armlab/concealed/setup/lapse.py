@@ -23,12 +23,16 @@ RANGE = (1e-2, 1e2)  # of r
 
 
 def likeliest_odds_ratio(claims: Sequence[StatedClaim]) -> float | None:
-    """r of the claims whose names all state a probability; None where there are none."""
-    stated = [(each.probability, each.named, each.right) for each in claims if each.probability and each.named]
+    """r of the claims that state a lapse; None where there are none."""
+    stated = [
+        (each.probability, each.all_names, each.right)
+        for each in claims
+        if each.probability is not None and each.all_names is not None and 0 < each.all_names < 1
+    ]
     if not stated:
         return None
-    chances, named, hits = np.array(stated, dtype=np.float64).T
-    share, odds = chances / named, np.maximum(1 / named - 1, 0.0)
+    chances, sums, hits = np.array(stated, dtype=np.float64).T
+    share, odds = chances / sums, 1 / sums - 1
 
     def loss(logarithm: float) -> float:
         return float(np.sum(log_scores(share / (1 + np.exp(logarithm) * odds), hits)))

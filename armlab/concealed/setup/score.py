@@ -213,8 +213,8 @@ def _stated(finding: dict[str, Any], mistakes: Sequence[dict[str, Any]], single:
     rivals = (finding.get("class") or [])[1:]
     # a class leaves out the form; of a direction, that of the position is the one that fits alike
     alike = [each for each in rivals if _is_named({**each, "joints": [], "form": "position"}, own, single)]
-    together, named = (chance + sum(each["probability"] for each in names) for names in (alike, rivals))
-    return StatedClaim(finding["effect"], together, right, in_class, named)
+    together, all_names = (chance + sum(each["probability"] for each in names) for names in (alike, rivals))
+    return StatedClaim(finding["effect"], together, right, in_class, all_names)
 
 
 def _gravity_off(truth: dict[str, Any], setup: Sequence[dict[str, Any]]) -> float | None:

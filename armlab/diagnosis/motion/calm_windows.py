@@ -25,15 +25,20 @@ from armlab.diagnosis.motion.windows import Windows
 
 
 def find_calm_windows(windows: Windows, servos: Array, tuning: MotionTuning = DEFAULT) -> NDArray[np.intp]:
-    """Windows in which no drive of these comes near its torque limit. servos: (sets, parameters)."""
+    """Windows in which no drive of these comes near its torque limit. servos: (sets, parameters).
+
+    By commands and positions as they were recorded: how late a command is does not count.
+    """
     first, steps = windows.history, windows.measured.shape[1]
-    error = np.abs(windows.command[:, first : first + steps] - windows.measured).max(axis=1)
+    error = windows.command[:, first : first + steps] - windows.measured
+    velocity = np.gradient(windows.measured, windows.step_s, axis=1)
     calm = np.ones(windows.count, dtype=bool)
     for servo in servos:
-        pull = servo[place("kp")] * (error + abs(servo[place("offset")]))
+        pull = np.abs(servo[place("kp")] * (error + servo[place("offset")]) - servo[place("kd")] * velocity)
         if servo[place("ki")] > 0:
             pull = pull + servo[place("integral_limit")]
-        calm &= pull < tuning.calm_share * servo[place("limit")]
+        least = servo[place("limit")] - servo[place("limit_slope")] * np.abs(velocity)
+        calm &= np.all(pull < tuning.calm_share * least, axis=1)
     return np.flatnonzero(calm)
 
 
@@ -54,11 +59,13 @@ def confirm_in_calm_windows(
     alone = choose_servo(still, chosen.nominal, looks, tuning, start=chosen.fit.values)
     if set(numbers) <= set(alone.gains) or not is_refuted(still, chosen.fit.values, alone.named[0], tuning):
         return chosen
-    return choose_limits(windows, replace(alone, nominal=chosen.nominal, odd=chosen.odd), looks, tuning)
+    return choose_limits(windows, replace(alone, odd=chosen.odd), looks, tuning)
 
 
 def is_refuted(calm: Windows, found: Array, fewer: Array, tuning: MotionTuning = DEFAULT) -> bool:
     """Whether numbers, (parameters,), explain less of the motion in calm windows than is possible if they are true.
+
+    Within as many standard errors as a replay is clearly worse by.
 
     fewer: those that calm windows confirm, the others as in the simulation.
     """

@@ -58,7 +58,7 @@ from armlab.diagnosis.motion.windows import Windows
 
 LIMIT_SLOPE = place("limit_slope")
 # Beside a wrong damping within the limit of a drive, a limit that falls with speed looks as damping outside it does. So
-# it is tried alone, and beside what was chosen without it, and not on the way.
+# it does not grow with the others: it is tried alone, beside what was chosen without it, and where calm windows refute.
 GROWTH_CANDIDATES = tuple(
     number for number in range(len(KEYS)) if (OPTIONAL[number] or USUAL[number]) and number != LIMIT_SLOPE
 )
@@ -89,7 +89,7 @@ class ChosenServo:
     were free when those that may be findings were judged; in `fit` the others have the numbers of the simulation where
     that explains as much. gains: what each parameter is worth that may be a finding, by its place in PARAMETERS. odd:
     windows that the servo of all others does not explain (contact, a lost command), left out of the fit. cost: the
-    logarithm of its squared error on the other half, with the price of its numbers.
+    logarithm of its squared error on the other half, with the price of its numbers, when it was chosen.
     """
 
     nominal: Array
@@ -127,20 +127,37 @@ class ChosenServo:
         gains = {other: gain for other, gain in self.gains.items() if other != number}
         return replace(self, fit=fit, free=judged, gains=gains)
 
-    def with_findings_alone(self, windows: Windows, tuning: MotionTuning = DEFAULT) -> "ChosenServo":
-        """The findings fitted anew, all other numbers as in the simulation; a number that it lacks stays free."""
-        values, free = self.named
+    def with_damping_outside(self) -> "ChosenServo":
+        """The same with a change of kd that `with_damping_inside` made in damping again."""
+        kd, damping = place("kd"), place("damping")
+        if damping not in self.gains or kd in self.gains or self.fit.values[kd] == self.nominal[kd]:
+            return self
+        values = self.fit.values.copy()
+        values[[kd, damping]] = self.nominal[kd], values[damping] + values[kd] - self.nominal[kd]
+        return replace(self, fit=replace(self.fit, values=values))
+
+    def with_one_finding(self, number: int, windows: Windows, tuning: MotionTuning = DEFAULT) -> "ChosenServo":
+        """One finding fitted anew, all other numbers as in the simulation; a number that it lacks stays free."""
+        outside = self.with_damping_outside()
+        single = replace(outside, gains={number: self.gains[number]})
+        values, free = single.named
         lacking = np.isnan(self.nominal) & self.fit.free
-        values = np.where(lacking, self.fit.values, values)
+        values = np.where(lacking, single.fit.values, values)
         sound = _without_odd(windows, self.odd).with_integral(self.fit.integral)
-        return replace(self, fit=fit_servo(sound, values, free | lacking, tuning.refit_evaluations))
+        single = replace(single, fit=fit_servo(sound, values, free | lacking, tuning.refit_evaluations))
+        return single if outside is self else single.with_damping_inside() or single
 
     @property
     def named(self) -> tuple[Array, NDArray[np.bool_]]:
-        """The numbers of the simulation with those in their place that may be findings; which these are."""
+        """The numbers of the simulation with those in their place that may be findings; which these are.
+
+        Static friction has the speed at which it was found.
+        """
         free = np.zeros(len(self.nominal), dtype=bool)
         free[list(self.gains)] = True
-        return np.where(free, self.fit.values, fill_unknown(self.nominal)), free
+        found = free.copy()
+        found[place("stribeck_speed")] = free[place("static_excess")]
+        return np.where(found, self.fit.values, fill_unknown(self.nominal)), free
 
 
 def choose_servo(
@@ -171,8 +188,10 @@ def choose_servo(
         return chosen
     other = _judge(windows, _grow(few, single, nominal, tuning), (nominal, odd), looks, tuning)
     chosen = min(chosen, other, key=lambda each: each.cost)
+    if chosen.fit.free[LIMIT_SLOPE]:
+        return chosen
     falling = _grow(few, chosen.fit, chosen.nominal, tuning, (LIMIT_SLOPE,))
-    if chosen.fit.free[LIMIT_SLOPE] or not falling[0].free[LIMIT_SLOPE]:
+    if not falling[0].free[LIMIT_SLOPE]:
         return chosen
     return min(chosen, _judge(windows, falling, (chosen.nominal, odd), looks, tuning), key=lambda each: each.cost)
 

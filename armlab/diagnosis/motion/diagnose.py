@@ -307,12 +307,12 @@ def _conclude(
 
     def name(number: int, each: ChosenServo) -> list[ServoFinding]:
         windows = learned[number], judged[number]
-        found = name_differences(number, each, simulation, windows, mass_error, tuning)
-        return [one for one in found if not (one.is_shorter(sample) or one.is_lead_of(step))]
+        differs = name_differences(number, each, simulation, windows, mass_error, tuning)
+        return [one for one in differs if not (one.is_shorter(sample) or one.is_lead_of(step))]
 
-    def alone(number: int, each: ChosenServo) -> tuple[ChosenServo, list[ServoFinding]]:
-        fewer = each.with_findings_alone(learned[number], tuning)
-        return fewer, name(number, fewer)
+    def alone(number: int, finding: ServoFinding, each: ChosenServo) -> tuple[ChosenServo, list[ServoFinding]]:
+        single = each.with_one_finding(PARAMETERS.index(finding.parameter), learned[number], tuning)
+        return single, name(number, single)
 
     named = [[] if each is None else name(number, each) for number, each in enumerate(fit.chosen)]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
@@ -321,7 +321,7 @@ def _conclude(
     chosen, named, servos, after = replay_named(simulations, fit.chosen, named, alone, before, held_out, tuning)
     findings = [finding for own in named for finding in own]
     if payload is not None:
-        findings.append(_name_payload(payload, fit, judged, tuning))
+        findings.append(_name_payload(payload, replace(fit, chosen=chosen), judged, tuning))
     errors = tuple(
         _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
@@ -356,7 +356,7 @@ def replay_named(
     simulations: tuple[ServoSimulation, ServoSimulation],
     chosen: Sequence[ChosenServo | None],
     named: Sequence[list[ServoFinding]],
-    alone: Callable[[int, ChosenServo], tuple[ChosenServo, list[ServoFinding]]],
+    alone: Callable[[int, ServoFinding, ChosenServo], tuple[ChosenServo, list[ServoFinding]]],
     before: tuple[Replayed, ...],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning = DEFAULT,
@@ -369,10 +369,10 @@ def replay_named(
     error over stretches, also with steps so short that the simulator's own error is small. Where the simulation as it
     is given ends at the encoder's steps, its own error is small enough.
     simulations: as it is given, and with a payload that was found. before: replay of the first one. alone: a servo of a
-    joint with its findings alone, and what is named then.
+    joint with one finding alone, and what is named then.
     """
     chosen, named, (given, simulation) = list(chosen), list(named), simulations
-    sound, fewer = set[int](), set[int]()
+    sound, tried_alone = set[int](), set[int]()
     exact_before: list[Replayed] = []
     while True:
         values = [_values_after(simulation, number, each, bool(named[number])) for number, each in enumerate(chosen)]
@@ -389,11 +389,11 @@ def replay_named(
         own = chosen[worst]
         if not _is_at_floor(before, worst, tuning) and _rises(exact_before, exact_after, tuning)[worst] <= 1:
             sound.add(worst)
-        elif own is None or worst in fewer or len(own.gains) != 1:
+        elif own is None or worst in tried_alone or len(named[worst]) != 1:
             named[worst] = []
         else:
-            chosen[worst], named[worst] = alone(worst, own)
-            fewer.add(worst)
+            chosen[worst], named[worst] = alone(worst, named[worst][0], own)
+            tried_alone.add(worst)
 
 
 def _is_at_floor(replayed: Sequence[Replayed], joint: int, tuning: MotionTuning) -> bool:

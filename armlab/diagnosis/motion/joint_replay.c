@@ -270,8 +270,8 @@ INLINE void advance(const Stretch *at, const Lanes *lanes, int64_t step, const S
         const Vector moved = state->position[part] + half * before_step;
         state->velocity[part] = free[part] - clip_each(free[part], h * friction / (mass[part] + slow[part]));
         if (servo->ki > 0) {
-            const Vector speed = 0.5 * (before_step + state->velocity[part]);
-            const Vector more = h * (servo->ki * error[part] - servo->ki_speed * speed);
+            const Vector mean = 0.5 * (before_step + state->velocity[part]);
+            const Vector more = h * (servo->ki * error[part] - servo->ki_speed * mean);
             state->integral[part] = clip_each(state->integral[part] + more, wound_up);
         }
         state->position[part] = moved + half * state->velocity[part];

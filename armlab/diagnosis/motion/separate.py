@@ -13,7 +13,7 @@ from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows
 
 # one factor for all of them, and for the inertia
-TORQUE_SCALED = ("kp", "kd", "damping", "friction", "static_excess", "limit", "armature")
+TORQUE_SCALED = ("kp", "kd", "damping", "friction", "static_excess", "limit", "limit_slope", "armature")
 
 
 def confused_parameters(

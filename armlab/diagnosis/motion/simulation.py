@@ -106,6 +106,7 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
         nominal[:, place("armature")] = _rotors(recording)
     if controller is not None:
         nominal = _with_controller(nominal, controller)
+        _check_limits(nominal, where)
     else:
         nominal[np.isnan(nominal[:, [place("kp")]]) & np.array(UNSTATED)] = np.nan
     return ServoSimulation(
@@ -149,6 +150,15 @@ def _check_supported(controller: ControllerEntry, where: str) -> None:
     gains = zip(controller.ki_speed or (), controller.kp, strict=False)
     if any(part is not None and whole is not None and part >= whole for part, whole in gains):
         raise InputError(f"controller.ki_speed in {where} should be less than kp, of which it is a part")
+
+
+def _check_limits(nominal: Array, where: str) -> None:
+    falls = (nominal[:, place("limit_slope")] > 0) & (nominal[:, place("limit")] >= INFINITE_LIMIT)
+    if falls.any():
+        joint = int(np.argmax(falls)) + 1
+        raise InputError(
+            f"controller.limit_slope in {where}: joint {joint} has no torque_limit that could fall with speed"
+        )
 
 
 def _rotors(recording: MotionRecording) -> Array:

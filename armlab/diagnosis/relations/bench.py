@@ -104,9 +104,11 @@ def relations_page(outcomes: Sequence[Outcome]) -> str:
 def count_null_pairs(outcomes: Sequence[Outcome]) -> str:
     """How often a change is named between stretches of one recording that are independent of each other."""
     answered = [each for each in outcomes if each.relation in NULL_PAIRS and each.holds is not None]
+    if not answered:
+        return f"Stretches that are independent of each other ({join_words(NULL_PAIRS)}) have no answer."
     named = sum(each.holds is False for each in answered)
     low, high = wilson_interval(named, len(answered))
     return (
         f"Stretches that are independent of each other ({join_words(NULL_PAIRS)}): {len(answered)} answers, a change "
-        f"is named in {named} (95 % interval {100 * low:.2g} to {100 * high:.2g} %)."
+        f"is named in {named} (95 % interval {100 * low:.3g} to {100 * high:.3g} %)."
     )
