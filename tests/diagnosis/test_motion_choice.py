@@ -33,7 +33,8 @@ def chosen_servo(nominal: np.ndarray, *named: Key, **fitted: float) -> ChosenSer
     for key, value in fitted.items():
         values[KEYS.index(key)] = value
     fit = ServoFit(values, np.array(USUAL), lambda: np.eye(sum(USUAL)) * 1e-4, 1e-3, 1e-4, 24, np.zeros(1))
-    return ChosenServo(nominal, fit, fit.free, {place(key): GAIN for key in named}, np.zeros(0, dtype=np.intp))
+    none = np.zeros(0, dtype=np.intp)
+    return ChosenServo(nominal, fit, fit.free, {place(key): GAIN for key in named}, none, cost=0.0)
 
 
 def test_a_change_of_damping_goes_into_the_drive_as_a_whole() -> None:

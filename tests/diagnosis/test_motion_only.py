@@ -373,7 +373,7 @@ def test_windows_where_no_limit_acts_refute_a_gain_that_a_limit_makes(soft: Path
     free = np.array(USUAL)
     spoilt[place("kp")] = 7.5
     odd, gain = np.zeros(0, dtype=np.intp), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3)
-    wrong = ChosenServo(nominal, fit_servo(windows, spoilt, free), free, {place("kp"): gain}, odd, 0.0)
+    wrong = ChosenServo(nominal, fit_servo(windows, spoilt, free), free, {place("kp"): gain}, odd, cost=0.0)
     confirmed = confirm_in_calm_windows(windows, wrong, 20)
     assert 0 < len(find_calm_windows(windows, nominal[None])) < windows.count
     assert list(confirmed.gains) == [place("limit")]
@@ -398,7 +398,7 @@ def test_a_finding_alone_keeps_its_kd_and_its_stribeck_speed(soft: Path) -> None
     outside = true.copy()
     outside[[place("kd"), place("damping")]] = 0.4, 0.3
     gains = dict.fromkeys(np.flatnonzero(free).tolist(), Gain(0.5, 0.02, 1e-9, 2e-3, 1e-3))
-    inside = ChosenServo(nominal, fit_servo(windows, outside, free), free, gains, odd, 0.0).with_damping_inside()
+    inside = ChosenServo(nominal, fit_servo(windows, outside, free), free, gains, odd, cost=0.0).with_damping_inside()
     assert inside is not None
     damped = inside.with_one_finding(place("damping"), windows).fit.values
     assert (damped[place("damping")], damped[place("static_excess")]) == (0.1, 0.0)
