@@ -96,17 +96,22 @@ def test_held_out_replay_comes_near_the_encoder(diagnosis: MotionDiagnosis) -> N
 
 
 def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis: MotionDiagnosis) -> None:
-    first, second = diagnosis.chosen
-    assert first is not None
-    values = first.fit.values.copy()
-    values[place("kp")] = 0.01
-    spoilt = replace(first, fit=replace(first.fit, values=values))
+    second, spoilt = diagnosis.chosen[1], with_spoilt_gain(diagnosis)
     named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
     held_out = split_runs(diagnosis.recording)[1]
     both, before = (diagnosis.simulation, diagnosis.simulation), diagnosis.replayed_before
     _, kept, servos, _ = replay_named(both, (spoilt, second), named, fail_if_called, before, held_out)
     assert kept == [[], named[1]]
     np.testing.assert_array_equal(servos.values[0], diagnosis.simulation.nominal.values[0])
+
+
+def with_spoilt_gain(diagnosis: MotionDiagnosis) -> ChosenServo:
+    """The servo found at the first joint, with a gain that lets it hang."""
+    first = diagnosis.chosen[0]
+    assert first is not None
+    values = first.fit.values.copy()
+    values[place("kp")] = 0.01
+    return replace(first, fit=replace(first.fit, values=values))
 
 
 def fail_if_called(*_: object) -> tuple[ChosenServo, list[ServoFinding]]:
@@ -116,11 +121,7 @@ def fail_if_called(*_: object) -> tuple[ChosenServo, list[ServoFinding]]:
 def test_a_single_finding_whose_replay_is_worse_is_tried_alone_and_kept_where_it_holds(
     diagnosis: MotionDiagnosis,
 ) -> None:
-    first, second = diagnosis.chosen
-    assert first is not None
-    values = first.fit.values.copy()
-    values[place("kp")] = 0.01
-    spoilt = replace(first, fit=replace(first.fit, values=values))
+    (first, second), spoilt = diagnosis.chosen, with_spoilt_gain(diagnosis)
     named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
     named[0] = named[0][:1]
     held_out = split_runs(diagnosis.recording)[1]
@@ -129,6 +130,7 @@ def test_a_single_finding_whose_replay_is_worse_is_tried_alone_and_kept_where_it
 
     def alone(joint: int, finding: ServoFinding, servo: ChosenServo) -> tuple[ChosenServo, list[ServoFinding]]:
         asked.append((joint, finding, servo))
+        assert first is not None
         return first, named[0]
 
     chosen, kept, _, _ = replay_named(both, (spoilt, second), named, alone, before, held_out)
