@@ -24,6 +24,8 @@ from armlab.effects.contract import Candidate, Kind, Parameter
 from armlab.effects.links import SolidBody
 from armlab.effects.parameters import ParameterValue, parameter_values
 
+ROUNDING = 1e-9  # of a link's torque at the joint that shows it best: a joint with less does not feel it
+
 
 def withdraw_implausible(pruned: Pruned) -> Pruned:
     """The same without laws of friction whose numbers cannot be believed, the weakest first, special laws before usual
@@ -90,9 +92,11 @@ def links_that_data_tell(
 ) -> tuple[FittedModel, tuple[Claim, ...]]:
     """The claims without those on a link or a load of which these data do not tell; the log says why not.
 
-    No parameter of a link that is off differs from zero, and it is not certain that the link is off; or a joint that
-    feels the link has structure left without a name that is comparable with what the claim explains there; or a load
-    has another mass where it is found anew beside all that is named. left: what is structured beyond chance.
+    No parameter of a link that is off differs from zero, and it is not certain that the link is off. Or structure is
+    left without a name that is comparable with what the claim explains: at the joint that shows the claim best, or,
+    unless it is of the friction there, at another joint that feels the link; at a joint beyond the link any is, because
+    a later link may carry what was found. Or a load has another mass where it is found anew beside all that is named.
+    left: what is structured beyond chance.
     """
     kept, steps = [], list(model.steps)
     for each in claims:
@@ -111,14 +115,26 @@ def reason_link_unknown(claim: Claim, left: Sequence[Structure], tuning: Plausib
         return None
     if claim.in_links and claim.evidence.score < tuning.certain_link_evidence and not _differs_from_zero(claim):
         return "no parameter differs from zero"
+    best, link = claim.evidence.joint, claim.candidate.joints[0]
     for each in left:
+        if each.joint != best and _is_of_friction(each):
+            continue
+        if each.joint >= link:
+            return f"what is left without a name at joint {each.joint + 1} may be of a body that a later link carries"
         own, unknown = (float(np.std(of)) for of in (claim.prediction[:, each.joint], each.prediction))
-        if own > 0 and unknown > tuning.max_unknown_ratio * own:
+        is_felt = own > ROUNDING * float(np.std(claim.prediction[:, best]))
+        if is_felt and unknown > tuning.max_unknown_ratio * own:
             share = format(unknown / own, ".2g")
             return (
                 f"what is left without a name at joint {each.joint + 1} is {share} times as large as its torque there"
             )
     return None
+
+
+def _is_of_friction(each: Structure) -> bool:
+    """Whether structure depends on the velocity and the load of its own joint alone: no link does that."""
+    joint = each.joint + 1
+    return bool(each.depends_on) and {*each.depends_on} <= {f"velocity_{joint}", f"torque_{joint}"}
 
 
 def _reason_other_mass(model: FittedModel, claim: Claim) -> str | None:

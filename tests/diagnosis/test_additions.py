@@ -84,6 +84,21 @@ def test_what_passed_takes_its_likeliest_name(model: FittedModel, monkeypatch: p
     assert len(named.steps) == (effect != "cable_stiffness")
 
 
+def test_what_passed_keeps_its_name_where_the_numbers_of_a_likelier_one_cannot_be_believed(
+    model: FittedModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "armlab.diagnosis.naming.decide.calibrated_weights", lambda left_out: Weights({"is cable_stiffness": 9.0})
+    )
+    monkeypatch.setattr(
+        "armlab.diagnosis.naming.additions.doubtful_names",
+        lambda model, effects, exact: dict.fromkeys(effects, "stiffness may be zero"),
+    )
+    held = holding(model, "gravity_compensator")
+    known = Judge(held, held.state).effects()
+    assert with_likeliest_names(held, known, ()) == (held, known)
+
+
 def test_what_passed_keeps_its_name_where_none_is_likelier(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:
     held = holding(model, "gravity_compensator")
     known = Judge(held, held.state).effects()

@@ -338,6 +338,25 @@ def test_what_frees_the_joints_of_their_links_is_no_unit(tmp_path: Path) -> None
     assert not any(is_accepted(judge, start, each) for each in search_singles(judge, start))
 
 
+def test_a_joint_that_travels_as_far_as_the_others_is_in_their_unit(tmp_path: Path) -> None:
+    """An unknown load makes a joint that hardly moves explain more; only a joint that travels too far is in degrees."""
+    for factor, wanted in ((1.0, set[str]()), (180 / np.pi, {"unit_error@1"})):
+        recording = recording_with(tmp_path / f"{factor:.0f}", scale(["q1"], factor))
+        channels = thin_channels(recording, TUNING)
+        assert channels is not None
+        judge = Judge(Fitter(channels, TUNING), recording)
+        start = read_as_is(recording, ARM.parameters)
+        degrees = [
+            each
+            for each in units(start)
+            if each.mistakes[-1].form == "position"
+            and each.mistakes[-1].value("factor") > 1
+            and each.mistakes[-1].joint
+        ]
+        assert len(degrees) == 3
+        assert {each.mistakes[-1].label for each in degrees if judge.is_size_plausible(start, each)} == wanted
+
+
 def test_a_short_run_beside_a_long_one_hides_no_mistake(tmp_path: Path) -> None:
     """Blocks follow the length of the runs: none is empty."""
     folder = folder_with(tmp_path / "rig", frame(seconds=300.0))

@@ -116,8 +116,10 @@ def with_likeliest_names(
 ) -> tuple[FittedModel, dict[int, Evidence]]:
     """Effects that passed, each with the likeliest name of its finding where that has a name or a class of names.
 
-    A search takes what raises the score most, and what fits best need not be likeliest. left: structure of the joints.
+    A search takes what raises the score most, and what fits best need not be likeliest. A name whose numbers cannot be
+    believed takes no place. left: structure of the joints.
     """
+    exact = not any(is_structured(each, model.design.settings.tuning) for each in left)
     out = dict(effects)
     for group in effects:
         if group not in out:
@@ -128,8 +130,10 @@ def with_likeliest_names(
             continue
         without = replace(model, state=model.state.minus(group))
         likelier = _with_name(without, first, least=0.0)
-        if likelier is not None:
-            other, state, evidence = likelier
+        if likelier is None:
+            continue
+        other, state, evidence = likelier
+        if not doubtful_names(replace(model, state=state), {other: evidence}, exact=exact):
             what = _candidate(model, other)
             text = f"{own.effect} {own.joint} -> {what.effect} {what.joint}, which is likelier"
             step = Step(text, model.solver.fit(state).score)

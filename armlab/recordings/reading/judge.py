@@ -11,7 +11,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.mistakes import TORQUE
+from armlab.recordings.reading.mistakes import POSITION, TORQUE
 from armlab.recordings.reading.reading import Reading
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
@@ -79,11 +79,14 @@ class Judge:
         return Trial(reading, losses[0] if known else None, losses[-1])
 
     def is_size_plausible(self, parent: Reading, reading: Reading) -> bool:
-        """Whether a last mistake that scales torques or links makes their sizes more alike, as a wrong unit does.
+        """Whether a last mistake that scales makes sizes more alike, as a wrong unit does.
 
-        Else the links may vanish, or grow, until friction alone explains the torque.
+        Of torques and links: else the links may vanish, or grow, until friction alone explains the torque. Of the
+        positions of one joint: else a joint that hardly moves explains what no reading does.
         """
         mistake = reading.mistakes[-1]
+        if mistake.effect == "unit_error" and mistake.form == POSITION:
+            return mistake.joint is None or self._is_travel_more_alike(parent, reading, mistake.joint - 1)
         links = mistake.effect == "link_data_error" and mistake.form != "centre_sign"
         scales = links or (mistake.effect == "unit_error" and mistake.form == TORQUE)
         if not scales:
@@ -95,6 +98,17 @@ class Judge:
         sizes = np.log(np.maximum(np.std(self.fitter.channels.read_torque(parent), axis=0), SMALLEST))
         own, others = sizes[mistake.joint - 1], float(np.median(np.delete(sizes, mistake.joint - 1)))
         return bool(abs(own - np.log(mistake.value("factor")) - others) < abs(own - others))
+
+    def _is_travel_more_alike(self, parent: Reading, reading: Reading, joint: int) -> bool:
+        """Whether a joint (from 0) travels more as far as the other joints of its kind do, where there are any."""
+        kinds = [each.kind for each in reading.arm.joints]
+        others = [place for place, kind in enumerate(kinds) if kind == kinds[joint] and place != joint]
+        before, after = (
+            np.log(np.maximum(np.ptp(self.fitter.columns(each).motion.position, axis=0), SMALLEST))
+            for each in (parent, reading)
+        )
+        usual = float(np.median(before[others])) if others else 0.0
+        return not others or bool(abs(after[joint] - usual) < abs(before[joint] - usual))
 
     def _size_mismatch(self, reading: Reading) -> float:
         """Sum over joints of the logarithms between the scatter of the torque and that of the links as given."""
