@@ -131,9 +131,7 @@ def identify(
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}: {suggest_name(method, list(METHODS))}")
-    runs = recording.with_role("identify")
-    if not runs:
-        raise InputError(f"{recording.name} has no run to identify from: give one of its runs the role identify")
+    runs = recording.runs_to_identify()
     wrong = None if as_read else wrong_reading(recording)
     if wrong is not None:
         raise InputError(f"{recording.name}: {wrong[0]} `as_read=True` identifies it all the same")

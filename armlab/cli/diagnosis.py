@@ -301,7 +301,10 @@ def real_concealed(
 @click.argument("robot")
 @click.argument("trajectory")
 @click.option(
-    "--noise", multiple=True, type=FiniteNumber(), help="Of the torque, N m: once, or once a joint [default: 1 %]."
+    "--noise",
+    multiple=True,
+    type=FiniteNumber(min=0, min_open=True),
+    help="Of the torque, N m: once, or once a joint [default: 1 %].",
 )
 @click.option("--joints", type=click.IntRange(min=1), help="How many of its first joints move [default: all].")
 @click.option("--out", type=OutputPath(), help="Folder for the card as page, tables and pictures.")

@@ -118,7 +118,9 @@ class _CommandGroup(click.Group):
         try:
             name, command, rest = super().resolve_command(ctx, args)
         except click.UsageError as error:
-            close = get_close_matches(args[0], _COMMANDS, n=1)
+            group = self.get_command(ctx, "recording")
+            inside = {name: f"recording {name}" for name in group.commands} if isinstance(group, click.Group) else {}
+            close = [inside.get(each, each) for each in get_close_matches(args[0], [*inside, *_COMMANDS], n=1)]
             hint = f" Did you mean '{close[0]}'?" if close else ""
             raise click.UsageError(f"{error.message}{hint}", ctx) from None
         place = 1 if isinstance(command, click.Group) and rest and not rest[0].startswith("-") else 0

@@ -36,9 +36,6 @@ def doctor() -> ResultLines:
     return examine_installation()
 
 
-_PATH = click.Path(path_type=Path)
-
-
 @click.command()
 @click.option("--trials", type=click.IntRange(min=1), default=100_000, show_default=True)
 @click.option("--kills", type=click.IntRange(min=1), help="Kill the command and its workers that many times instead.")

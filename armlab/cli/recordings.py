@@ -65,7 +65,7 @@ def check(folder: Path, out: Path | None) -> ResultLines:
 
 
 @recording.command()
-@click.argument("name", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
+@click.argument("name", metavar="NAME", type=click.Choice((*PUBLIC_RECORDING_NAMES, *PUBLIC_MOTION_NAMES)))
 @click.option("--out", type=OutputPath(), help="New folder for the recording [default: NAME].")
 @prints_result
 def fetch(name: str, out: Path | None) -> ResultLines:

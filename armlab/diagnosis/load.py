@@ -40,7 +40,6 @@ from armlab.identification.payload import (
     CENTRE_NAMES,
     Number,
     PayloadSetting,
-    identification_runs,
     load_document,
     number_line,
 )
@@ -105,7 +104,7 @@ def nominal_payload_lines(loaded: Path, setting: PayloadSetting, progress: Progr
     setting.check(recording.arm)
     if recording.arm.links is None:
         raise InputError(f"--without is needed: the robot {recording.arm.name} has no nominal `links` to stand for it")
-    identification_runs(recording)
+    recording.runs_to_identify()
     settings = Settings()
     if setting.cutoff_hz is not None:
         settings = vary(settings, "data.cutoff_hz", setting.cutoff_hz)

@@ -90,8 +90,8 @@ def _has_nominal(recording: Recording) -> bool:
 
 
 def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None:
-    """The reason in a sentence; None for a recording that can be used."""
-    runs = recording.with_role("identify") or recording.runs
+    """The reason in a sentence; None for a recording that can be used. InputError where no run identifies."""
+    runs = recording.runs_to_identify()
     seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
     if seconds < tuning.min_duration_s:
         return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."

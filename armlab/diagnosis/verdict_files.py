@@ -65,10 +65,15 @@ def write_verdict(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
 
 def check_output_folder(folder: Path, recording: Recording) -> None:
     """Makes sure, before any work, that the files of a verdict may stand there; InputError where they may not."""
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"--out {folder} is a file: give a folder")
+    check_can_be_written(folder)
     if recording.simulation is not None and recording.simulation.resolve() == (folder / MODEL).resolve():
         raise InputError(f"--out {folder} holds {MODEL}, the simulation of {recording.name}: give another folder")
+
+
+def check_can_be_written(folder: Path) -> None:
+    """Makes sure that a folder is one or can be made; InputError where not."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {folder} is a file: give a folder")
     nearest = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
     if not nearest.is_dir() or not os.access(nearest, os.W_OK):
         raise InputError(f"cannot write into {nearest}: give --out a folder that can be written")

@@ -111,9 +111,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
     it. `corrected/` in `out` then holds the recording as it should be read.
     """
     recording = load_recording(folder)
-    runs = recording.with_role("identify")
-    if not runs:
-        raise InputError(f"{folder} has no run to identify from: give one of its runs the role identify")
+    runs = recording.runs_to_identify()
     if options.tolerance and recording.arm.links is None:
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
     if not options.as_read:

@@ -23,7 +23,6 @@ from armlab.identification.structure import Structure
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording_file import ControllerEntry
 from problem.arm import Arm
-from problem.pseudo_inertia import links_of
 from problem.robot_file import LinkEntry, built_in_arms, check_arm, load_arm
 
 SCHEMA = "model/1"
@@ -282,11 +281,3 @@ def base_covariance(base: Array, structure: Structure) -> Array:
     out = np.full((structure.size, structure.size), np.nan)
     out[: len(base), : len(base)] = base
     return out
-
-
-def arm_of_model(model: TorqueModel) -> Arm:
-    """The model's arm with its identified links and rotors; ValueError for a model without physical links."""
-    if model.inertial is None:
-        raise ValueError("the model has base parameters only: identify it with physically consistent links")
-    arm = model.arm
-    return Arm(arm.name, arm.joints, links_of(model.inertial), arm.gravity, tuple(model.rotor_inertia.tolist()))

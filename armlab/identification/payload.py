@@ -28,7 +28,6 @@ from armlab.identification.selection import counterbalance_groups
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.load import load_recording
-from armlab.recordings.recording import Recording, Run
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
 from problem.pseudo_inertia import link_from_centre_of_mass, link_of, pseudo_inertias
 from problem.regressor import observation_matrix
@@ -236,18 +235,10 @@ class _PayloadTask:
         if len(bare.arm) != len(carrying.arm):
             raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(carrying.arm)}")
         setting.check(carrying.arm)
-        runs = identification_runs(carrying), identification_runs(bare)
+        runs = carrying.runs_to_identify(), bare.runs_to_identify()
         cutoff = setting.cutoff_hz or max(map(suggested_cutoff, (*runs[0], *runs[1])))
         signals = ([signals_of(run, cutoff, LOAD_POSITION_FACTOR) for run in each] for each in runs)
         return _PayloadTask(_payload_structure(carrying.arm, setting), *signals)
-
-
-def identification_runs(recording: Recording) -> tuple[Run, ...]:
-    """The runs of a recording that identify; InputError where it has none."""
-    runs = recording.with_role("identify")
-    if not runs:
-        raise InputError(f"{recording.folder} has no run to identify from: give one of its runs the role identify")
-    return runs
 
 
 def _payload_structure(arm: Arm, setting: PayloadSetting) -> Structure:

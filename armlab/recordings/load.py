@@ -50,8 +50,8 @@ def open_recording(folder: Path) -> tuple[Recording, RecordingFile]:
     file = read_recording_file(folder)
     if not file.has_torque:
         raise InputError(
-            f"columns in {folder / FILE_NAME} has neither torque nor current with `gains`: a recording of motion only, "
-            "which `armlab diagnose` takes, and `armlab recording check`"
+            f"{folder / FILE_NAME}: columns has neither torque nor current with `gains`, which this command needs; "
+            "`armlab diagnose` and `armlab recording check` take a recording of motion only"
         )
     if file.joints is not None:
         raise InputError(f"joints in {folder / FILE_NAME}: only a recording of motion only may name joints")

@@ -94,6 +94,10 @@ def open_motion_recording(folder: Path) -> tuple[MotionRecording, RecordingFile]
         )
     if file.timing is not None or file.gravity is not None:
         raise InputError(f"timing and gravity in {folder / FILE_NAME}: a recording of motion only has neither")
+    if file.simulation is not None:
+        raise InputError(
+            f"simulation in {folder / FILE_NAME}: motion only is compared with the MJCF of `robot` and `controller`"
+        )
     arm = load_arm(file.robot, folder)
     joints = _recorded_joints(file, arm, folder)
     _check_controller(file, len(joints), folder)

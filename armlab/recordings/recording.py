@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
+from armlab.common.errors import InputError
 from problem.arm import Arm
 
 Role = Literal["identify", "validate"]
@@ -185,3 +186,10 @@ class Recording:
     def with_role(self, role: Role) -> tuple[Run, ...]:
         """The runs that identify, or those that validate."""
         return tuple(run for run in self.runs if run.role == role)
+
+    def runs_to_identify(self) -> tuple[Run, ...]:
+        """The runs that identify; InputError where there is none."""
+        runs = self.with_role("identify")
+        if not runs:
+            raise InputError(f"{self.folder} has no run to identify from: give one of its runs the role identify")
+        return runs

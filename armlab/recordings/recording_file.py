@@ -196,6 +196,10 @@ class RecordingFile(Settings):
 def read_recording_file(folder: Path) -> RecordingFile:
     """The checked content of `recording.yaml` in a folder; InputError, in one line, where it is wrong."""
     path = folder / FILE_NAME
+    if folder.is_file():
+        raise InputError(
+            f"{folder} is a file: `armlab recording import {folder} --out FOLDER` makes a recording of a log"
+        )
     if not path.is_file():
         raise InputError(f"no {FILE_NAME} in {folder}: a recording is a folder with {FILE_NAME} and its runs")
     return validate(RecordingFile, read_yaml(path), str(path))

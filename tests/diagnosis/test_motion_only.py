@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
 
 from armlab.cli.main import main
+from armlab.common.arrays import Array
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough
@@ -100,9 +101,11 @@ def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis
     named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
     held_out = split_runs(diagnosis.recording)[1]
     both, before = (diagnosis.simulation, diagnosis.simulation), diagnosis.replayed_before
-    _, kept, servos, _ = replay_named(both, (spoilt, second), named, fail_if_called, before, held_out)
+    _, kept, servos, _ = replay_named(both, (spoilt, second), named, (tells_nothing, fail_if_called), before, held_out)
     assert kept == [[], named[1]]
     np.testing.assert_array_equal(servos.values[0], diagnosis.simulation.nominal.values[0])
+    ask = (lambda joint, values: joint == 0, fail_if_called)
+    assert replay_named(both, (spoilt, second), named, ask, before, held_out)[1] == named
 
 
 def with_spoilt_gain(diagnosis: MotionDiagnosis) -> ChosenServo:
@@ -112,6 +115,10 @@ def with_spoilt_gain(diagnosis: MotionDiagnosis) -> ChosenServo:
     values = first.fit.values.copy()
     values[place("kp")] = 0.01
     return replace(first, fit=replace(first.fit, values=values))
+
+
+def tells_nothing(joint: int, values: Array) -> bool:
+    return False
 
 
 def fail_if_called(*_: object) -> tuple[ChosenServo, list[ServoFinding]]:
@@ -133,7 +140,7 @@ def test_a_single_finding_whose_replay_is_worse_is_tried_alone_and_kept_where_it
         assert first is not None
         return first, named[0]
 
-    chosen, kept, _, _ = replay_named(both, (spoilt, second), named, alone, before, held_out)
+    chosen, kept, _, _ = replay_named(both, (spoilt, second), named, (tells_nothing, alone), before, held_out)
     assert asked == [(0, named[0][0], spoilt)]
     assert (chosen, kept) == ([first, second], named)
 
@@ -707,6 +714,9 @@ def test_a_mass_is_refused_by_replays_that_are_worse_with_short_steps_too(diagno
     stiffer.values[:, place("kp")] *= 2
     worse = replace(diagnosis, replayed_after=off, servos=stiffer)
     assert not replays_as_well(worse, diagnosis, DEFAULT)
+    rise = 1e-6 * (10 + np.arange(len(diagnosis.replayed_alone)))[:, None]
+    assert replays_as_well(worse, replace(diagnosis, replayed_alone=diagnosis.replayed_alone + rise), DEFAULT)
+    assert not replays_as_well(worse, replace(diagnosis, replayed_alone=diagnosis.replayed_alone - rise), DEFAULT)
     assert not replays_as_well(replace(worse, servos=None), diagnosis, DEFAULT)
 
 

@@ -215,6 +215,14 @@ def test_a_file_that_is_no_verdict_is_refused(tmp_path: Path) -> None:
     assert "is no verdict" in complaint(run(tmp_path, tmp_path / "verdict.json"))
 
 
+def test_the_verdict_of_a_recording_of_motion_only_is_refused(tmp_path: Path) -> None:
+    verdict = verdict_file(tmp_path, {**VISCOUS, "rivals": [LATE]})
+    (tmp_path / "model.yaml").write_text(
+        "schema: model/1\nrobot: robot.yaml\ncomponents: []\ncontroller: {type: pd, kp: [1], kd: [0]}\n"
+    )
+    assert "of a recording of motion only" in complaint(run(tmp_path, verdict))
+
+
 def test_a_robot_without_limits_and_without_a_recording_is_refused(tmp_path: Path) -> None:
     verdict = verdict_file(tmp_path, {**VISCOUS, "rivals": [LATE]})
     result = CliRunner().invoke(main, ["next", str(verdict), "--robot", "irb120-arm", "--out", str(tmp_path / "out")])

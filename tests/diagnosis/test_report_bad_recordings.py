@@ -49,12 +49,12 @@ def another_arm(folder: Path) -> Path:
     return made
 
 
-def with_text(change: Callable[[str], str]) -> Make:
-    """A recording whose first run is changed as text."""
+def with_text(change: Callable[[str], str], file: str = "run-0.csv") -> Make:
+    """A recording of which a file is changed as text: the first run, or another one."""
 
     def make(folder: Path) -> Path:
         made = recording_in(folder, frame(0), frame(1))
-        path = made / "run-0.csv"
+        path = made / file
         path.write_text(change(path.read_text()))
         return made
 
@@ -70,6 +70,10 @@ REFUSED = {
     "robot of another number of joints": (changed(lambda run: run, robot="kuka-kr300"), "joints"),
     "unknown unit": (changed(lambda run: run, units={"time": "s", "position": "rad", "torque": "lbf"}), "lbf"),
     "an empty run": (with_text(lambda text: text.splitlines()[0] + "\n"), "holds no rows"),
+    "no run to identify from": (
+        with_text(lambda text: text.replace("identify", "validate"), "recording.yaml"),
+        "give one of its runs the role identify",
+    ),
     "no simulation to compare with": (
         changed(lambda run: run, simulation="model.yaml"),
         "no file",

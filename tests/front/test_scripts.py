@@ -184,6 +184,7 @@ def test_an_unknown_command_is_refused_with_the_one_that_was_probably_meant(here
     status, out, err = told("diagnos", "rec")
     assert (status, out) == (2, "")
     assert "No such command 'diagnos'. Did you mean 'diagnose'?" in err
+    assert "Did you mean 'recording import'?" in told("import", "log.csv")[2]
 
 
 def test_click_completes_commands_and_options_in_a_shell():

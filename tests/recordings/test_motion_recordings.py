@@ -90,6 +90,7 @@ def test_excluded_stretches_are_left_out_and_cut_the_run(folder: Path, tmp_path:
         ({"joints": ["shoulder", "wrist"]}, "no joint 'wrist'"),
         ({"joints": ["shoulder"]}, "names 2 columns, but the robot has 1 joints"),
         ({"controller": {"type": "pd", "kp": [1.0], "kd": [None]}}, "controller.kp"),
+        ({"simulation": "model.yaml"}, "compared with the MJCF of `robot` and `controller`"),
         ({"runs": [{"file": "run-1.csv", "exclude": [[7.0, 8.0]]}]}, "holds no row"),
         ({"runs": [{"file": "run-1.csv", "exclude": [[3.0, 2.0]]}]}, "should hold [first, last]"),
     ],

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 from recording_folders import folder_with, frame
+from refusals import refusal
 
 from armlab.cli.recordings import recording
 from armlab.common.documents import FailedResultError
@@ -79,6 +80,12 @@ def test_import_by_flags_gives_a_recording_that_loads(tmp_path: Path) -> None:
     result = call(*words, "--unit", "time=s", "--unit", "position=rad", "--unit", "torque=N.m")
     assert result.exit_code == 0
     assert [run.role for run in load_recording(tmp_path / "new").runs] == ["identify", "validate"]
+
+
+def test_a_log_in_the_place_of_a_recording_is_refused_with_what_makes_one_of_it(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,q1\n")
+    assert f"{log} is a file: `armlab recording import {log} --out FOLDER`" in refusal(load_recording, log)
 
 
 @pytest.mark.skipif(local_copies() is None, reason=f"{LOCAL_COPIES_VARIABLE} names no local copies")

@@ -16,9 +16,7 @@ from armlab.concealed.pairs.plan import CHANGE_KINDS, PAIRS
 from armlab.concealed.score.cases import FAILURE_FILE
 from armlab.concealed.sealed_set import Share
 
-FRICTION = ("coulomb_friction", "viscous_friction")
 MAX_CLASS = 3  # names
-TRUE_FACTS = ("pair", "kind", "tier", "arm", "same_motion", "drifting", "multiple", "changed")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from armlab.concealed.servo._servo_arm import ffi, lib
 
 STEP_S = 0.00025
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
-MAX_JOINTS = 8
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ commands of the held-out runs through the simulation before and after (`replay`)
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -104,7 +104,8 @@ class MotionDiagnosis:
 
     chosen: of each joint, None for one that stands still or follows no servo. servos: all numbers for the simulation
     after. odd: stretches that the servos do not explain: joint, run, from, to. replayed_before, replayed_after: the
-    held-out runs. tool: error of the tool before and after, m. currents: what those of the held-out runs say.
+    held-out runs. replayed_alone: squared errors after, of each joint alone, (stretches, joints), rad2. tool: error of
+    the tool before and after, m. currents: what those of the held-out runs say.
     """
 
     recording: MotionRecording
@@ -118,6 +119,7 @@ class MotionDiagnosis:
     odd: tuple[tuple[int, str, float, float], ...] = ()
     replayed_before: tuple[Replayed, ...] = ()
     replayed_after: tuple[Replayed, ...] = ()
+    replayed_alone: Array = field(default_factory=lambda: np.zeros((0, 0)))
     tool: tuple[float | None, float] = (None, 0.0)
     silent: tuple[int, ...] = ()
     currents: tuple[CurrentWitness, ...] = ()
@@ -154,7 +156,7 @@ def diagnose_motion(
         runs = coupled_windows(taken, fit.simulation, fit.values, whole)
         kept = replace(fit, chosen=_without_worse(fit, runs, tuning))
         placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
-        return _conclude(recording, bare_simulation, (placed, payload), judged, taken, tuning)
+        return _conclude(recording, bare_simulation, (placed, payload), (judged, runs), taken, tuning)
 
     def taken(servos: Sequence[Array | None]) -> Sequence[MotionRun]:
         return hold_commands(learned, given, servos, tuning) if held else learned
@@ -266,22 +268,26 @@ def replays_as_well(loaded: MotionDiagnosis, bare: MotionDiagnosis, tuning: Moti
     """Whether held-out runs replay with a mass at the tool not clearly worse, over all joints, than without it.
 
     Many numbers of servos fit the simulator's own error, too, which one mass cannot: worse is what is worse also with
-    steps so short that this error is small.
+    steps so short that this error is small, unless each joint alone, whose replay sticks exactly, replays clearly
+    better with the mass, and the simulator does not end at the encoder's steps without it.
     """
     if loaded.servos is None or bare.servos is None:
         return bare.servos is None
-    if not _is_clearly_worse(bare.replayed_after, loaded.replayed_after, tuning):
+    whole = _stretches_of_replays(bare.replayed_after, loaded.replayed_after, tuning)
+    if not _is_clearly_worse(*whole, tuning):
+        return True
+    trusted = all(_is_at_floor(bare.replayed_after, joint, tuning) for joint in range(len(bare.chosen)))
+    if not trusted and _is_clearly_worse(loaded.replayed_alone, bare.replayed_alone, tuning):
         return True
     without, with_it = (
         replay(each.simulation, each.servos, [own.run for own in each.replayed_after], EXACT_STEPS)
         for each in (bare, loaded)
     )
-    return not _is_clearly_worse(without, with_it, tuning)
+    return not _is_clearly_worse(*_stretches_of_replays(without, with_it, tuning), tuning)
 
 
-def _is_clearly_worse(before: Sequence[Replayed], after: Sequence[Replayed], tuning: MotionTuning) -> bool:
-    """Whether the squared errors of all joints together rise, each as a share of its mean."""
-    without, with_it = _stretches_of_replays(before, after, tuning)
+def _is_clearly_worse(without: Array, with_it: Array, tuning: MotionTuning) -> bool:
+    """Whether the squared errors (stretches, joints) of all joints together rise, each as a share of its mean."""
     size = np.maximum(without.mean(axis=0), 1e-300)
     return _rise((without / size).sum(axis=1), (with_it / size).sum(axis=1), tuning) > tuning.clearly_worse
 
@@ -290,15 +296,15 @@ def _conclude(
     recording: MotionRecording,
     given: ServoSimulation,
     found: tuple[ArmFit, Payload | None],
-    judged: Sequence[Windows],
+    parts: tuple[Sequence[Windows], Sequence[Windows]],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning,
 ) -> MotionDiagnosis:
     """Findings, replays and errors.
 
-    given: the simulation to be judged; found: servos and payload. judged: windows of the held-out runs.
+    given: the simulation to be judged; found: servos and payload. parts: the held-out runs in windows, and whole.
     """
-    fit, payload = found
+    (fit, payload), (judged, runs) = found, parts
     simulation, learned = fit.simulation, fit.windows
     mass_error = np.inf if payload is None else payload.error
     holds = recording.controller is not None and recording.controller.rate_hz is not None
@@ -314,11 +320,16 @@ def _conclude(
         single = each.with_one_finding(PARAMETERS.index(finding.parameter), learned[number], tuning)
         return single, name(number, single)
 
+    def told(number: int, values: Array) -> bool:
+        nominal = _with_payload(simulation.nominal.values[number], -simulation.payload)
+        without, with_it = (_stretch_squares(runs[number], each, tuning) for each in (nominal, values))
+        return _rise(with_it, without, tuning) > tuning.clearly_worse
+
     named = [[] if each is None else name(number, each) for number, each in enumerate(fit.chosen)]
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(given, None, held_out)) if known else ()
     simulations = given, simulation
-    chosen, named, servos, after = replay_named(simulations, fit.chosen, named, alone, before, held_out, tuning)
+    chosen, named, servos, after = replay_named(simulations, fit.chosen, named, (told, alone), before, held_out, tuning)
     findings = [finding for own in named for finding in own]
     if payload is not None:
         findings.append(_name_payload(payload, replace(fit, chosen=chosen), judged, tuning))
@@ -346,17 +357,23 @@ def _conclude(
         errors=errors,
         replayed_before=before,
         replayed_after=after,
+        replayed_alone=np.column_stack(
+            [_stretch_squares(own, values, tuning) for own, values in zip(runs, servos.values, strict=True)]
+        ),
         tool=(tools[0] if before else None, tools[-1]),
         silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not follows[each.joint]),
         currents=correlate_currents(held_out, simulation, servos.values),
     )
 
 
+TriedAlone = Callable[[int, ServoFinding, ChosenServo], tuple[ChosenServo, list[ServoFinding]]]
+
+
 def replay_named(
     simulations: tuple[ServoSimulation, ServoSimulation],
     chosen: Sequence[ChosenServo | None],
     named: Sequence[list[ServoFinding]],
-    alone: Callable[[int, ServoFinding, ChosenServo], tuple[ChosenServo, list[ServoFinding]]],
+    ask: tuple[Callable[[int, Array], bool], TriedAlone],
     before: tuple[Replayed, ...],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning = DEFAULT,
@@ -367,11 +384,13 @@ def replay_named(
     single finding, that one is tried alone before: other numbers, which are none, may spoil the replay. A whole run of
     sticking joints goes a little another way with any other number: worse is what matters and exceeds the standard
     error over stretches, also with steps so short that the simulator's own error is small. Where the simulation as it
-    is given ends at the encoder's steps, its own error is small enough.
-    simulations: as it is given, and with a payload that was found. before: replay of the first one. alone: a servo of a
-    joint with one finding alone, and what is named then.
+    is given ends at the encoder's steps, its own error is small enough. Elsewhere a joint keeps its numbers where they
+    are clearly better for it alone, because the simulator lets joints creep that stick.
+    simulations: as it is given, and with a payload that was found. before: replay of the first one. ask: whether whole
+    runs of a joint alone are clearly better with its numbers than with the simulation's; and a servo of a joint with
+    one finding alone, with what is named then.
     """
-    chosen, named, (given, simulation) = list(chosen), list(named), simulations
+    chosen, named, (given, simulation), (told, alone) = list(chosen), list(named), simulations, ask
     sound, tried_alone = set[int](), set[int]()
     exact_before: list[Replayed] = []
     while True:
@@ -384,10 +403,14 @@ def replay_named(
         worst = int(np.argmax(rises))
         if rises[worst] <= 1:
             return chosen, named, servos, after
+        trusted = _is_at_floor(before, worst, tuning)
+        if not trusted and told(worst, values[worst]):
+            sound.add(worst)
+            continue
         exact_before = exact_before or replay(given, None, held_out, EXACT_STEPS)
         exact_after = replay(simulation, servos, held_out, EXACT_STEPS)
         own = chosen[worst]
-        if not _is_at_floor(before, worst, tuning) and _rises(exact_before, exact_after, tuning)[worst] <= 1:
+        if not trusted and _rises(exact_before, exact_after, tuning)[worst] <= 1:
             sound.add(worst)
         elif own is None or worst in tried_alone or len(named[worst]) != 1:
             named[worst] = []

@@ -145,9 +145,10 @@ def fit_servo(
     wound_up, push = float(values[place("integral_limit")]), INTEGRAL_STEP * float(values[place("kp")])
 
     def whole(part: Array) -> tuple[Windows, Array]:
-        coordinates, integral = to_coordinates(values), windows.integral.copy()
+        coordinates, integral, found = to_coordinates(values), windows.integral.copy(), values.copy()
         coordinates[chosen], integral[runs] = part[: len(chosen)], part[len(chosen) :]
-        return windows.with_integral(integral) if len(runs) else windows, from_coordinates(coordinates)
+        found[chosen] = from_coordinates(coordinates)[chosen]
+        return windows.with_integral(integral) if len(runs) else windows, found
 
     def slopes(part: Array) -> Array:
         moved, at = whole(part)

@@ -5,7 +5,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from armlab.common.documents import ResultLines
-from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.motion.diagnose import diagnose_motion
@@ -15,6 +14,7 @@ from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.words import motion_lines
 from armlab.diagnosis.signals_file import SIGNALS_FILE, check_signals_writer, signals_content
 from armlab.diagnosis.tuning import Tuning, change_tuning, parse_change
+from armlab.diagnosis.verdict_files import check_can_be_written
 from armlab.recordings.motion import load_motion_recording
 
 
@@ -38,8 +38,7 @@ def diagnose_motion_recording(
     if with_signals:
         check_signals_writer()
     recording = load_motion_recording(folder)
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out} is a file: give a folder")
+    check_can_be_written(out)
     diagnosis = diagnose_motion(recording, progress, tuning.motion)
     settings = [part for change in changes for part in ("--set", change)] + ["--mcap"] * with_signals
     settings += [part for form in dict.fromkeys(tables) for part in ("--table", form)]

@@ -138,10 +138,6 @@ class Question:
         seen = [self.noncentrality(gram, *way) for way in ways if not self.inseparable[way]]
         return float(np.sqrt(min(seen))) if seen else 0.0
 
-    def separations(self, gram: Array) -> list[float]:
-        """Separations of all pairs that a motion can separate."""
-        return [self.separation(gram, *pair) for pair in self.pairs]
-
 
 @dataclass(frozen=True, eq=False)
 class Layout:

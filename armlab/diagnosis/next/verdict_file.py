@@ -71,6 +71,8 @@ def read_verdict(path: Path) -> VerdictWithModel:
     if not beside.is_file():
         return VerdictWithModel(file, findings, noise)
     model = read_model_file(beside)
+    if model.controller is not None:
+        raise InputError(f"{file} is of a recording of motion only: `armlab next` needs the verdict of one with torque")
     cutoff_hz = model.provenance.get("cutoff_hz")
     if not isinstance(cutoff_hz, float | int | None):
         raise InputError(f"provenance.cutoff_hz in {beside} should be a number, not {cutoff_hz!r}")

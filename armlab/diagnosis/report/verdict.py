@@ -52,6 +52,8 @@ def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
         return "These recordings allow no verdict.", diagnosis.summary
     worst = max(diagnosis.fit, key=lambda each: each.after, default=None)
     simulation = diagnosis.simulation
+    if diagnosis.status == "none" and not diagnosis.fit:
+        return diagnosis.summary, ""  # physics was not asked
     if diagnosis.status == "none":
         size = "" if worst is None else _largest_error_text(worst, simulation.arm)
         left = f"The largest error on held-out data is {size}." if size else ""

@@ -26,7 +26,6 @@ NAMES = {
     INERTIAL_ERROR: "links that are not as simulated",
     SPRING: "a spring or a gravity compensator",
 }
-SETUP_EFFECTS = tuple(name for name in NAMES if name not in (INERTIAL_ERROR, SPRING))
 
 MEASUREMENTS = {
     "torque_sign": "push {joint} by hand in the direction in which its position grows: the drive's torque has to "
