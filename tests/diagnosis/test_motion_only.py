@@ -44,7 +44,7 @@ from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simul
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
 from armlab.diagnosis.motion.windows import Windows, make_windows
-from armlab.diagnosis.motion.words import motion_lines
+from armlab.diagnosis.motion.words import error_phrase, motion_lines
 from armlab.identification.model_file import read_model
 from armlab.recordings.motion import load_motion_recording
 from armlab.recordings.recording import MotionRun
@@ -94,6 +94,13 @@ def test_held_out_replay_comes_near_the_encoder(diagnosis: MotionDiagnosis) -> N
         assert each.replay_after < 0.1 * each.replay_before
     assert diagnosis.tool[0] is not None
     assert diagnosis.tool[1] < 0.1 * diagnosis.tool[0]
+
+
+def test_a_joint_that_the_simulator_replays_worse_has_its_own_replay_beside_it(diagnosis: MotionDiagnosis) -> None:
+    arm, error = diagnosis.recording.recorded_arm, replace(diagnosis.errors[0], before=3e-3, after=1e-3)
+    worse, alike = (replace(error, replay_before=2e-3, replay_after=each) for each in (2.1e-3, 2.01e-3))
+    assert error_phrase(arm, worse).endswith("; of the joint alone 3 before, 1 after")
+    assert "alone" not in error_phrase(arm, alike)
 
 
 def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis: MotionDiagnosis) -> None:

@@ -368,7 +368,7 @@ def test_a_recording_of_motion_only_is_understood_and_what_needs_torque_refuses_
     assert file.controller is not None
     assert (file.controller.kp, file.controller.kd) == ((7.8,), (None,))
     message = refusal(load_recording, tmp_path)
-    assert "a recording of motion only, which `armlab diagnose` takes" in message
+    assert "`armlab recording check` take a recording of motion only" in message
     assert str(tmp_path / "recording.yaml") in message
 
 

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from textwrap import wrap
 
 from armlab.common.report.numbers import format_unit
 from armlab.common.report.words import join_words
@@ -9,6 +10,7 @@ from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoF
 from armlab.diagnosis.motion.naming import servo_naming
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
 from armlab.diagnosis.motion.witness import CurrentWitness
+from armlab.diagnosis.report.verdict import LINE_WIDTH
 from armlab.diagnosis.report.words import LESS_MASS, format_chance
 from armlab.effects.library import effect_named
 from problem.arm import Arm
@@ -24,6 +26,7 @@ NUMBER_WORDS = {
     "limit_slope": " (falls with speed)",
     "static_excess": " (more at rest)",
 }
+SHOWN_RISE = 1.02  # of a replay error: a smaller one is none
 MAX_LISTED_WORDS = 24  # of the findings with their places in the first sentence; more are named without
 
 
@@ -114,7 +117,7 @@ def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
 def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
     """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint."""
     arm = diagnosis.recording.recorded_arm
-    yield f"{diagnosis.status.upper()}: {summary_of(diagnosis)}"
+    yield from wrap(f"{diagnosis.status.upper()}: {summary_of(diagnosis)}", LINE_WIDTH)
     yield from (f"  {each}" for each in finding_phrases(diagnosis))
     for error in diagnosis.errors:
         yield f"  {error_phrase(arm, error)}"
@@ -158,7 +161,14 @@ def current_phrase(arm: Arm, current: CurrentWitness) -> str:
 
 
 def error_phrase(arm: Arm, error: JointError) -> str:
-    """Replay errors of a joint in one line. arm: with the joints of the recording."""
+    """Replay errors of a joint in one line. arm: with the joints of the recording.
+
+    Where the simulator, which lets joints creep that stick, replays a joint worse with what was found: what each joint
+    replays alone.
+    """
     before = "" if error.replay_before is None else f"{1e3 * error.replay_before:.3g} before, "
     numbers = f"{before}{1e3 * error.replay_after:.3g} after, {1e3 * error.command:.3g} of the command itself"
+    rises = error.replay_before is not None and error.replay_after > SHOWN_RISE * error.replay_before
+    if rises and error.before is not None:
+        numbers += f"; of the joint alone {1e3 * error.before:.3g} before, {1e3 * error.after:.3g} after"
     return f"{joint_in_words(arm, error.joint)}: replay error on held-out runs, mrad: {numbers}"
