@@ -13,7 +13,6 @@ from click.testing import CliRunner
 from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
 
 from armlab.cli.main import main
-from armlab.common.arrays import Array
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
 from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough
@@ -23,6 +22,7 @@ from armlab.diagnosis.motion.compare import compare_motion
 from armlab.diagnosis.motion.compare_write import comparison_page, make_motion_comparison
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.diagnose import (
+    JointTrials,
     MotionDiagnosis,
     ServoFinding,
     diagnose_motion,
@@ -108,11 +108,12 @@ def test_names_that_make_the_replay_of_their_joint_worse_are_withdrawn(diagnosis
     named = [[each for each in diagnosis.findings if each.joint == joint] for joint in (1, 2)]
     held_out = split_runs(diagnosis.recording)[1]
     both, before = (diagnosis.simulation, diagnosis.simulation), diagnosis.replayed_before
-    _, kept, servos, _ = replay_named(both, (spoilt, second), named, (tells_nothing, fail_if_called), before, held_out)
+    trials = JointTrials(lambda joint, values: False, fail_if_called)
+    _, kept, servos, _ = replay_named(both, (spoilt, second), named, trials, before, held_out)
     assert kept == [[], named[1]]
     np.testing.assert_array_equal(servos.values[0], diagnosis.simulation.nominal.values[0])
-    ask = (lambda joint, values: joint == 0, fail_if_called)
-    assert replay_named(both, (spoilt, second), named, ask, before, held_out)[1] == named
+    confirmed = replace(trials, is_confirmed=lambda joint, values: joint == 0)
+    assert replay_named(both, (spoilt, second), named, confirmed, before, held_out)[1] == named
 
 
 def with_spoilt_gain(diagnosis: MotionDiagnosis) -> ChosenServo:
@@ -122,10 +123,6 @@ def with_spoilt_gain(diagnosis: MotionDiagnosis) -> ChosenServo:
     values = first.fit.values.copy()
     values[place("kp")] = 0.01
     return replace(first, fit=replace(first.fit, values=values))
-
-
-def tells_nothing(joint: int, values: Array) -> bool:
-    return False
 
 
 def fail_if_called(*_: object) -> tuple[ChosenServo, list[ServoFinding]]:
@@ -147,7 +144,8 @@ def test_a_single_finding_whose_replay_is_worse_is_tried_alone_and_kept_where_it
         assert first is not None
         return first, named[0]
 
-    chosen, kept, _, _ = replay_named(both, (spoilt, second), named, (tells_nothing, alone), before, held_out)
+    trials = JointTrials(lambda joint, values: False, alone)
+    chosen, kept, _, _ = replay_named(both, (spoilt, second), named, trials, before, held_out)
     assert asked == [(0, named[0][0], spoilt)]
     assert (chosen, kept) == ([first, second], named)
 
@@ -318,6 +316,7 @@ def test_less_friction_is_no_finding_where_steps_of_the_encoder_make_it(
     fit = fit_servo(windows, true, np.array(USUAL))
     print(f"friction {friction}, fitted {fit.values[place('friction')]:.3g} N m")
     assert is_made_by_encoder_steps(windows, fit, place("friction"), base) == made
+    np.testing.assert_array_equal(fit.values[~fit.free], true[~fit.free])  # exactly, so that an infinite limit stays infinite
     assert not is_made_by_encoder_steps(replace(windows, encoder_step=0.0), fit, place("friction"), base)
 
 

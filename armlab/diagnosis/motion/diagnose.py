@@ -316,11 +316,13 @@ def _conclude(
         differs = name_differences(number, each, simulation, windows, mass_error, tuning)
         return [one for one in differs if not (one.is_shorter(sample) or one.is_lead_of(step))]
 
-    def alone(number: int, finding: ServoFinding, each: ChosenServo) -> tuple[ChosenServo, list[ServoFinding]]:
+    def with_one_finding(
+        number: int, finding: ServoFinding, each: ChosenServo
+    ) -> tuple[ChosenServo, list[ServoFinding]]:
         single = each.with_one_finding(PARAMETERS.index(finding.parameter), learned[number], tuning)
         return single, name(number, single)
 
-    def told(number: int, values: Array) -> bool:
+    def is_confirmed(number: int, values: Array) -> bool:
         nominal = _with_payload(simulation.nominal.values[number], -simulation.payload)
         without, with_it = (_stretch_squares(runs[number], each, tuning) for each in (nominal, values))
         return _rise(with_it, without, tuning) > tuning.clearly_worse
@@ -329,7 +331,8 @@ def _conclude(
     known = bool(np.isfinite(simulation.nominal.get("kp")).all())
     before = tuple(replay(given, None, held_out)) if known else ()
     simulations = given, simulation
-    chosen, named, servos, after = replay_named(simulations, fit.chosen, named, (told, alone), before, held_out, tuning)
+    joints = JointTrials(is_confirmed, with_one_finding)
+    chosen, named, servos, after = replay_named(simulations, fit.chosen, named, joints, before, held_out, tuning)
     findings = [finding for own in named for finding in own]
     if payload is not None:
         findings.append(_name_payload(payload, replace(fit, chosen=chosen), judged, tuning))
@@ -366,14 +369,24 @@ def _conclude(
     )
 
 
-TriedAlone = Callable[[int, ServoFinding, ChosenServo], tuple[ChosenServo, list[ServoFinding]]]
+@dataclass(frozen=True)
+class JointTrials:
+    """What is tried of one joint (from 0) whose replay in the simulator is worse with the numbers found.
+
+    is_confirmed: whether the joint alone, in armlab's own replay of whole held-out runs, is clearly better with them
+    than with those of the simulation. with_one_finding: its servo with one finding and nothing else, and what is named
+    then.
+    """
+
+    is_confirmed: Callable[[int, Array], bool]
+    with_one_finding: Callable[[int, ServoFinding, ChosenServo], tuple[ChosenServo, list[ServoFinding]]]
 
 
 def replay_named(
     simulations: tuple[ServoSimulation, ServoSimulation],
     chosen: Sequence[ChosenServo | None],
     named: Sequence[list[ServoFinding]],
-    ask: tuple[Callable[[int, Array], bool], TriedAlone],
+    trials: JointTrials,
     before: tuple[Replayed, ...],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning = DEFAULT,
@@ -384,13 +397,11 @@ def replay_named(
     single finding, that one is tried alone before: other numbers, which are none, may spoil the replay. A whole run of
     sticking joints goes a little another way with any other number: worse is what matters and exceeds the standard
     error over stretches, also with steps so short that the simulator's own error is small. Where the simulation as it
-    is given ends at the encoder's steps, its own error is small enough. Elsewhere a joint keeps its numbers where they
-    are clearly better for it alone, because the simulator lets joints creep that stick.
-    simulations: as it is given, and with a payload that was found. before: replay of the first one. ask: whether whole
-    runs of a joint alone are clearly better with its numbers than with the simulation's; and a servo of a joint with
-    one finding alone, with what is named then.
+    is given ends at the encoder's steps, its own error is small enough. Elsewhere a joint keeps numbers that its own
+    replay confirms, because the simulator lets joints creep that stick.
+    simulations: as it is given, and with a payload that was found. before: replay of the first one.
     """
-    chosen, named, (given, simulation), (told, alone) = list(chosen), list(named), simulations, ask
+    chosen, named, (given, simulation) = list(chosen), list(named), simulations
     sound, tried_alone = set[int](), set[int]()
     exact_before: list[Replayed] = []
     while True:
@@ -404,7 +415,7 @@ def replay_named(
         if rises[worst] <= 1:
             return chosen, named, servos, after
         trusted = _is_at_floor(before, worst, tuning)
-        if not trusted and told(worst, values[worst]):
+        if not trusted and trials.is_confirmed(worst, values[worst]):
             sound.add(worst)
             continue
         exact_before = exact_before or replay(given, None, held_out, EXACT_STEPS)
@@ -415,7 +426,7 @@ def replay_named(
         elif own is None or worst in tried_alone or len(named[worst]) != 1:
             named[worst] = []
         else:
-            chosen[worst], named[worst] = alone(worst, named[worst][0], own)
+            chosen[worst], named[worst] = trials.with_one_finding(worst, named[worst][0], own)
             tried_alone.add(worst)
 
 

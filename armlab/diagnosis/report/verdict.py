@@ -50,12 +50,11 @@ def verdict_sentences(diagnosis: Diagnosis) -> tuple[str, str]:
         return setup, physics if diagnosis.claims else diagnosis.summary.removeprefix(setup).strip()
     if diagnosis.status == "inconclusive":
         return "These recordings allow no verdict.", diagnosis.summary
-    worst = max(diagnosis.fit, key=lambda each: each.after, default=None)
-    simulation = diagnosis.simulation
-    if diagnosis.status == "none" and not diagnosis.fit:
-        return diagnosis.summary, ""  # physics was not asked
     if diagnosis.status == "none":
-        size = "" if worst is None else _largest_error_text(worst, simulation.arm)
+        if not diagnosis.fit:  # physics was not asked
+            return diagnosis.summary, ""
+        worst, simulation = max(diagnosis.fit, key=lambda each: each.after), diagnosis.simulation
+        size = _largest_error_text(worst, simulation.arm)
         left = f"The largest error on held-out data is {size}." if size else ""
         return f"Nothing is missing: {model_in_words(simulation)} explains the recordings down to their noise.", left
     return _findings_and_gain(diagnosis)

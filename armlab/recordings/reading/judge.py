@@ -103,12 +103,14 @@ class Judge:
         """Whether a joint (from 0) travels more as far as the other joints of its kind do, where there are any."""
         kinds = [each.kind for each in reading.arm.joints]
         others = [place for place, kind in enumerate(kinds) if kind == kinds[joint] and place != joint]
+        if not others:
+            return True
         before, after = (
             np.log(np.maximum(np.ptp(self.fitter.columns(each).motion.position, axis=0), SMALLEST))
             for each in (parent, reading)
         )
-        usual = float(np.median(before[others])) if others else 0.0
-        return not others or bool(abs(after[joint] - usual) < abs(before[joint] - usual))
+        usual = float(np.median(before[others]))
+        return bool(abs(after[joint] - usual) < abs(before[joint] - usual))
 
     def _size_mismatch(self, reading: Reading) -> float:
         """Sum over joints of the logarithms between the scatter of the torque and that of the links as given."""
