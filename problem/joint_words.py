@@ -7,7 +7,7 @@ from 1, and link 2 is what joint 2 moves.
 import re
 from collections.abc import Sequence
 
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import join_words
 from problem.arm import Arm
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import join_words
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.report.sentences import findings_in_sentences
 from armlab.diagnosis.report.words import effect_in_words, joint_unit

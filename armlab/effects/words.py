@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from armlab.common.report.numbers import format_number, format_unit
+from armlab.common.report.wording import format_number, format_unit
 from armlab.effects.contract import Candidate
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue

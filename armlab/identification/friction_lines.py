@@ -6,8 +6,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from armlab.common.errors import InputError
-from armlab.common.report.numbers import format_number, format_unit
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import format_number, format_unit, join_words
 from armlab.effects.contract import COULOMB_LEVEL, VISCOUS_COEFFICIENT
 from armlab.effects.model import FittedEffect
 from armlab.identification.torque_model import TorqueModel

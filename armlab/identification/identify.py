@@ -10,9 +10,9 @@ import pandas as pd
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
-from armlab.common.report.numbers import format_number, format_unit
 from armlab.common.report.page import Table, png_address, render_page
 from armlab.common.report.palette import figure_style
+from armlab.common.report.wording import format_number, format_unit
 from armlab.identification.identifier import Identifier
 from armlab.identification.model import Model
 from armlab.identification.model_file import model_content, model_text

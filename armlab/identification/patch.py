@@ -14,7 +14,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import join_words
 from armlab.common.xml_text import XmlNode, read_xml_text
 from armlab.identification.export import (
     INERTIA_NAMES,

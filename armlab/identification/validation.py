@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.common.report.numbers import format_number
+from armlab.common.report.wording import format_number
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.filters import LowPass

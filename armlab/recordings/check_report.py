@@ -12,9 +12,9 @@ from matplotlib.ticker import NullFormatter
 from armlab.common.arrays import Array
 from armlab.common.files import write_whole
 from armlab.common.report import palette
-from armlab.common.report.numbers import count_of
 from armlab.common.report.page import png_address, render_page
 from armlab.common.report.palette import figure_style, series_style
+from armlab.common.report.wording import count_of
 from armlab.recordings.check import CheckResult
 from armlab.recordings.cutoff import CutoffChoice
 from armlab.recordings.differentiate import Signals, differentiate

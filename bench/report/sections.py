@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import yaml
 
-from armlab.common.report.numbers import count_of
 from armlab.common.report.page import Table
+from armlab.common.report.wording import count_of
 from bench.report.analysis import Cell
 from bench.result_sets.result_set import ResultSet
 from bench.statistics.critical_difference import ERROR_RATE, CriticalDifference

@@ -316,7 +316,9 @@ def test_less_friction_is_no_finding_where_steps_of_the_encoder_make_it(
     fit = fit_servo(windows, true, np.array(USUAL))
     print(f"friction {friction}, fitted {fit.values[place('friction')]:.3g} N m")
     assert is_made_by_encoder_steps(windows, fit, place("friction"), base) == made
-    np.testing.assert_array_equal(fit.values[~fit.free], true[~fit.free])  # exactly, so that an infinite limit stays infinite
+    np.testing.assert_array_equal(
+        fit.values[~fit.free], true[~fit.free]
+    )  # exactly, so that an infinite limit stays infinite
     assert not is_made_by_encoder_steps(replace(windows, encoder_step=0.0), fit, place("friction"), base)
 
 

@@ -11,7 +11,7 @@ from simulated_arm import RATE_HZ, arm, run, structure, truth
 from armlab.cli.diagnosis import export_model, real
 from armlab.cli.identification import coverage, identify, predict
 from armlab.common.errors import InputError
-from armlab.common.report.numbers import format_number
+from armlab.common.report.wording import format_number
 from armlab.identification.model import Model
 from armlab.identification.validation import filter_in_words
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording

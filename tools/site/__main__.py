@@ -1,12 +1,19 @@
 """`python -m tools.site OUT`: writes the sources of the site beside OUT and builds it; every warning is an error."""
 
 import argparse
+import shutil
 import sys
 from pathlib import Path
 
 from sphinx.cmd.build import build_main
 
-from tools.site.source import write_source
+from tools.site.commands import command_pages
+from tools.site.formats import format_pages
+from tools.site.gallery import gallery_pages
+from tools.site.interface import interface_pages
+
+ROOT = Path(__file__).parents[2]
+FROM_ROOT = {"CHANGELOG.md": "changelog.md", "CONTRIBUTING.md": "contributing.md"}
 
 
 def main() -> int:
@@ -18,6 +25,19 @@ def main() -> int:
     write_source(chosen.source)
     strict = ["--fail-on-warning", "--keep-going", "--quiet", "--fresh-env"]
     return build_main([*strict, "--builder", "html", str(chosen.source), str(chosen.out)])
+
+
+def write_source(folder: Path) -> None:
+    """Writes all sources into a folder; what the folder held is removed."""
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(ROOT / "docs", folder, ignore=shutil.ignore_patterns(".*"))
+    for name, page in FROM_ROOT.items():
+        text = (ROOT / name).read_text(encoding="utf-8")
+        (folder / page).write_text(text.replace("](docs/", "]("), encoding="utf-8")
+    for generated in (gallery_pages, command_pages, format_pages, interface_pages):
+        for path, content in generated().items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(content if isinstance(content, bytes) else content.encode())
 
 
 if __name__ == "__main__":

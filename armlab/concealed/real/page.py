@@ -9,8 +9,8 @@ import pandas as pd
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report import palette
-from armlab.common.report.numbers import count_of
 from armlab.common.report.palette import svg_text
+from armlab.common.report.wording import count_of
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
 from armlab.concealed.real.score import (
     ANSWERS,

@@ -33,9 +33,8 @@ from armlab.common.report.charts import (
     svg_picture,
     svg_text,
 )
-from armlab.common.report.numbers import format_number, format_unit
 from armlab.common.report.page import Table, render_page
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import format_number, format_unit, join_words
 from armlab.diagnosis.compare.comparison import Comparison, compare
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
 from armlab.diagnosis.compare.named import ONE_FACTOR, NamedChange

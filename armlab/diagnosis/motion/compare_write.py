@@ -7,8 +7,8 @@ from pathlib import Path
 from armlab.common.documents import ResultLines
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
-from armlab.common.report.numbers import format_unit
 from armlab.common.report.page import Table, render_page
+from armlab.common.report.wording import format_unit
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
     ChangeEntry,

@@ -4,8 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
-from armlab.common.report.numbers import format_unit
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import format_unit, join_words
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
 from armlab.diagnosis.motion.naming import servo_naming
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS

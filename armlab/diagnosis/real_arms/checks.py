@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from armlab.common.errors import InputError
-from armlab.common.report.numbers import format_number, format_unit
+from armlab.common.report.wording import format_number, format_unit
 from armlab.diagnosis.real_arms.direct_reading import DirectLevel, direct_levels
 from armlab.diagnosis.real_arms.judged_run import joint_rms
 from armlab.diagnosis.real_arms.study import ArmStudy

@@ -6,7 +6,7 @@ from io import StringIO
 import pandas as pd
 
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.common.report.numbers import format_number
+from armlab.common.report.wording import format_number
 from armlab.diagnosis.real_arms.checks import MIN_FRICTION_SHARE, Check, mass_agreement, mass_claims, named_mass
 from armlab.diagnosis.real_arms.checks import numbers_in_words as claim_numbers
 from armlab.diagnosis.real_arms.direct_reading import MIDDLE

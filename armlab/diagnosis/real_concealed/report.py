@@ -15,8 +15,8 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.report import palette
-from armlab.common.report.numbers import format_number, format_unit
 from armlab.common.report.palette import svg_text
+from armlab.common.report.wording import format_number, format_unit
 from armlab.common.settings import suggest_name
 from armlab.diagnosis.real_concealed.examine import Outcome, ReportedFinding, open_outcomes
 from armlab.diagnosis.real_concealed.judge import Answer, CaseVerdict, ComparedNumber, JudgedPart

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import join_words
 from armlab.common.statistics import wilson_interval
 from armlab.diagnosis.relations.relations import NULL_PAIRS, RELATIONS, Desk, Outcome, check_relation
 from armlab.diagnosis.stored import code_digest, recording_digest

@@ -6,9 +6,8 @@ from importlib.metadata import version
 
 from markupsafe import Markup
 
-from armlab.common.report.numbers import count_of, format_number
 from armlab.common.report.page import Table
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import count_of, format_number, join_words
 from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.diagnosis.report.words import (

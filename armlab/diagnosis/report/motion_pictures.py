@@ -19,8 +19,7 @@ from armlab.common.report.charts import (
     draw_chart,
     fit_axis,
 )
-from armlab.common.report.numbers import format_number
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import format_number, join_words
 from armlab.diagnosis.report.words import shorten_name
 from armlab.diagnosis.resimulate import WINDOW_SECONDS, NoInertiaError, Resimulation, resimulate
 from armlab.diagnosis.result import Diagnosis

@@ -12,8 +12,7 @@ from itertools import starmap
 
 import numpy as np
 
-from armlab.common.report.numbers import format_unit
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import format_unit, join_words
 from armlab.diagnosis.report.words import (
     effect_in_words,
     format_fixed,

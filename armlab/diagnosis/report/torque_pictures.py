@@ -36,7 +36,7 @@ from armlab.common.report.charts import (
     svg_text,
     text_width,
 )
-from armlab.common.report.numbers import format_number
+from armlab.common.report.wording import format_number
 from armlab.diagnosis.report.residuals import ShownResiduals, bin_means, clearest_stretch, residual_without, space_rows
 from armlab.diagnosis.report.words import claim_name, joint_unit, shorten_name
 from armlab.diagnosis.result import Claim, Diagnosis

@@ -6,7 +6,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from armlab.common.report.numbers import count_of, format_number
+from armlab.common.report.wording import count_of, format_number
 from armlab.diagnosis.report.residuals import (
     ShownResiduals,
     correlation_seconds,

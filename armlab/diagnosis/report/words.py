@@ -7,8 +7,7 @@ from string import Formatter
 
 import numpy as np
 
-from armlab.common.report.numbers import format_number, format_unit
-from armlab.common.report.words import join_words
+from armlab.common.report.wording import format_number, format_unit, join_words
 from armlab.diagnosis.result import Claim, Member, Rival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.simulation import Simulation

@@ -1,6 +1,7 @@
-"""Numbers and units as people write them."""
+"""Numbers, units and lists as people write them."""
 
 import math
+from collections.abc import Sequence
 
 
 def format_number(value: float, digits: int = 3) -> str:
@@ -24,3 +25,8 @@ def format_unit(text: str) -> str:
 def count_of(number: int, what: str) -> str:
     """`1 joint`, `2 joints`."""
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def join_words(parts: Sequence[str], last: str = "and") -> str:
+    """a, b and c."""
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} {last} {parts[-1]}"
