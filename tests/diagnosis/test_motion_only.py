@@ -35,11 +35,11 @@ from armlab.diagnosis.motion.estimate import fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
-from armlab.diagnosis.motion.payload import JointModel, estimate_mass
 from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
+from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
@@ -547,6 +547,17 @@ def test_a_mass_that_all_joints_tell_is_no_rival_at_one_joint(soft: Path) -> Non
     assert rivals[2] == rivals[0] - {place("payload")}
 
 
+def test_a_limit_that_was_free_and_never_acts_has_no_rivals(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
+    start = NEUTRAL.copy()
+    start[[place("kp"), place("damping"), place("friction"), place("delay")]] = 8.0, 0.5, 0.1, 0.0203
+    fit = fit_servo(windows, start, np.array(USUAL))
+    free = fit.free.copy()
+    free[place("limit")] = True
+    assert confused_parameters(windows, replace(fit, free=free)).keys() == confused_parameters(windows, fit).keys()
+
+
 def test_windows_that_are_replayed_together_do_not_touch_each_other(soft: Path) -> None:
     recording = load_motion_recording(soft)
     windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
@@ -736,10 +747,38 @@ def test_a_joint_that_does_not_carry_the_tool_says_nothing_of_a_mass_there(soft:
     carrying = JointModel(windows, values, free)
     rounding = 1e-18 * np.ones_like(windows.unit_load)
     upright = JointModel(replace(windows, unit_load=rounding, unit_inertia=rounding), values, free)
-    alone = estimate_mass([carrying], DEFAULT)
+    alone = estimate_shared(TOOL_MASS, [carrying], DEFAULT)
     assert alone[1] > 1e-6
-    assert estimate_mass([upright, carrying], DEFAULT) == alone
-    assert estimate_mass([upright], DEFAULT) == (0.0, np.inf)
+    assert estimate_shared(TOOL_MASS, [upright, carrying], DEFAULT) == alone
+    assert estimate_shared(TOOL_MASS, [upright], DEFAULT) == (0.0, np.inf)
+
+
+def test_a_delay_of_all_commands_is_one_number_where_a_joint_alone_hardly_shows_it(tmp_path: Path) -> None:
+    folder = write_recording(tmp_path / "late", {"delay": 0.006}, seconds=20.0)
+    coarse = 2 * np.pi / 256
+    for file in folder.glob("run-*.csv"):
+        table = pd.read_csv(file)
+        table[["q1", "q2"]] = np.round(table[["q1", "q2"]] / coarse) * coarse
+        table.to_csv(file, index=False)
+    found = diagnose_motion(load_motion_recording(folder))
+    assert [(each.effect, each.joint) for each in found.findings] == [("command_delay", 1), ("command_delay", 2)]
+    assert len({(each.value, each.interval) for each in found.findings}) == 1
+    assert found.findings[0].interval[0] < 0.006 < found.findings[0].interval[1]
+    assert found.servos is not None
+    assert np.ptp(found.servos.get("delay")) == 0
+    assert np.all(found.simulation.nominal.get("delay") == 0)
+    assert found.simulation.delay == 0
+
+
+def test_joints_that_do_not_agree_make_a_shared_number_uncertain(soft: Path) -> None:
+    recording = load_motion_recording(soft)
+    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[1]
+    values, free = NEUTRAL.copy(), np.zeros(len(NEUTRAL), dtype=bool)
+    values[place("kp")] = TRUTH["kp"]
+    joint = JointModel(windows, values, free)
+    alike = estimate_shared(COMMON_DELAY, [joint, joint], DEFAULT)
+    apart = [joint.with_more(COMMON_DELAY.place, more) for more in (-0.004, 0.004)]
+    assert estimate_shared(COMMON_DELAY, apart, DEFAULT)[1] > 2 * alike[1]
 
 
 def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:

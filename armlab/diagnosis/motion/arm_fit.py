@@ -148,8 +148,8 @@ def _choose(fit: ArmFit, joints: Sequence[int], progress: Callable[[str], None])
 
 
 def number_of_tests(joints: int) -> int:
-    """In the diagnosis of an arm, for Bonferroni's correction: each number that is fitted, and one payload."""
-    return joints * (sum(USUAL) + sum(OPTIONAL)) + 1
+    """In the diagnosis of an arm, for Bonferroni's correction: each number of a joint, a payload, a common delay."""
+    return joints * (sum(USUAL) + sum(OPTIONAL)) + 2
 
 
 def _explains(windows: Windows, chosen: ChosenServo, tuning: MotionTuning) -> bool:

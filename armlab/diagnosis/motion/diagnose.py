@@ -6,7 +6,7 @@ commands of the held-out runs through the simulation before and after (`replay`)
 """
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -22,10 +22,19 @@ from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import settle, thin_windows
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.joint_replay import joint_errors
-from armlab.diagnosis.motion.payload import JointModel, Payload, estimate_mass, weigh_tool
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
 from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, ServoParameter, Servos, place
+from armlab.diagnosis.motion.shared_number import (
+    COMMON_DELAY,
+    TOOL_MASS,
+    FoundNumber,
+    JointModel,
+    cost_of,
+    estimate_shared,
+    weigh,
+    with_more,
+)
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.windows import Windows, make_windows, smallest_step, window_stretches
@@ -66,6 +75,11 @@ class ServoFinding:
     def is_lead_of(self, step: float) -> bool:
         """Whether it may be a lead of half a step, s, of a simulator, whose integration makes that."""
         return self.effect == "channel_skew" and self.value > 0 and self.interval[0] < step / 2
+
+    @property
+    def holds_nominal(self) -> bool:
+        """Whether the interval holds the simulation's number."""
+        return self.interval[0] <= self.nominal <= self.interval[1]
 
     @property
     def equation(self) -> str:
@@ -149,14 +163,14 @@ def diagnose_motion(
         simulation = replace(given, rate_hz=None)
     bare_simulation = replace(given, rate_hz=simulation.rate_hz)
 
-    def conclude(fit: ArmFit, payload: Payload | None) -> MotionDiagnosis:
+    def conclude(fit: ArmFit, shared: Sequence[FoundNumber]) -> MotionDiagnosis:
         taken = hold_commands(held_out, given, fit.values, tuning) if held else held_out
         judged = coupled_windows(taken, fit.simulation, fit.values, fit.tuning)
         whole = replace(fit.tuning, wanted_windows=1, longest_window_s=np.inf)
         runs = coupled_windows(taken, fit.simulation, fit.values, whole)
         kept = replace(fit, chosen=_without_worse(fit, runs, tuning))
         placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
-        return _conclude(recording, bare_simulation, (placed, payload), (judged, runs), taken, tuning)
+        return _conclude(recording, bare_simulation, (placed, shared), (judged, runs), taken, tuning)
 
     def taken(servos: Sequence[Array | None]) -> Sequence[MotionRun]:
         return hold_commands(learned, given, servos, tuning) if held else learned
@@ -165,12 +179,13 @@ def diagnose_motion(
     if not any(fit.chosen):
         return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
     progress("replaying held-out runs")
-    concluded = conclude(fit, None)
-    progress("weighing the tool")
-    loaded = weigh_tool(taken, fit, progress)
-    if loaded is not None:
-        with_mass = conclude(*loaded)
-        concluded = with_mass if replays_as_well(with_mass, concluded, tuning) else concluded
+    concluded = conclude(fit, ())
+    for each, shared in _with_shared_numbers(taken, fit, progress):
+        tried = conclude(each, shared)
+        named = {finding.parameter.key for finding in tried.findings}
+        if all(own.number.key in named for own in shared) and replays_as_well(tried, concluded, tuning):
+            concluded = tried
+            break
     if concluded.servos is None:
         return concluded
     return replace(
@@ -179,6 +194,27 @@ def diagnose_motion(
         odd=tuple(_odd_stretches(learned, concluded.chosen, tuning)),
         seconds=time.perf_counter() - started,
     )
+
+
+def _with_shared_numbers(
+    taken: Callable[[Sequence[Array | None]], Sequence[MotionRun]],
+    bare: ArmFit,
+    progress: Callable[[str], None],
+) -> list[tuple[ArmFit, tuple[FoundNumber, ...]]]:
+    """The arm with numbers that all joints share and that servos alone do not explain as well, the best first.
+
+    A delay of all commands, a mass at the tool, or both. taken: as `fit_arm` has it. bare: without them.
+    """
+    found = list[tuple[ArmFit, tuple[FoundNumber, ...]]]()
+    progress(COMMON_DELAY.doing)
+    late = weigh(COMMON_DELAY, taken, bare, progress)
+    progress(TOOL_MASS.doing)
+    loaded = weigh(TOOL_MASS, taken, bare, progress)
+    if late is not None and loaded is not None:
+        both = weigh(TOOL_MASS, taken, late[0], progress)
+        found += [] if both is None else [(both[0], (late[1], both[1]))]
+    found += [(fit, (number,)) for fit, number in filter(None, (late, loaded))]
+    return sorted(found, key=lambda each: cost_of(each[0], bare))
 
 
 def reason_unusable(recording: MotionRecording) -> str | None:
@@ -264,24 +300,24 @@ def _place_damping(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning)
     return out
 
 
-def replays_as_well(loaded: MotionDiagnosis, bare: MotionDiagnosis, tuning: MotionTuning) -> bool:
-    """Whether held-out runs replay with a mass at the tool not clearly worse, over all joints, than without it.
+def replays_as_well(shared: MotionDiagnosis, bare: MotionDiagnosis, tuning: MotionTuning) -> bool:
+    """Whether held-out runs replay with a shared number not clearly worse, over all joints, than without it.
 
-    Many numbers of servos fit the simulator's own error, too, which one mass cannot: worse is what is worse also with
-    steps so short that this error is small, unless each joint alone, whose replay sticks exactly, replays clearly
-    better with the mass, and the simulator does not end at the encoder's steps without it.
+    Many numbers of servos fit the simulator's own error, too, which one shared number cannot: worse is what is worse
+    also with steps so short that this error is small, unless each joint alone, whose replay sticks exactly, replays
+    clearly better with it, and the simulator does not end at the encoder's steps without it.
     """
-    if loaded.servos is None or bare.servos is None:
+    if shared.servos is None or bare.servos is None:
         return bare.servos is None
-    whole = _stretches_of_replays(bare.replayed_after, loaded.replayed_after, tuning)
+    whole = _stretches_of_replays(bare.replayed_after, shared.replayed_after, tuning)
     if not _is_clearly_worse(*whole, tuning):
         return True
     trusted = all(_is_at_floor(bare.replayed_after, joint, tuning) for joint in range(len(bare.chosen)))
-    if not trusted and _is_clearly_worse(loaded.replayed_alone, bare.replayed_alone, tuning):
+    if not trusted and _is_clearly_worse(shared.replayed_alone, bare.replayed_alone, tuning):
         return True
     without, with_it = (
         replay(each.simulation, each.servos, [own.run for own in each.replayed_after], EXACT_STEPS)
-        for each in (bare, loaded)
+        for each in (bare, shared)
     )
     return not _is_clearly_worse(*_stretches_of_replays(without, with_it, tuning), tuning)
 
@@ -295,18 +331,19 @@ def _is_clearly_worse(without: Array, with_it: Array, tuning: MotionTuning) -> b
 def _conclude(
     recording: MotionRecording,
     given: ServoSimulation,
-    found: tuple[ArmFit, Payload | None],
+    found: tuple[ArmFit, Sequence[FoundNumber]],
     parts: tuple[Sequence[Windows], Sequence[Windows]],
     held_out: Sequence[MotionRun],
     tuning: MotionTuning,
 ) -> MotionDiagnosis:
     """Findings, replays and errors.
 
-    given: the simulation to be judged; found: servos and payload. parts: the held-out runs in windows, and whole.
+    given: the simulation to be judged; found: servos, and numbers that all joints share. parts: the held-out runs in
+    windows, and whole.
     """
-    (fit, payload), (judged, runs) = found, parts
+    (fit, shared), (judged, runs) = found, parts
     simulation, learned = fit.simulation, fit.windows
-    mass_error = np.inf if payload is None else payload.error
+    mass_error = min((each.error for each in shared if each.number is TOOL_MASS), default=np.inf)
     holds = recording.controller is not None and recording.controller.rate_hz is not None
     sample = max(1 / run.rate_hz for run in held_out) if holds else 0.0
     step = float(given.model().opt.timestep)
@@ -314,7 +351,10 @@ def _conclude(
     def name(number: int, each: ChosenServo) -> list[ServoFinding]:
         windows = learned[number], judged[number]
         differs = name_differences(number, each, simulation, windows, mass_error, tuning)
-        return [one for one in differs if not (one.is_shorter(sample) or one.is_lead_of(step))]
+        return [one for one in _with_given_delay(differs, given, simulation.delay) if is_told(one)]
+
+    def is_told(finding: ServoFinding) -> bool:
+        return not (finding.is_shorter(sample) or finding.is_lead_of(step))
 
     def with_one_finding(
         number: int, finding: ServoFinding, each: ChosenServo
@@ -323,7 +363,7 @@ def _conclude(
         return single, name(number, single)
 
     def is_confirmed(number: int, values: Array) -> bool:
-        nominal = _with_payload(simulation.nominal.values[number], -simulation.payload)
+        nominal = with_more(given.nominal.values[number], TOOL_MASS.place, -simulation.payload)
         without, with_it = (_stretch_squares(runs[number], each, tuning) for each in (nominal, values))
         return _rise(with_it, without, tuning) > tuning.clearly_worse
 
@@ -334,27 +374,33 @@ def _conclude(
     joints = JointTrials(is_confirmed, with_one_finding)
     chosen, named, servos, after = replay_named(simulations, fit.chosen, named, joints, before, held_out, tuning)
     findings = [finding for own in named for finding in own]
-    if payload is not None:
-        findings.append(_name_payload(payload, replace(fit, chosen=chosen), judged, tuning))
+    fit = replace(fit, chosen=chosen)
+    for each in shared:
+        if each.number is TOOL_MASS:
+            found_shared = [_name_payload(each, fit, judged, tuning)]
+        else:
+            found_shared = [one for one in _name_delay(each, fit, judged, findings, tuning) if is_told(one)]
+        findings += [one for one in found_shared if not one.holds_nominal]
     errors = tuple(
-        _errors(number, simulation, servos, judged[number], before, after, held_out) for number in range(len(chosen))
+        _errors(number, simulations, servos, judged[number], before, after, held_out) for number in range(len(chosen))
     )
     follows = {each.joint: each.follows_command(tuning) for each in errors}
     if not any(follows.values()):
-        return MotionDiagnosis(recording, simulation, "inconclusive", NO_SERVO)
-    findings = [each for each in findings if follows[each.joint] or each.effect == "payload"]
+        return MotionDiagnosis(recording, given, "inconclusive", NO_SERVO)
+    findings = [each for each in findings if follows[each.joint] or each.parameter.key == TOOL_MASS.key]
     status, reason = _status(findings, errors, chosen, tuning.same_error if known else None)
     tools = [
         float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
         for part in (before, after)
         if part
     ]
+    simulation = replace(simulation, nominal=given.nominal, delay=0.0)
     return MotionDiagnosis(
         recording=recording,
         simulation=simulation,
         status=status,
         reason=reason,
-        chosen=tuple(chosen),
+        chosen=tuple(_with_given_nominal(chosen, given)),
         servos=servos,
         findings=tuple(findings),
         errors=errors,
@@ -557,16 +603,15 @@ def name_differences(
     return found
 
 
-def _name_payload(payload: Payload, fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> ServoFinding:
+def _name_payload(payload: FoundNumber, fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> ServoFinding:
     """The mass at the tool, fitted once more beside the numbers that each joint's servo has in the end."""
-    models = [
-        JointModel(joint.with_integral(each.fit.integral), each.fit.values, each.fit.free)
-        for joint, each in zip(fit.windows, fit.chosen, strict=True)
-        if each is not None
-    ]
-    more, error = estimate_mass(models, tuning)
+    more, error = estimate_shared(payload.number, [each for each in _models_of(fit) if each is not None], tuning)
     parameter, half = PARAMETERS[place("payload")], float(student.ppf(0.975, max(payload.windows - 1, 1))) * error
-    before, after = _errors_without_and_with(payload, fit, judged)
+    joints = [(judged[number], values) for number in payload.squares if (values := fit.values[number]) is not None]
+    errors = [
+        [_settled_errors(joint, with_more(values, TOOL_MASS.place, less)) for joint, values in joints]
+        for less in (-fit.simulation.payload, 0.0)
+    ]
     mass = fit.simulation.payload + more
     return ServoFinding(
         parameter=parameter,
@@ -576,27 +621,89 @@ def _name_payload(payload: Payload, fit: ArmFit, judged: Sequence[Windows], tuni
         value=mass,
         interval=(mass - half, mass + half),
         nominal=0.0,
-        before=before,
-        after=after,
-        p_value=min(payload.gain.p_value * TESTS_OF_GAIN * number_of_tests(len(judged)), 1.0),
+        before=_rms(np.concatenate(errors[0])),
+        after=_rms(np.concatenate(errors[1])),
+        p_value=_corrected_chance(payload, len(judged)),
         rivals=parameter.rivals,
     )
 
 
-def _errors_without_and_with(payload: Payload, fit: ArmFit, judged: Sequence[Windows]) -> tuple[float, float]:
-    """Error on held-out windows of the joints that carry a mass at the tool, without and with it, rad."""
-    joints = [(judged[number], fit.values[number]) for number in payload.squares]
-    errors = []
-    for mass in (-fit.simulation.payload, 0.0):
-        rows = [(joint, _with_payload(values, mass)) for joint, values in joints if values is not None]
-        errors.append(_rms(np.concatenate([_settled_errors(joint, values) for joint, values in rows])))
-    return errors[0], errors[1]
+def _name_delay(
+    delay: FoundNumber, fit: ArmFit, judged: Sequence[Windows], named: Sequence[ServoFinding], tuning: MotionTuning
+) -> list[ServoFinding]:
+    """The delay of all commands at each joint that has no delay of its own, fitted once more beside the other numbers.
+
+    named: what joints have of their own.
+    """
+    own = {each.joint - 1 for each in named if each.parameter.key == COMMON_DELAY.key}
+    models = {
+        number: replace(each, values=COMMON_DELAY.without_own(each.values, fit.simulation.nominal.values[number]))
+        for number, each in enumerate(_models_of(fit))
+        if each is not None and number not in own
+    }
+    more, error = estimate_shared(delay.number, list(models.values()), tuning)
+    parameter, half = PARAMETERS[COMMON_DELAY.place], float(student.ppf(0.975, max(delay.windows - 1, 1))) * error
+    found = []
+    for number, model in models.items():
+        given = float(fit.simulation.nominal.get("delay")[number]) - fit.simulation.delay
+        seconds = given + fit.simulation.delay + more
+        said = _named(parameter, seconds, (seconds - half, seconds + half), given)
+        before, after = (
+            _rms(_settled_errors(judged[number], with_more(model.values, COMMON_DELAY.place, less)))
+            for less in (-fit.simulation.delay, 0.0)
+        )
+        found.append(
+            ServoFinding(
+                parameter=parameter,
+                effect=said.effect,
+                name=said.name,
+                joint=number + 1,
+                value=said.value,
+                interval=said.ends,
+                nominal=said.nominal,
+                before=before,
+                after=after,
+                p_value=_corrected_chance(delay, len(judged)),
+                rivals=tuple(each for each in (parameter.effect, *parameter.rivals) if each != said.effect),
+            )
+        )
+    return found
 
 
-def _with_payload(values: Array, mass: float) -> Array:
-    changed = values.copy()
-    changed[place("payload")] = mass
-    return changed
+def _models_of(fit: ArmFit) -> list[JointModel | None]:
+    """Each joint with its servo in the end; None without one."""
+    return [
+        None if each is None else JointModel(joint.with_integral(each.fit.integral), each.fit.values, each.fit.free)
+        for joint, each in zip(fit.windows, fit.chosen, strict=True)
+    ]
+
+
+def _corrected_chance(found: FoundNumber, joints: int) -> float:
+    """P-value of no gain of a number that all joints share, corrected for all tests."""
+    return min(found.gain.p_value * TESTS_OF_GAIN * number_of_tests(joints), 1.0)
+
+
+def _with_given_delay(findings: Sequence[ServoFinding], given: ServoSimulation, delay: float) -> Iterator[ServoFinding]:
+    """The findings of a joint, a delay of its own beside that of the simulation that is given, from which it differs.
+
+    delay: of all commands, which they were judged beside, s.
+    """
+    for each in findings:
+        if delay and each.parameter.key == COMMON_DELAY.key:
+            each = replace(each, nominal=float(given.nominal.get("delay")[each.joint - 1]))
+            if each.holds_nominal:
+                continue
+        yield each
+
+
+def _with_given_nominal(chosen: Sequence[ChosenServo | None], given: ServoSimulation) -> Iterator[ChosenServo | None]:
+    """The servos with the delays of the simulation that is given as nominal ones."""
+    for each, delay in zip(chosen, given.nominal.get("delay"), strict=True):
+        if each is not None:
+            nominal = each.nominal.copy()
+            nominal[COMMON_DELAY.place] = delay
+            each = replace(each, nominal=nominal)
+        yield each
 
 
 @dataclass(frozen=True)
@@ -665,21 +772,24 @@ def _command_error(windows: Windows) -> Array:
 
 def _errors(
     number: int,
-    simulation: ServoSimulation,
+    simulations: tuple[ServoSimulation, ServoSimulation],
     servos: Servos,
     judged: Windows,
     before: Sequence[Replayed],
     after: Sequence[Replayed],
     held_out: Sequence[MotionRun],
 ) -> JointError:
-    nominal = simulation.nominal.values[number]
+    given, simulation = simulations
+    nominal = given.nominal.values[number]
     known = bool(np.isfinite(nominal).all())
     commands = np.concatenate(
         [np.asarray(run.reference_position)[:, number] - run.position[:, number] for run in held_out]
     )
     return JointError(
         joint=number + 1,
-        before=_rms(_settled_errors(judged, _with_payload(nominal, -simulation.payload))) if known else None,
+        before=_rms(_settled_errors(judged, with_more(nominal, TOOL_MASS.place, -simulation.payload)))
+        if known
+        else None,
         after=_rms(_settled_errors(judged, servos.values[number])),
         replay_before=float(joint_rms(before)[number]) if before else None,
         replay_after=float(joint_rms(after)[number]),

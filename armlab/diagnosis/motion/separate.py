@@ -28,7 +28,7 @@ def confused_parameters(
     every[place("limit")] = fit.values[place("limit")] < INFINITE_LIMIT
     slopes = jacobian(windows, fit.values, every)
     columns = dict(zip(np.flatnonzero(every).tolist(), slopes.T, strict=True))
-    fitted = np.flatnonzero(fit.free).tolist()
+    fitted = np.flatnonzero(fit.free & every).tolist()  # a limit that never acts has no slope
     alone = _inverse([columns[number] for number in fitted])
     found: dict[int, list[int]] = {number: [] for number in fitted}
     for first in range(len(fitted)):

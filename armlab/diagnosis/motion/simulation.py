@@ -34,7 +34,8 @@ class ServoSimulation:
     where unknown. joints: places of the recorded joints in the arm. as_given: the MJCF alone is the simulation.
     read_delay: of the position of each recorded joint after its stamp, (joints,), s. rate_hz: how often the command is
     taken over. supply: nominal supply voltage, V, of drives that command a voltage;
-    None for others. payload: mass that is added at the tool, kg.
+    None for others. payload: mass that is added at the tool, kg. delay: what is added to that of each command, s; it is
+    in `nominal`.
     """
 
     arm: Arm
@@ -47,6 +48,7 @@ class ServoSimulation:
     rate_hz: float | None = None
     supply: float | None = None
     payload: float = 0.0
+    delay: float = 0.0
 
     def spec(self) -> Any:
         """The simulation as mujoco.MjSpec, with a position actuator at each joint; their gain is 1 where none was."""
@@ -80,6 +82,12 @@ class ServoSimulation:
         moved = (self.arm.parameters + mass * unit).reshape(-1, 10)
         links = tuple(Link(float(row[0]), tuple(row[1:4].tolist()), tuple(row[4:].tolist())) for row in moved)
         return replace(with_mass, arm=replace(self.arm, links=links))
+
+    def with_delay(self, seconds: float) -> "ServoSimulation":
+        """The simulation whose commands all come later, s."""
+        values = self.nominal.values.copy()
+        values[:, place("delay")] += seconds
+        return replace(self, nominal=Servos(values), delay=self.delay + seconds)
 
     def model(self) -> Any:
         """The same, compiled: mujoco.MjModel."""

@@ -123,7 +123,9 @@ class MotionTuning:
     wound_up_levels: tuple[float, ...] = tuned(
         (0.2, 0.6), unit="of the torque that the motion needs", meaning="starts of the limit of an integral"
     )
-    payload_replays: int = tuned(3, unit="replays", meaning="most replays of the arm for one payload", least=1)
+    shared_replays: int = tuned(
+        3, unit="replays", meaning="most replays of the arm for one number that all joints share", least=1
+    )
     min_gain: float = tuned(
         0.02,
         unit="of the squared error beyond the encoder's noise",
