@@ -31,7 +31,7 @@ from armlab.diagnosis.motion.diagnose import (
     split_runs,
 )
 from armlab.diagnosis.motion.encoder_steps import is_made_by_encoder_steps
-from armlab.diagnosis.motion.estimate import fit_servo
+from armlab.diagnosis.motion.estimate import ServoFit, fit_servo
 from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
@@ -531,12 +531,17 @@ def test_a_limit_acts_on_the_command_before_and_after_its_change_within_a_step(s
         assert np.sqrt(np.mean((paths[0] - paths[1]) ** 2)) < 0.002 * np.std(paths[1])
 
 
-def test_a_mass_that_all_joints_tell_is_no_rival_at_one_joint(soft: Path) -> None:
-    recording = load_motion_recording(soft)
+def fit_first_joint(folder: Path) -> tuple[Windows, ServoFit]:
+    recording = load_motion_recording(folder)
     windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
     start = NEUTRAL.copy()
     start[[place("kp"), place("damping"), place("friction"), place("delay")]] = 8.0, 0.5, 0.1, 0.0203
     fit = fit_servo(windows, start, np.array(USUAL))
+    return windows, fit
+
+
+def test_a_mass_that_all_joints_tell_is_no_rival_at_one_joint(soft: Path) -> None:
+    windows, fit = fit_first_joint(soft)
     tuning = replace(DEFAULT, class_factor=1.01)
     rivals = [
         {each for own in confused_parameters(windows, fit, error, tuning).values() for each in own}
@@ -548,11 +553,7 @@ def test_a_mass_that_all_joints_tell_is_no_rival_at_one_joint(soft: Path) -> Non
 
 
 def test_a_limit_that_was_free_and_never_acts_has_no_rivals(soft: Path) -> None:
-    recording = load_motion_recording(soft)
-    windows = make_windows(recording.with_role("identify"), read_servo_simulation(recording))[0]
-    start = NEUTRAL.copy()
-    start[[place("kp"), place("damping"), place("friction"), place("delay")]] = 8.0, 0.5, 0.1, 0.0203
-    fit = fit_servo(windows, start, np.array(USUAL))
+    windows, fit = fit_first_joint(soft)
     free = fit.free.copy()
     free[place("limit")] = True
     assert confused_parameters(windows, replace(fit, free=free)).keys() == confused_parameters(windows, fit).keys()

@@ -17,7 +17,7 @@ from scipy.stats import t as student
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.diagnosis.motion.arm_fit import ArmFit, fit_arm, number_of_tests
-from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, first_fit, judge_again
+from armlab.diagnosis.motion.choose import TESTS_OF_GAIN, ChosenServo, Gain, first_fit, judge_again
 from armlab.diagnosis.motion.couple import coupled_windows
 from armlab.diagnosis.motion.estimate import settle, thin_windows
 from armlab.diagnosis.motion.hold import hold_commands, holds_samples
@@ -578,28 +578,14 @@ def name_differences(
             said = _name_damping(chosen, simulation.nominal.values[number])
         if parameter.key == "kp":
             said = _with_unknown_clock(said, float(fit.values[place("ki")]), tuning)
-        if said.ends[0] <= said.nominal <= said.ends[1]:
-            continue
         others = [other for other in confused[place_of] if not (chosen.free[other] and np.isfinite(said.nominal))]
         rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in others))
         rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
-        if said.effect != parameter.effect:
-            rivals = (parameter.effect, *rivals)
-        found.append(
-            ServoFinding(
-                parameter=parameter,
-                effect=said.effect,
-                name=said.name,
-                joint=number + 1,
-                value=said.value,
-                interval=said.ends,
-                nominal=said.nominal,
-                before=_rms(error) if np.isfinite(said.nominal) else _rms(_command_error(judged)),
-                after=after,
-                p_value=min(gain.p_value * TESTS_OF_GAIN * number_of_tests(len(simulation.joints)), 1.0),
-                rivals=tuple(dict.fromkeys(each for each in rivals if each != said.effect)),
-            )
+        before = _rms(error) if np.isfinite(said.nominal) else _rms(_command_error(judged))
+        one = said.finding(
+            parameter, number + 1, (before, after), _corrected_chance(gain, len(simulation.joints)), rivals
         )
+        found += [] if one.holds_nominal else [one]
     return found
 
 
@@ -613,19 +599,10 @@ def _name_payload(payload: FoundNumber, fit: ArmFit, judged: Sequence[Windows], 
         for less in (-fit.simulation.payload, 0.0)
     ]
     mass = fit.simulation.payload + more
-    return ServoFinding(
-        parameter=parameter,
-        effect=parameter.effect,
-        name=parameter.name,
-        joint=len(judged),
-        value=mass,
-        interval=(mass - half, mass + half),
-        nominal=0.0,
-        before=_rms(np.concatenate(errors[0])),
-        after=_rms(np.concatenate(errors[1])),
-        p_value=_corrected_chance(payload, len(judged)),
-        rivals=parameter.rivals,
-    )
+    before, after = (_rms(np.concatenate(each)) for each in errors)
+    said = _Said(parameter.effect, parameter.name, mass, (mass - half, mass + half), 0.0)
+    chance = _corrected_chance(payload.gain, len(judged))
+    return said.finding(parameter, len(judged), (before, after), chance, parameter.rivals)
 
 
 def _name_delay(
@@ -652,21 +629,8 @@ def _name_delay(
             _rms(_settled_errors(judged[number], with_more(model.values, COMMON_DELAY.place, less)))
             for less in (-fit.simulation.delay, 0.0)
         )
-        found.append(
-            ServoFinding(
-                parameter=parameter,
-                effect=said.effect,
-                name=said.name,
-                joint=number + 1,
-                value=said.value,
-                interval=said.ends,
-                nominal=said.nominal,
-                before=before,
-                after=after,
-                p_value=_corrected_chance(delay, len(judged)),
-                rivals=tuple(each for each in (parameter.effect, *parameter.rivals) if each != said.effect),
-            )
-        )
+        chance = _corrected_chance(delay.gain, len(judged))
+        found.append(said.finding(parameter, number + 1, (before, after), chance, parameter.rivals))
     return found
 
 
@@ -678,9 +642,9 @@ def _models_of(fit: ArmFit) -> list[JointModel | None]:
     ]
 
 
-def _corrected_chance(found: FoundNumber, joints: int) -> float:
-    """P-value of no gain of a number that all joints share, corrected for all tests."""
-    return min(found.gain.p_value * TESTS_OF_GAIN * number_of_tests(joints), 1.0)
+def _corrected_chance(gain: Gain, joints: int) -> float:
+    """P-value of no gain, corrected for all tests of an arm."""
+    return min(gain.p_value * TESTS_OF_GAIN * number_of_tests(joints), 1.0)
 
 
 def _with_given_delay(findings: Sequence[ServoFinding], given: ServoSimulation, delay: float) -> Iterator[ServoFinding]:
@@ -715,6 +679,33 @@ class _Said:
     value: float
     ends: tuple[float, float]
     nominal: float
+
+    def finding(
+        self,
+        parameter: ServoParameter,
+        joint: int,
+        errors: tuple[float, float],
+        p_value: float,
+        rivals: tuple[str, ...],
+    ) -> ServoFinding:
+        """The finding that says it at a joint, from 1. errors: before and after, rad.
+
+        The effect of the parameter is a rival where the difference has another name.
+        """
+        others = (each for each in (parameter.effect, *rivals) if each != self.effect)
+        return ServoFinding(
+            parameter=parameter,
+            effect=self.effect,
+            name=self.name,
+            joint=joint,
+            value=self.value,
+            interval=self.ends,
+            nominal=self.nominal,
+            before=errors[0],
+            after=errors[1],
+            p_value=p_value,
+            rivals=tuple(dict.fromkeys(others)),
+        )
 
 
 def _named(parameter: ServoParameter, value: float, ends: tuple[float, float], nominal: float) -> _Said:
