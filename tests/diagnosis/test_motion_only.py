@@ -15,7 +15,7 @@ from servo_arms import RATE_HZ, arm_text, commands, simulate, write_recording
 from armlab.cli.main import main
 from armlab.common.files import write_texts
 from armlab.diagnosis.formats import read_verdict_file
-from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough
+from armlab.diagnosis.motion.arm_fit import ArmFit, fine_enough, fit_arm
 from armlab.diagnosis.motion.calm_windows import confirm_in_calm_windows, find_calm_windows
 from armlab.diagnosis.motion.choose import ChosenServo, Gain, choose_servo, learned_errors
 from armlab.diagnosis.motion.compare import compare_motion
@@ -39,7 +39,7 @@ from armlab.diagnosis.motion.replay import joint_rms, replay
 from armlab.diagnosis.motion.report import motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
-from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared
+from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared, weigh
 from armlab.diagnosis.motion.simulation import ServoSimulation, read_servo_simulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.diagnosis.motion.verdict import make_motion_verdict, motion_texts
@@ -754,7 +754,26 @@ def test_a_joint_that_does_not_carry_the_tool_says_nothing_of_a_mass_there(soft:
     assert estimate_shared(TOOL_MASS, [upright], DEFAULT) == (0.0, np.inf)
 
 
-def test_a_delay_of_all_commands_is_one_number_where_a_joint_alone_hardly_shows_it(tmp_path: Path) -> None:
+def test_a_delay_that_no_joint_has_of_its_own_is_one_number_of_all(tmp_path: Path) -> None:
+    recording = load_motion_recording(write_recording(tmp_path / "late", {"delay": 0.006}, seconds=20.0))
+    runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
+    start = simulation.nominal.values.copy()
+    start[:, COMMON_DELAY.place] = 0.006
+    fit = fit_arm(lambda servos: runs, simulation, list(start), lambda message: None)
+    assert weigh(COMMON_DELAY, lambda servos: runs, fit, lambda message: None) is None  # each joint has its own
+    chosen = [
+        None if each is None else each.without(COMMON_DELAY.place, windows)
+        for each, windows in zip(fit.chosen, fit.windows, strict=True)
+    ]
+    found = weigh(COMMON_DELAY, lambda servos: runs, replace(fit, chosen=chosen), lambda message: None)
+    assert found is not None
+    late, shared = found
+    assert shared.simulation.delay == pytest.approx(0.006, abs=1e-3)
+    np.testing.assert_allclose(late.simulation.nominal.get("delay"), late.simulation.delay)
+    assert not any(COMMON_DELAY.place in each.gains for each in late.chosen if each is not None)
+
+
+def test_a_delay_of_all_commands_is_named_at_each_joint_of_coarse_encoders(tmp_path: Path) -> None:
     folder = write_recording(tmp_path / "late", {"delay": 0.006}, seconds=20.0)
     coarse = 2 * np.pi / 256
     for file in folder.glob("run-*.csv"):
@@ -763,10 +782,7 @@ def test_a_delay_of_all_commands_is_one_number_where_a_joint_alone_hardly_shows_
         table.to_csv(file, index=False)
     found = diagnose_motion(load_motion_recording(folder))
     assert [(each.effect, each.joint) for each in found.findings] == [("command_delay", 1), ("command_delay", 2)]
-    assert len({(each.value, each.interval) for each in found.findings}) == 1
-    assert found.findings[0].interval[0] < 0.006 < found.findings[0].interval[1]
-    assert found.servos is not None
-    assert np.ptp(found.servos.get("delay")) == 0
+    assert all(each.interval[0] < 0.006 < each.interval[1] for each in found.findings)
     assert np.all(found.simulation.nominal.get("delay") == 0)
     assert found.simulation.delay == 0
 
