@@ -648,9 +648,9 @@ def _corrected_chance(gain: Gain, joints: int) -> float:
 
 
 def _with_given_delay(findings: Sequence[ServoFinding], given: ServoSimulation, delay: float) -> Iterator[ServoFinding]:
-    """The findings of a joint, a delay of its own beside that of the simulation that is given, from which it differs.
+    """The findings of a joint, its own delay compared with the simulation as given, not with the delay of all commands.
 
-    delay: of all commands, which they were judged beside, s.
+    A delay whose interval holds the given one is left out. delay: of all commands, s.
     """
     for each in findings:
         if delay and each.parameter.key == COMMON_DELAY.key:
