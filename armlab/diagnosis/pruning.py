@@ -12,7 +12,7 @@ from armlab.diagnosis.added_body import (
     predicts_as_well,
 )
 from armlab.diagnosis.evidence import Evidence, Judge
-from armlab.diagnosis.fitted_model import FittedModel, scan_residual, with_design
+from armlab.diagnosis.fitted_model import FittedModel, follow_model, scan_residual, with_design
 from armlab.diagnosis.refine import refine_shapes
 from armlab.diagnosis.search import Search, Step
 from armlab.diagnosis.settings import Settings
@@ -117,13 +117,15 @@ def look_again(pruned: Pruned, withdrawn: frozenset[int]) -> Pruned:
 def scan_what_is_left(pruned: Pruned) -> Pruned:
     """The same with what scans find in what it leaves, where that passes, too, and is more likely in the end.
 
-    The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push.
+    The first scans looked at what links and plain friction leave: what had no name then can hide a gap or a push. Nor
+    were they, or the last round, made with the links that passed: a gap is crossed where the load of these is zero.
     """
     before = pruned[0]
-    design, known = scan_residual(before), frozenset(range(len(before.design.blocks)))
-    if design is before.design:
+    moved = with_design(before, follow_model(before.design, before))
+    design, known = scan_residual(moved), frozenset(range(len(before.design.blocks)))
+    if design is moved.design:
         return pruned
-    model = with_design(before, design)
+    model = with_design(moved, design)
     found = _search_again(model, known, fixed=True)
     if known.issuperset(found.state.groups):
         return pruned

@@ -10,7 +10,7 @@ import pytest
 from armlab.common.arrays import Array
 from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.diagnose import prepare
-from armlab.diagnosis.fitted_model import FittedModel, fit_background, search_effects
+from armlab.diagnosis.fitted_model import FittedModel, fit_background, search_effects, torque_of, with_design
 from armlab.diagnosis.pruning import Pruned, prune, scan_what_is_left
 from armlab.diagnosis.settings import Settings
 from armlab.effects.contract import Family
@@ -55,6 +55,15 @@ def test_a_second_scan_finds_what_the_first_one_did_not_and_keeps_the_rest() -> 
     (ripple,) = (group for group in effects if model.solver.groups[group].candidate.effect == "torque_ripple")
     assert model.solver.groups[ripple].candidate.shape[0] == pytest.approx(24.0, abs=0.2)
     assert model.noise is passed[0].noise
+
+
+def test_a_second_scan_looks_with_the_links_and_the_torque_that_passed() -> None:
+    model, *rest = passed_without_scans(viscous_and_ripple)
+    right = model.design.scenes[0]
+    misled = model.design.with_model(0.5 * right.inertial, lambda scene: np.zeros_like(scene.torque))
+    scene = scan_what_is_left((with_design(model, misled), *rest))[0].design.scenes[0]
+    np.testing.assert_allclose(scene.inertial, right.inertial)
+    np.testing.assert_allclose(scene.torque, torque_of(model)(right))
 
 
 def test_a_second_scan_that_finds_nothing_changes_nothing() -> None:
