@@ -20,7 +20,6 @@ from armlab.concealed.formats import (
     Truth,
     write_model,
 )
-from armlab.concealed.outside import OutsideEffect
 from armlab.concealed.plan import Plan
 from armlab.concealed.simulate import FINE_HZ, absorbed_rotors, law_torque
 from armlab.concealed.sizing import SimulatedCase
@@ -172,7 +171,7 @@ def _effect_facts(effect: HiddenEffect, mixed_up: bool) -> dict[str, Any]:
         "effect": effect.effect,
         "joint": effect.place,
         "joints": effect.joints,
-        "outside": isinstance(effect, OutsideEffect),
+        "outside": effect.is_outside,
         "form": effect.form,
         "obvious_form": effect.form == effect.forms[0],
         "equivalent": effect.equivalent,

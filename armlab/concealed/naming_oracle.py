@@ -159,7 +159,7 @@ def _ask(case: SimulatedCase, number: int) -> OracleAnswer:
         effect=effect.effect,
         form=effect.form,
         joint=effect.place,
-        outside=type(effect) in OUTSIDE,
+        outside=effect.is_outside,
         multiple=case.multiples[number],
         multiple_recorded=float(np.sqrt(power / limit_noncentrality(joints))),
         multiple_away=bench.away.multiple(torque, bench.beside) * scale,
@@ -264,8 +264,8 @@ def _is_right(other: HiddenEffect, effect: HiddenEffect, bench: _Bench) -> bool:
     A law that holds the right one as a limit fits as well, and has more numbers: the simpler one is preferred. Of an
     effect outside the library, the right answer is that it is there: any other law outside says so, too.
     """
-    if type(effect) in OUTSIDE:
-        return type(other) in OUTSIDE
+    if effect.is_outside:
+        return other.is_outside
     if other.place == effect.place and (
         other.effect in (effect.effect, *effect.equivalent) or _holds(type(other), type(effect))
     ):

@@ -1,8 +1,11 @@
 """Effects OUTSIDE the library of the diagnosis, frozen before any diagnosis was run on them.
 
-The right answer to each is `unknown`. They were fixed once, with their equations, and are not to be changed, added
-to or taken away after a result is known. q, v, a: position, velocity, acceleration; tau: motor torque; i: the joint;
-j: another joint; s: the size; R: the rated torque.
+The right answer to each is `unknown`, as long as the library has no name for it. They were fixed once, with their
+equations, and are not to be changed, added to or taken away after a result is known. What the library has learnt since
+counts as an effect of the library (`is_outside`): `flexible_base`.
+
+q, v, a: position, velocity, acceleration; tau: motor torque; i: the joint; j: another joint; s: the size; R: the rated
+torque.
 
 | name | equation |
 |---|---|
@@ -19,21 +22,22 @@ j: another joint; s: the size; R: the rated torque.
 """
 
 from collections.abc import Sequence
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import Machine
 from armlab.concealed.effects.friction import bouc_wen
-from armlab.concealed.effects.hidden import HiddenEffect, smooth_sign, torque_share
+from armlab.concealed.effects.hidden import HiddenEffect, ParameterValues, smooth_sign, torque_share
 from armlab.concealed.engine import Mount, Parts, Pendulum, Track
 
 
 class OutsideEffect(HiddenEffect):
-    """An effect without a name in the library of the diagnosis: no parameter of it can be compared."""
+    """An effect that had no name in the library of the diagnosis when it was frozen; see `is_outside`."""
 
     forms = ("frozen",)
+    is_outside = True
 
 
 def draw_other_joint(rng: np.random.Generator, machine: Machine, joint: int) -> float:
@@ -111,6 +115,9 @@ class FlexibleBase(OutsideEffect):
     """A base on a spring. size: compliance, rad/(N m)."""
 
     effect = "flexible_base"
+    where = "robot"
+    units: ClassVar = {"compliance": "rad/(N.m)"}
+    is_outside = False
 
     @classmethod
     def places(cls, machine: Machine) -> Sequence[int]:
@@ -129,6 +136,9 @@ class FlexibleBase(OutsideEffect):
     @property
     def place(self) -> None:
         return None
+
+    def parameters(self) -> ParameterValues:
+        return {"compliance": self.size}
 
 
 class Slosh(OutsideEffect):

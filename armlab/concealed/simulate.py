@@ -21,7 +21,7 @@ from mujoco import rollout
 from armlab.common.arrays import Array
 from armlab.concealed.arms import with_parameters
 from armlab.concealed.effects.hidden import HiddenEffect, smooth_sign
-from armlab.concealed.engine import Parts, Plant, Track, build_plant
+from armlab.concealed.engine import Mount, Parts, Plant, Track, build_plant
 from armlab.concealed.motions import make_reference, moving_average
 from armlab.concealed.plan import Plan, RunPlan
 from armlab.concealed.sticking import is_carried, play_sticking
@@ -126,7 +126,10 @@ def simulate(arm: Arm, parts: Parts, controller: Controller, reference: Referenc
     step = float(reference.time[1] - reference.time[0])
     made = build_plant(arm, parts, step, (controller.position_gain, controller.velocity_gain))
     control, wanted = servo_torques(controller, reference, taken)
-    states = _roll_out(made, wanted, control, _initial_twists(arm, parts, wanted))
+    twists = _initial_twists(arm, parts, wanted)
+    if parts.mount is not None:
+        twists["mount"] = _settled_mount(made, parts.mount, wanted)
+    states = _roll_out(made, wanted, control, twists)
     return _make_track(made, controller, reference.time, states, control)
 
 
@@ -153,6 +156,15 @@ def _initial_twists(arm: Arm, parts: Parts, wanted: Motion) -> dict[str, float]:
     first = Motion(wanted.position[:1], wanted.velocity[:1], wanted.acceleration[:1])
     load = rigid_body_torque(arm, first)[0]
     return {f"spring{spring.joint}": spring.at_rest(float(load[spring.joint])) for spring in parts.springs}
+
+
+def _settled_mount(made: Plant, mount: Mount, wanted: Motion) -> float:
+    """Angle of a base, rad, whose spring carries the moment of the first state."""
+    data = mujoco.MjData(made.model)
+    data.qpos[made.places], data.qvel[made.dofs] = wanted.position[0], wanted.velocity[0]
+    data.qacc[made.dofs] = wanted.acceleration[0]
+    mujoco.mj_inverse(made.model, data)
+    return -float(data.qfrc_inverse[made.model.joint("mount").dofadr[0]]) / mount.stiffness
 
 
 def _roll_out(made: Plant, wanted: Motion, control: Array, twists: dict[str, float]) -> Array:

@@ -9,7 +9,7 @@ typedef struct {
     double stiffness, damping, gap;
 } DriveTrain;
 void twist_of_drive_train(const DriveTrain *train, int64_t samples, double interval, int half_steps,
-    const double *load, const double *inertia, double *out);
+    const double *load, const double *inertia, const double *by_speed, const double *by_angle, double *out);
 """
 
 ffibuilder = cffi.FFI()

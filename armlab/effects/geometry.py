@@ -9,7 +9,13 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import ANGLE, Candidate, Effect, Family, Parameter, Range, Scene, Value
-from armlab.effects.sensitivity import GEOMETRY_STEP, directional_derivative, geometry_derivative, gravity_derivative
+from armlab.effects.sensitivity import (
+    GEOMETRY_STEP,
+    directional_derivative,
+    geometry_derivative,
+    gravity_derivative,
+    horizontal_directions,
+)
 from armlab.effects.term import EveryJoint, Term, form_from_parameters, format_less, format_number
 from problem.arm import Arm, Joint
 from problem.motion import Motion
@@ -74,7 +80,7 @@ class BaseTilt(Term):
 
     @classmethod
     def at(cls, arm: Arm, joint: int, **details: Any) -> Self:
-        first, second = _across(np.array(arm.gravity))
+        first, second = horizontal_directions(np.array(arm.gravity))
         across = (tuple(first.tolist()), tuple(second.tolist()))
         return cls(None, (), tuple(range(len(arm))), nominal=arm.gravity, across=across, **details)
 
@@ -128,16 +134,6 @@ class TiltFamily(Family):
         self, arm: Arm, joints: tuple[int, ...], parameters: Mapping[str, Value], form: str = ""
     ) -> tuple[Candidate, Array]:
         return form_from_parameters((BaseTilt,), arm, joints, parameters, form)
-
-
-def _across(gravity: Array) -> tuple[Array, Array]:
-    """Two directions across gravity: x and y of the base, where gravity is along z."""
-    strength = np.linalg.norm(gravity)
-    down = gravity / strength if strength else np.array([0.0, 0.0, -1.0])
-    axis = np.eye(3)[1 if abs(down[0]) > 0.9 else 0]
-    first = axis - (axis @ down) * down
-    first /= np.linalg.norm(first)
-    return first, np.cross(-down, first)
 
 
 BASE_TILT = TiltFamily()

@@ -24,6 +24,7 @@ from armlab.effects.geometry import BASE_TILT, ENCODER_OFFSET, GEOMETRY_ERROR
 from armlab.effects.links import INERTIAL_ERROR, PAYLOAD
 from armlab.effects.memory import FRICTION_DRIFT, PRESLIDING
 from armlab.effects.servo import SERVO_EFFECTS
+from armlab.effects.soft_base import FLEXIBLE_BASE
 from armlab.effects.springs import CABLE_STIFFNESS, GRAVITY_COMPENSATOR, TORQUE_RIPPLE
 from armlab.effects.timing import CHANNEL_SKEW, TIME_DELAY
 from armlab.effects.transmission import BACKLASH, JOINT_ELASTICITY
@@ -49,6 +50,7 @@ BUILT_IN: tuple[Family, ...] = (
     PAYLOAD,
     INERTIAL_ERROR,
     BASE_TILT,
+    FLEXIBLE_BASE,
     ENCODER_OFFSET,
     GEOMETRY_ERROR,
     TIME_DELAY,

@@ -9,7 +9,10 @@ from armlab.common.arrays import Array
 from armlab.recordings.recording import Run
 from problem.arm import Arm
 from problem.motion import Motion
+from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import inertia_column, rigid_body_torque
+
+NO_INERTIA = 1e-9  # an eigenvalue of a pseudo-inertia, which rounding leaves of none
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +57,11 @@ class Scene:
         arm, position = self.arm, self.motion.position
         columns = (inertia_column(arm, position, joint, self.inertial)[:, joint] for joint in range(len(arm)))
         return np.column_stack(list(columns))
+
+    @cached_property
+    def has_bodies(self) -> bool:
+        """Whether the links of the present model could exist; a fit of base parameters need not."""
+        return bool(np.all(least_eigenvalues(self.inertial) > -NO_INERTIA))
 
     @property
     def step(self) -> float:

@@ -40,6 +40,25 @@ def directional_derivative(scene: Scene, change: Motion) -> Array:
     return (forwards - backwards) / (2 * step)
 
 
+def own_torque_slopes(scene: Scene, joint: int) -> tuple[Array, Array]:
+    """By how much the rigid torque of a joint (from 0) grows with its own angle and with its own speed, (samples,).
+
+    N m/rad and N m s/rad (N/m, N s/m).
+    """
+    motion, ends = scene.motion, []
+    for sign in (1, -1):
+        position, velocity = motion.position.copy(), motion.velocity.copy()
+        position[:, joint] += sign * MOTION_STEP
+        velocity[:, joint] += sign * MOTION_STEP
+        changed = (
+            Motion(position, motion.velocity, motion.acceleration),
+            Motion(motion.position, velocity, motion.acceleration),
+        )
+        ends.append([rigid_body_torque(scene.arm, each, scene.inertial)[:, joint] for each in changed])
+    by_angle, by_speed = ((more - less) / (2 * MOTION_STEP) for more, less in zip(*ends, strict=True))
+    return by_angle, by_speed
+
+
 def joint_displacement(scene: Scene, joint: int, change: Array) -> Motion:
     """A motion in which only one joint (from 0) moves, by `change` (samples,), with its own derivatives."""
     moved = np.zeros((3, *scene.motion.position.shape))
@@ -67,6 +86,16 @@ def gravity_derivative(scene: Scene, direction: Array) -> Array:
     changed = [replace(scene.arm, gravity=_vector(np.array(scene.arm.gravity) + sign * direction)) for sign in (1, -1)]
     more, less = (rigid_body_torque(arm, scene.motion, scene.inertial) for arm in changed)
     return (more - less) / 2
+
+
+def horizontal_directions(gravity: Array) -> tuple[Array, Array]:
+    """Two directions across gravity: x and y of the base, where gravity is along z."""
+    strength = np.linalg.norm(gravity)
+    down = gravity / strength if strength else np.array([0.0, 0.0, -1.0])
+    axis = np.eye(3)[1 if abs(down[0]) > 0.9 else 0]
+    first = axis - (axis @ down) * down
+    first /= np.linalg.norm(first)
+    return first, np.cross(-down, first)
 
 
 def geometry_derivative(scene: Scene, joint: int, changed: Callable[[Joint, float], Joint]) -> Array:

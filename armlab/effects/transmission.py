@@ -1,8 +1,9 @@
 """A drive train that gives: elastic joints and play.
 
 The link's angle is q = theta + twist, theta the recorded angle of the motor. The links ask for the rigid torque at
-theta and, to first order, for their own inertia times the acceleration of the twist; the drive train gives the force
-of its spring or of its walls: inertia twist'' = -load - force(twist, twist'). It is integrated in time.
+theta and, to first order, for what it grows with the twist, its speed and its acceleration; the drive train gives the
+force of its spring or of its walls: inertia twist'' = -load - load_qd twist' - load_q twist - force(twist, twist'). It
+is integrated in time.
 """
 
 from abc import abstractmethod
@@ -25,7 +26,7 @@ from armlab.effects.contract import (
     Value,
 )
 from armlab.effects.friction import mean_within_samples, positions_within_samples
-from armlab.effects.sensitivity import directional_derivative, joint_displacement
+from armlab.effects.sensitivity import directional_derivative, joint_displacement, own_torque_slopes
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
 from problem.arm import Arm
 from problem.kernel import pointer
@@ -99,6 +100,7 @@ def integrate_twist(scene: Scene, joint: int, law: Twist) -> Array:
     wall = 2 * np.pi * WALL_HZ
     stiffness, damping = (wall**2, 2 * wall) if law.gap > 0 else (law.stiffness, law.damping_time * law.stiffness)
     train = ffi.new("DriveTrain *", [stiffness, damping, law.gap])
+    by_angle, by_speed = _load_slopes(scene, joint, inertia, stiffness * inertia if law.gap > 0 else stiffness)
     out = np.empty((3, len(load)))
     lib.twist_of_drive_train(
         train,
@@ -107,9 +109,24 @@ def integrate_twist(scene: Scene, joint: int, law: Twist) -> Array:
         _half_steps(scene, law, inertia),
         pointer(load),
         pointer(np.ascontiguousarray(inertia)),
+        pointer(by_speed),
+        pointer(by_angle),
         pointer(out),
     )
     return out
+
+
+def _load_slopes(scene: Scene, joint: int, inertia: Array, stiffness: Array | float) -> tuple[Array, Array]:
+    """By how much the load grows with the twist and with its speed, (samples,) each.
+
+    Links that could not exist may feed a twist with energy: of these only the change of the inertia counts. Nor does a
+    load undo more than half of a spring.
+    inertia: of the integration, (samples,).
+    """
+    if not scene.has_bodies:
+        return np.zeros(len(inertia)), np.gradient(inertia, scene.step)
+    by_angle, by_speed = own_torque_slopes(scene, joint)
+    return np.maximum(by_angle, -0.5 * stiffness), by_speed
 
 
 def _half_steps(scene: Scene, law: Twist, inertia: Array) -> int:

@@ -53,6 +53,7 @@ SENTENCES = {
         "The mass, centre of mass or inertia of link 2 differs from that in the simulation: mass 0.500 kg (0.4 to 0.6)"
     ),
     "base_tilt": "Gravity points in another direction than in the simulation: (0.170, 0.00, −9.81) m/s²",
+    "flexible_base": "What the arm stands on gives way: 0.500 rad/(N m) (0.4 to 0.6)",
     "encoder_offset": ("The zero position of joint 2 differs from that in the simulation: 0.500 rad (0.4 to 0.6)"),
     "geometry_error": "A length or a twist at joint 2 differs from that in the simulation: 0.500 m (0.4 to 0.6)",
     "time_delay": "Torque and motion are recorded at different times: 0.500 s (0.4 to 0.6)",

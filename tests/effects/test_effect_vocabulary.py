@@ -12,8 +12,8 @@ IDS = [
     *("asymmetric_friction", "load_dependent_friction", "presliding_hysteresis", "friction_drift"),
     *("rotor_inertia", "torque_gain_error", "torque_offset", "torque_ripple", "joint_elasticity", "backlash"),
     *("joint_coupling", "gravity_compensator", "cable_stiffness", "payload", "inertial_parameter_error"),
-    *("base_tilt", "encoder_offset", "geometry_error", "time_delay", "channel_skew", "external_contact"),
-    *("torque_saturation", "friction_curve", "early_friction"),
+    *("base_tilt", "flexible_base", "encoder_offset", "geometry_error", "time_delay", "channel_skew"),
+    *("external_contact", "torque_saturation", "friction_curve", "early_friction"),
     *("controller_gain_error", "command_delay", "controller_dead_band", "command_offset", "unknown"),
 ]
 # design, contract of the diagnosis
@@ -21,7 +21,7 @@ NAMES = {
     *("level", "coefficient", "positive", "negative", "static_level", "velocity", "exponent", "gain", "inertia"),
     *("offset", "order", "amplitude", "phase", "stiffness", "rest", "gap", "mass", "centre", "gravity", "seconds"),
     *("start", "end", "peak", "limit", "initial", "final", "time_constant", "velocities", "torques", "way"),
-    *("impulse", "lead"),
+    *("impulse", "lead", "compliance", "direction", "resonance", "damping"),
 }
 
 

@@ -73,6 +73,7 @@ EXAMPLES = {
         (3,), {"mass": 0.4, "centre": (0.05, 0.0, 0.02), "inertia": (0.004, 0.006, 0.004, 0.0, 0.0, 0.0)}
     ),
     "base_tilt": Example((), {"gravity": (0.5, 0.0, -9.797)}),
+    "flexible_base": Example((), {"compliance": 1e-4, "direction": 0.6, "resonance": 12.0, "damping": 0.05}),
     "encoder_offset": Example((2,), {"offset": 0.02}),
     "geometry_error": Example((2,), {"offset": 0.005}, "a"),
     "time_delay": Example((), {"seconds": 0.008}),

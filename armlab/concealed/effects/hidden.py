@@ -30,7 +30,7 @@ class HiddenEffect:
     torque of one follows the motion of the other; at a link; or in the whole robot. units: unit of each parameter at
     a joint that turns. companions: plain friction of the same joint that the oracle fits beside it. blurred:
     parameters that cannot be separated from the plain friction of a background. takes_energy: friction, of which a
-    negative size is no law.
+    negative size is no law. is_outside: whether the library of the diagnosis has no name for it.
 
     size: what grows until the effect is as visible as wanted; in the unit of its main parameter. max_size: the size
     beyond which the effect would be absurd. form: which law. shape: the other numbers of the law.
@@ -43,6 +43,7 @@ class HiddenEffect:
     companions: ClassVar[tuple[str, ...]] = ()
     blurred: ClassVar[tuple[str, ...]] = ()
     takes_energy: ClassVar[bool] = False
+    is_outside: ClassVar[bool] = False
     joint: int
     size: float
     max_size: float

@@ -146,8 +146,8 @@ ANSWERS_WITHOUT_NAME = {
     "inconclusive": "inconclusive",
     "invalid": "no verdict",
 }
-LIBRARY_NAMES = tuple(each.effect for each in LIBRARY)
-OUTSIDE_NAMES = tuple(each.effect for each in OUTSIDE)
+LIBRARY_NAMES = tuple(each.effect for each in (*LIBRARY, *OUTSIDE) if not each.is_outside)
+OUTSIDE_NAMES = tuple(each.effect for each in OUTSIDE if each.is_outside)
 CELL_SIZE_IN = 0.35  # inches a cell
 
 
