@@ -33,7 +33,8 @@ alone count as one); the range where problems are fewer than six, which is said;
 of both algorithms (McGill, Tukey and Larsen 1978). Algorithms are chosen on suite 1; the numbers of the held-out suite
 took no part in that. A median is infeasible where most ends break a limit; such problems are left out of a ratio and
 counted beside it, which flatters an algorithm that has many of them. The least of many medians is flattered by being
-chosen; ratios to it are upper bounds."""
+chosen; ratios to it are upper bounds. Of two infeasible medians the one with the larger share of feasible ends has
+the better rank; the reports of comparisons rank them as equal, so their average ranks differ a little."""
 
 
 def choice_page(sources: Sources) -> str:
