@@ -131,6 +131,7 @@ def conceal(
 @click.option("--development", is_flag=True, help="A set for development.")
 @click.option("--score", "scored", type=_FOLDER, help="Folder with the score of a diagnosis of the same set.")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@click.option("--asked", type=click.IntRange(min=1), help="Ask about so many of them, drawn at random [default: all].")
 @click.option("--work", type=OutputPath(), help="Folder for answers; an interrupted command continues there.")
 @click.option("--out", type=OutputPath(), help="Folder for oracle.csv and oracle.md [default: that of --score].")
 @prints_lines
@@ -141,6 +142,7 @@ def oracle(
     development: bool,
     scored: Path | None,
     jobs: int,
+    asked: int | None,
     work: Path | None,
     out: Path | None,
 ) -> Iterator[str]:
@@ -154,6 +156,7 @@ def oracle(
     from armlab.concealed.naming_oracle_page import (
         ask_about_set,
         collect_answers,
+        draw_cases,
         read_scored_effects,
         write_oracle,
     )
@@ -166,11 +169,13 @@ def oracle(
     settings = make_set_settings(cases, seed, tier, "mixed", development)
     effects = None if scored is None else read_scored_effects(settings, scored)
     work = work or Path(".armlab/oracle") / str(seed)
-    for _ in tqdm(ask_about_set(settings, work, jobs), total=cases, unit="case", desc="asked"):
+    numbers = draw_cases(settings, asked or cases)
+    for _ in tqdm(ask_about_set(settings, numbers, work, jobs), total=len(numbers), unit="case", desc="asked"):
         pass
-    for path in write_oracle(collect_answers(settings, work), effects, out):
+    for path in write_oracle(collect_answers(settings, numbers, work), (len(numbers), cases), effects, out):
         yield f"wrote {path}"
-    shutil.rmtree(work)
+    if len(numbers) == cases:
+        shutil.rmtree(work)
     if (out / SCORE_FILE).is_file():
         write_page_again(out)
         yield f"{out / PAGE_FILE}: written again with the distance to the oracle"

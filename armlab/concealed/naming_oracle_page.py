@@ -11,6 +11,7 @@ from joblib import Parallel, delayed
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
+from armlab.common.streams import named_generator
 from armlab.concealed.folders import claim_folder
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
 from armlab.concealed.score.distance import ORACLE_PAGE, ORACLE_TABLE, format_share, join_with_score
@@ -33,20 +34,26 @@ def read_scored_effects(settings: SetSettings, score: Path) -> pd.DataFrame:
     return effects
 
 
-def ask_about_set(settings: SetSettings, work: Path, jobs: int) -> Iterator[str]:
-    """Asks the oracle about the cases of a set that have no answer in the folder `work`; yields the name of each.
+def draw_cases(settings: SetSettings, count: int) -> list[int]:
+    """Numbers of so many cases of a set, drawn at random; those of a smaller count are among those of a larger one."""
+    order = named_generator("cases for the oracle", settings.seed).permutation(settings.cases)
+    return sorted(order[:count].tolist())
+
+
+def ask_about_set(settings: SetSettings, numbers: Sequence[int], work: Path, jobs: int) -> Iterator[str]:
+    """Asks the oracle about cases of a set that have no answer in the folder `work`; yields the name of each.
 
     Raises InputError for a folder of another set.
     """
     claim_folder(settings, work)
-    missing = [number for number in range(settings.cases) if not _answer_file(settings, number, work).is_file()]
+    missing = [number for number in numbers if not _answer_file(settings, number, work).is_file()]
     asked = (delayed(_ask_about_case)(settings, number, work) for number in missing)
     yield from Parallel(n_jobs=jobs, return_as="generator_unordered")(asked)
 
 
-def collect_answers(settings: SetSettings, work: Path) -> list[OracleAnswer]:
-    """What the oracle says of the effects of a set that are expected to be named."""
-    files = [_answer_file(settings, number, work) for number in range(settings.cases)]
+def collect_answers(settings: SetSettings, numbers: Sequence[int], work: Path) -> list[OracleAnswer]:
+    """What the oracle says of the effects of cases of a set that are expected to be named."""
+    files = [_answer_file(settings, number, work) for number in numbers]
     return [OracleAnswer(**each) for file in files for each in json.loads(file.read_text(encoding="utf-8"))]
 
 
@@ -62,8 +69,13 @@ def _answer_file(settings: SetSettings, number: int, work: Path) -> Path:
     return work / f"{settings.plan(number).name}.json"
 
 
-def write_oracle(answers: Sequence[OracleAnswer], effects: pd.DataFrame | None, out: Path) -> tuple[Path, ...]:
-    """Writes oracle.csv and oracle.md. effects: what a diagnosis named of the same set, see `read_scored_effects`.
+def write_oracle(
+    answers: Sequence[OracleAnswer], asked: tuple[int, int], effects: pd.DataFrame | None, out: Path
+) -> tuple[Path, ...]:
+    """Writes oracle.csv and oracle.md.
+
+    asked: number of cases that were asked, of the set. effects: what a diagnosis named of the same set, see
+    `read_scored_effects`.
 
     Raises InputError for effects of another set.
     """
@@ -77,7 +89,9 @@ def write_oracle(answers: Sequence[OracleAnswer], effects: pd.DataFrame | None, 
     ]
     page = markdown_page(
         "How far could anyone get?",
-        f"Effects above {MIN_NAMED_MULTIPLE:g} detection limits, which are those of an observer who knows the motion. "
+        f"{'All' if asked[0] == asked[1] else f'{asked[0]}, drawn at random, of the'} {asked[1]} cases of the set were "
+        f"asked about. Effects above {MIN_NAMED_MULTIPLE:g} detection limits, which are those of an observer who knows "
+        "the motion. "
         "*Limits, recorded*: their median for one who has positions as the encoders round them; *away from reversals*: "
         "for one who has nothing within 25 ms of a reversal of each joint. *Oracle*: what such an observer (with all "
         "rows) names who knows the noise and the equations of all laws, of the library and outside it. *Diagnosis*: "

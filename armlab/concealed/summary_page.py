@@ -59,9 +59,10 @@ too, where it names a part of what is hidden, or what no motion separates from i
 wrong. *Skill*: one less the score (Brier, or the mean of -log of the probability of what is true, which is bounded at
 0.001) over the score of one constant probability, the share that was right among the same claims. Above 0 is better
 than this constant. *Oracle*: what an observer would name of the same effects who knows the noise and the equations of
-all laws, and has positions as encoders round them ([effect by effect](mixed/oracle.md)). *Too small*: effects that
-are below {MIN_NAMED_MULTIPLE:g} limits for this observer. *Large away from reversals*: above
-{MIN_NAMED_MULTIPLE:g} limits for one who has nothing within 25 ms of a reversal of each joint.
+all laws, and has positions as encoders round them, with the number of effects that it was asked about
+([effect by effect](mixed/oracle.md)). *Too small*: effects that are below {MIN_NAMED_MULTIPLE:g} limits for this
+observer. *Large away from reversals*: above {MIN_NAMED_MULTIPLE:g} limits for one who has nothing within 25 ms of a
+reversal of each joint.
 
 All judged runs: [log]({LOG_PAGE})."""
 Columns = Mapping[str, Mapping[str, Measure]]
@@ -131,7 +132,7 @@ def _oracle_rows(id: str, columns: Columns, results: Path) -> Iterator[list[str]
         return
     found = [Distance.of(known, id, name) for name in columns]
     away = [f"{each.diagnosis_away}, {each.number_away}" if each.number_away else "-" for each in found]
-    yield ["&nbsp;&nbsp;the oracle", "-", *(each.oracle for each in found)]
+    yield ["&nbsp;&nbsp;the oracle", "-", *(f"{each.oracle}, {each.number}" if each.number else "-" for each in found)]
     yield ["&nbsp;&nbsp;the diagnosis, of what is large away from reversals", "-", *away]
     yield ["&nbsp;&nbsp;too small", "-", *(each.below for each in found)]
 

@@ -14,7 +14,13 @@ from armlab.concealed.effects.channels import Gain, Skew
 from armlab.concealed.effects.friction import Coulomb, EarlyFriction, Viscous
 from armlab.concealed.effects.hidden import HiddenEffect
 from armlab.concealed.naming_oracle import OracleAnswer, ask_oracle
-from armlab.concealed.naming_oracle_page import ask_about_set, collect_answers, read_scored_effects, write_oracle
+from armlab.concealed.naming_oracle_page import (
+    ask_about_set,
+    collect_answers,
+    draw_cases,
+    read_scored_effects,
+    write_oracle,
+)
 from armlab.concealed.plan import draw_plan
 from armlab.concealed.score.distance import distance_table, read_oracle_table, remove_oracle
 from armlab.concealed.score.scoring import SCORE_FILE
@@ -90,16 +96,17 @@ EFFECT = {"case": "a", "tier": "clean", "effect": "payload", "joint": 2, "named_
 
 
 def test_the_page_stands_beside_the_score_of_the_same_set_alone(tmp_path: Path) -> None:
-    _, page = write_oracle([ANSWER], pd.DataFrame([EFFECT]), tmp_path)
+    _, page = write_oracle([ANSWER], (1, 3), pd.DataFrame([EFFECT]), tmp_path)
     text = page.read_text(encoding="utf-8")
+    assert "1, drawn at random, of the 3 cases of the set were asked about." in text
     assert "| payload | 1 | 2.0 | 1.5 | 93 % | 100 % | 0 % | 100 % | rotor inertia, 3.0 |" in text
     assert "| **of the library, below 3 limits, recorded** | 1 | 2.0 | 1.5 | 93 % |" in text
     with pytest.raises(InputError, match="of different sets"):
-        write_oracle([ANSWER], pd.DataFrame([{**EFFECT, "case": "b"}]), tmp_path)
+        write_oracle([ANSWER], (1, 3), pd.DataFrame([{**EFFECT, "case": "b"}]), tmp_path)
 
 
 def test_a_score_shows_its_distance_to_the_oracle(tmp_path: Path) -> None:
-    write_oracle([ANSWER], None, tmp_path)
+    write_oracle([ANSWER], (1, 1), None, tmp_path)
     known = read_oracle_table(tmp_path, pd.DataFrame([EFFECT]))
     assert known is not None
     assert "right name or class of four, above 3 limits | 100 % | 100 % | 100 % | 1 |" in distance_table(known)
@@ -115,11 +122,14 @@ def test_an_interrupted_command_asks_only_what_has_no_answer(tmp_path: Path, mon
     monkeypatch.setattr(
         "armlab.concealed.naming_oracle_page.ask_oracle", lambda plan, _: [replace(ANSWER, case=plan.name)]
     )
-    first = next(ask_about_set(settings, tmp_path / "work", 1))
-    rest = list(ask_about_set(settings, tmp_path / "work", 1))
+    some, every = draw_cases(settings, 2), draw_cases(settings, 6)
+    assert (len(some), every) == (2, [*range(6)])
+    first = next(ask_about_set(settings, some, tmp_path / "work", 1))
+    rest = list(ask_about_set(settings, every, tmp_path / "work", 1))
+    assert first in {settings.plan(number).name for number in some}
     assert sorted([first, *rest]) == sorted(settings.plan(number).name for number in range(6))
     hiding = [plan.name for plan in map(settings.plan, range(6)) if plan.kind not in ("null", "decoy")]
-    assert [each.case for each in collect_answers(settings, tmp_path / "work")] == hiding
+    assert [each.case for each in collect_answers(settings, every, tmp_path / "work")] == hiding
 
 
 def test_the_score_of_another_set_is_refused_before_the_work(tmp_path: Path) -> None:

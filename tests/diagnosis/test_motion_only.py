@@ -36,7 +36,7 @@ from armlab.diagnosis.motion.export import mjcf_text
 from armlab.diagnosis.motion.hold import hold_commands
 from armlab.diagnosis.motion.joint_replay import joint_errors, replay_joint
 from armlab.diagnosis.motion.replay import joint_rms, replay
-from armlab.diagnosis.motion.report import motion_page
+from armlab.diagnosis.motion.report import joint_table, motion_page
 from armlab.diagnosis.motion.separate import confused_parameters
 from armlab.diagnosis.motion.servo import NEUTRAL, PARAMETERS, USUAL, Key, Servos, place
 from armlab.diagnosis.motion.shared_number import COMMON_DELAY, TOOL_MASS, JointModel, estimate_shared, weigh
@@ -637,6 +637,21 @@ def test_verdict_model_simulation_and_page_are_written(diagnosis: MotionDiagnosi
     assert "DelayedPDActuatorCfg" in texts["isaaclab_actuators.py"]
     assert mujoco.MjModel.from_xml_path(str(tmp_path / "simulation.xml")).nu == 2
     assert any("mrad" in line for line in motion_lines(diagnosis))
+
+
+def test_joints_are_counted_as_in_the_robot_whatever_the_order_of_the_columns(tmp_path: Path) -> None:
+    columns = {"time": "t", "reference_position": ["c2", "c1"], "position": ["q2", "q1"]}
+    folder = write_recording(tmp_path / "other", seconds=SECONDS, joints=["elbow", "shoulder"], columns=columns)
+    text = (folder / "arm.xml").read_text()
+    (folder / "arm.xml").write_text(text.replace('<position name="elbow"', '<position name="elbow" kp="30"'))
+    result = diagnose_motion(load_motion_recording(folder))
+    verdict = make_motion_verdict(result)
+    (gain,) = (each for each in verdict.findings if each.form == "kp")
+    assert (gain.joint, gain.parameters["kp"].value) == (2, pytest.approx(60.0, rel=0.05))
+    assert all(each.joint == 2 and each.equation.startswith("tau_2 ") for each in verdict.findings)
+    assert ([each.joint for each in verdict.located], [each.joint for each in verdict.fit]) == ([2], [2, 1])
+    assert "at elbow" in verdict.summary
+    assert joint_table(result).rows[0][0] == "2\N{NO-BREAK SPACE}elbow"
 
 
 def test_the_command_says_why_nothing_can_be_said(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ class ServoChange:
 
 @dataclass(frozen=True, eq=False)
 class MotionComparison:
-    """What changed. arm: with the joints of the recordings. reason: of an inconclusive one.
+    """What changed. arm: of the new recording. reason: of an inconclusive one.
 
     notes: temperature and voltage in both recordings.
     """
@@ -101,18 +101,18 @@ def compare_motion(
     for recording in (old, new):
         reason = reason_unusable(recording)
         if reason is not None:
-            return MotionComparison(names, new.recorded_arm, f"{recording.name}: {reason}", ())
+            return MotionComparison(names, new.arm, f"{recording.name}: {reason}", ())
     simulations = [read_servo_simulation(recording) for recording in (old, new)]
     windows = [
         make_windows(each.runs, simulation, tuning) for each, simulation in zip((old, new), simulations, strict=True)
     ]
     looks = len(PARAMETERS) * len(old.joints)
     changes: list[ServoChange] = []
-    for joint, pair in enumerate(zip(*windows, strict=True)):
-        progress(f"comparing joint {joint + 1} of {len(old.joints)}")
+    for row, pair in enumerate(zip(*windows, strict=True)):
+        progress(f"comparing joint {row + 1} of {len(old.joints)}")
         same_law = replace(tuning, needed_limits=(), integral_rates=())  # none that one recording alone starts from
         fits = [
-            choose_servo(each, simulation.nominal.values[joint], looks, same_law)
+            choose_servo(each, simulation.nominal.values[row], looks, same_law)
             for each, simulation in zip(pair, simulations, strict=True)
         ]
         sound = [
@@ -120,9 +120,10 @@ def compare_motion(
             for each, fit in zip(pair, fits, strict=True)
         ]
         thinned = tuple(thin_windows(each, tuning.max_judged_windows) for each in sound)
-        starts, free = _common_start(fits, simulations[0].nominal.values[joint])
-        changes += _compare_joint((thinned[0], thinned[1]), starts, free, (joint, looks), tuning)
-    return MotionComparison(names, new.recorded_arm, "", tuple(changes), tuple(_notes(old, new)))
+        starts, free = _common_start(fits, simulations[0].nominal.values[row])
+        named = simulations[1].number_of(row), looks
+        changes += _compare_joint((thinned[0], thinned[1]), starts, free, named, tuning)
+    return MotionComparison(names, new.arm, "", tuple(changes), tuple(_notes(old, new)))
 
 
 def _common_start(fits: Sequence[ChosenServo], nominal: Array) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
@@ -359,7 +360,7 @@ def _change(
         interval, new, ratio, detectable = (move - half, move + half), old + move, None, seen
     return ServoChange(
         parameter=PARAMETERS[number],
-        joint=joint + 1,
+        joint=joint,
         old=old,
         new=new,
         difference_interval=interval,

@@ -39,7 +39,7 @@ def comparison_summary(comparison: MotionComparison) -> str:
 
 
 def change_phrase(arm: Arm, change: ServoChange) -> str:
-    """A change with its numbers. arm: with the joints of the recordings."""
+    """A change with its numbers."""
     unit, where = format_unit(change.parameter.unit), joint_in_words(arm, change.joint)
     words = f"{effect_named(change.parameter.effect).words} at {where} ({change.parameter.name} from "
     words += f"{change.old:.4g} to {change.new:.4g} {unit}".rstrip()

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from armlab.common.arrays import Array
@@ -117,7 +116,7 @@ class MotionDiagnosis:
     """What a recording of motion only tells. Without an answer only status and summary are set.
 
     chosen: of each joint, None for one that stands still or follows no servo. servos: all numbers for the simulation
-    after. odd: stretches that the servos do not explain: joint, run, from, to. replayed_before, replayed_after: the
+    after. odd: stretches that a servo does not explain: run, from, to. replayed_before, replayed_after: the
     held-out runs. replayed_alone: squared errors after, of each joint alone, (stretches, joints), rad2. tool: error of
     the tool before and after, m. currents: what those of the held-out runs say.
     """
@@ -130,7 +129,7 @@ class MotionDiagnosis:
     servos: Servos | None = None
     findings: tuple[ServoFinding, ...] = ()
     errors: tuple[JointError, ...] = ()
-    odd: tuple[tuple[int, str, float, float], ...] = ()
+    odd: tuple[tuple[str, float, float], ...] = ()
     replayed_before: tuple[Replayed, ...] = ()
     replayed_after: tuple[Replayed, ...] = ()
     replayed_alone: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -387,7 +386,7 @@ def _conclude(
     follows = {each.joint: each.follows_command(tuning) for each in errors}
     if not any(follows.values()):
         return MotionDiagnosis(recording, given, "inconclusive", NO_SERVO)
-    findings = [each for each in findings if follows[each.joint] or each.parameter.key == TOOL_MASS.key]
+    findings = [each for each in findings if each.parameter.key == TOOL_MASS.key or follows[each.joint]]
     status, reason = _status(findings, errors, chosen, tuning.same_error if known else None)
     tools = [
         float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
@@ -410,7 +409,9 @@ def _conclude(
             [_stretch_squares(own, values, tuning) for own, values in zip(runs, servos.values, strict=True)]
         ),
         tool=(tools[0] if before else None, tools[-1]),
-        silent=tuple(each.joint for each in errors if chosen[each.joint - 1] is None or not follows[each.joint]),
+        silent=tuple(
+            each.joint for each, own in zip(errors, chosen, strict=True) if own is None or not follows[each.joint]
+        ),
         currents=correlate_currents(held_out, simulation, servos.values),
     )
 
@@ -519,9 +520,9 @@ def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo 
     if chosen is not None and (named or not np.isfinite(nominal).all()):
         return chosen.fit.values
     if not np.isfinite(nominal).all():
-        name = simulation.arm.joints[simulation.joints[number]].name
+        joint, name = simulation.number_of(number), simulation.arm.joints[simulation.joints[number]].name
         raise InputError(
-            f"joint {number + 1} ({name}) shows nothing of its drive, and neither the robot's file nor `controller` "
+            f"joint {joint} ({name}) shows nothing of its drive, and neither the robot's file nor `controller` "
             "tells its gain: leave it out by `joints`, or give `controller.kp` and `torque_limit`"
         )
     return np.asarray(nominal)
@@ -582,9 +583,8 @@ def name_differences(
         rivals = (*parameter.rivals, *(PARAMETERS[other].effect for other in others))
         rivals = (*rivals, *(scale if parameter.key in TORQUE_SCALED else ()))
         before = _rms(error) if np.isfinite(said.nominal) else _rms(_command_error(judged))
-        one = said.finding(
-            parameter, number + 1, (before, after), _corrected_chance(gain, len(simulation.joints)), rivals
-        )
+        joint, chance = simulation.number_of(number), _corrected_chance(gain, len(simulation.joints))
+        one = said.finding(parameter, joint, (before, after), chance, rivals)
         found += [] if one.holds_nominal else [one]
     return found
 
@@ -602,7 +602,7 @@ def _name_payload(payload: FoundNumber, fit: ArmFit, judged: Sequence[Windows], 
     before, after = (_rms(np.concatenate(each)) for each in errors)
     said = _Said(parameter.effect, parameter.name, mass, (mass - half, mass + half), 0.0)
     chance = _corrected_chance(payload.gain, len(judged))
-    return said.finding(parameter, len(judged), (before, after), chance, parameter.rivals)
+    return said.finding(parameter, fit.simulation.last_link, (before, after), chance, parameter.rivals)
 
 
 def _name_delay(
@@ -612,11 +612,11 @@ def _name_delay(
 
     named: what joints have of their own.
     """
-    own = {each.joint - 1 for each in named if each.parameter.key == COMMON_DELAY.key}
+    own = {each.joint for each in named if each.parameter.key == COMMON_DELAY.key}
     models = {
         number: replace(each, values=COMMON_DELAY.without_own(each.values, fit.simulation.nominal.values[number]))
         for number, each in enumerate(_models_of(fit))
-        if each is not None and number not in own
+        if each is not None and fit.simulation.number_of(number) not in own
     }
     more, error = estimate_shared(delay.number, list(models.values()), tuning)
     parameter, half = PARAMETERS[COMMON_DELAY.place], float(student.ppf(0.975, max(delay.windows - 1, 1))) * error
@@ -630,7 +630,8 @@ def _name_delay(
             for less in (-fit.simulation.delay, 0.0)
         )
         chance = _corrected_chance(delay.gain, len(judged))
-        found.append(said.finding(parameter, number + 1, (before, after), chance, parameter.rivals))
+        joint = fit.simulation.number_of(number)
+        found.append(said.finding(parameter, joint, (before, after), chance, parameter.rivals))
     return found
 
 
@@ -654,7 +655,8 @@ def _with_given_delay(findings: Sequence[ServoFinding], given: ServoSimulation, 
     """
     for each in findings:
         if delay and each.parameter.key == COMMON_DELAY.key:
-            each = replace(each, nominal=float(given.nominal.get("delay")[each.joint - 1]))
+            row = given.joints.index(each.joint - 1)
+            each = replace(each, nominal=float(given.nominal.get("delay")[row]))
             if each.holds_nominal:
                 continue
         yield each
@@ -777,7 +779,7 @@ def _errors(
         [np.asarray(run.reference_position)[:, number] - run.position[:, number] for run in held_out]
     )
     return JointError(
-        joint=number + 1,
+        joint=given.number_of(number),
         before=_rms(_settled_errors(judged, with_more(nominal, TOOL_MASS.place, -simulation.payload)))
         if known
         else None,
@@ -792,11 +794,8 @@ def _errors(
 
 def _odd_stretches(
     runs: Sequence[MotionRun], chosen: Sequence[ChosenServo | None], tuning: MotionTuning
-) -> list[tuple[int, str, float, float]]:
-    """Joint (from 1), run, first and last instant of the windows that a joint's servo does not explain."""
+) -> list[tuple[str, float, float]]:
+    """Run, first and last instant of the windows that the servo of some joint does not explain."""
     stretches = window_stretches(runs, tuning)
-    found: list[tuple[int, str, float, float]] = []
-    for number, each in enumerate(chosen):
-        odd: NDArray[np.intp] = each.odd if each is not None else np.zeros(0, dtype=np.intp)
-        found += [(number + 1, *stretches[window]) for window in odd.tolist()]
-    return found
+    odd = {window for each in chosen if each is not None for window in each.odd.tolist()}
+    return sorted(stretches[window] for window in odd)

@@ -42,7 +42,7 @@ def bench_real_motion(
     lines = [
         summary_of(diagnosis),
         *finding_phrases(diagnosis),
-        *(current_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.currents),
+        *(current_phrase(diagnosis.simulation.arm, each) for each in diagnosis.currents),
     ]
     table = _replay_table(diagnosis, alone)
     yield from (*lines, table)
@@ -66,7 +66,7 @@ def bench_real_motion(
         summary_of(diagnosis),
         "\n".join(f"- {each}" for each in finding_phrases(diagnosis)),
         "The current is that of the supply, without sign; it took no part in the diagnosis.",
-        "\n".join(f"- {current_phrase(diagnosis.recording.recorded_arm, each)}" for each in diagnosis.currents),
+        "\n".join(f"- {current_phrase(diagnosis.simulation.arm, each)}" for each in diagnosis.currents),
         "Root mean square of simulated minus measured position on the held-out runs, mrad; at the tool mm. Whole arm, "
         f"whole runs. One gain: the simulation with kp {ONE_GAIN} N m/rad and kv 0, nothing else changed.",
         table,

@@ -36,7 +36,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         replayed=pictures[shown : shown + 1],
         pictures=[*pictures[:shown], *pictures[shown + 1 :]],
         findings=finding_phrases(diagnosis),
-        currents=[current_phrase(diagnosis.recording.recorded_arm, each) for each in diagnosis.currents],
+        currents=[current_phrase(diagnosis.simulation.arm, each) for each in diagnosis.currents],
         numbers=_number_table(diagnosis) if known else None,
         missing=_missing_fields(diagnosis),
         command=command,
@@ -45,7 +45,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
 
 def joint_table(diagnosis: MotionDiagnosis) -> Table:
     """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
-    rows, arm = [], diagnosis.recording.recorded_arm
+    rows, arm = [], diagnosis.simulation.arm
     for each in diagnosis.errors:
         own = [finding for finding in diagnosis.findings if finding.joint == each.joint]
         words = "; ".join(finding_with_numbers(finding) for finding in own) or "–"
@@ -66,7 +66,7 @@ def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
 def _error_table(diagnosis: MotionDiagnosis) -> Table:
     rows = [
         (
-            joint_in_table(diagnosis.recording.recorded_arm, each.joint),
+            joint_in_table(diagnosis.simulation.arm, each.joint),
             f"{1e3 * each.command:.3g}",
             "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g}",
             f"{1e3 * each.replay_after:.3g}",
@@ -86,8 +86,7 @@ def _tool_text(diagnosis: MotionDiagnosis) -> str:
 def _most_telling_row(diagnosis: MotionDiagnosis) -> int:
     """The row of the joint whose replay error over held-out runs falls most, or is largest."""
     falls = [(each.replay_before or 2 * each.replay_after) - each.replay_after for each in diagnosis.errors]
-    row = int(np.argmax(falls)) if falls else 0
-    return diagnosis.errors[row].joint - 1 if falls else 0
+    return int(np.argmax(falls)) if falls else 0
 
 
 def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
@@ -106,9 +105,8 @@ def _pictures(diagnosis: MotionDiagnosis) -> list[Markup]:
         layers.append(Line(time, after.position[chosen, row], FOUND_LOOK))
         shown = [layer.y for layer in layers if isinstance(layer, Line)]
         x, y = fit_axis("time, s", time), fit_axis("position, rad", *shown)
-        made.append(
-            draw_chart(f"{joint_at_start(diagnosis.recording.recorded_arm, row + 1)}: {run.name}", x, y, layers)
-        )
+        joint = joint_at_start(diagnosis.simulation.arm, diagnosis.simulation.number_of(row))
+        made.append(draw_chart(f"{joint}: {run.name}", x, y, layers))
     return made
 
 
@@ -125,7 +123,7 @@ def _number_table(diagnosis: MotionDiagnosis) -> Table:
                 continue
             given = "unknown" if np.isnan(nominal) else "none" if nominal >= INFINITE_LIMIT else f"{nominal:.4g}"
             interval = f"{low[place]:.4g} to {high[place]:.4g}"
-            joint = joint_in_table(diagnosis.recording.recorded_arm, row + 1)
+            joint = joint_in_table(diagnosis.simulation.arm, diagnosis.simulation.number_of(row))
             rows.append((joint, parameter.key, given, f"{value:.4g}", interval, format_unit(parameter.unit)))
     headings = ("joint", "number", "simulation", "found", "95 % interval", "unit")
     return Table(headings, rows, (1, 5), stacked=True)

@@ -50,6 +50,15 @@ class ServoSimulation:
     payload: float = 0.0
     delay: float = 0.0
 
+    def number_of(self, row: int) -> int:
+        """Number in the robot, from 1, of the recorded joint of a column, from 0."""
+        return self.joints[row] + 1
+
+    @property
+    def last_link(self) -> int:
+        """The link that carries the tool, from 1."""
+        return len(self.arm)
+
     def spec(self) -> Any:
         """The simulation as mujoco.MjSpec, with a position actuator at each joint; their gain is 1 where none was."""
         mujoco = import_mujoco()

@@ -45,7 +45,7 @@ IN_COMPONENTS = ("viscous_friction", "coulomb_friction", "rotor_inertia", "load_
 
 def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
     """All files of the verdict but the report, as they are to stand in a folder."""
-    last = len(diagnosis.chosen)
+    last = diagnosis.simulation.last_link
     texts = {"verdict.json": make_motion_verdict(diagnosis).to_json()}
     texts |= names_texts([weigh_servo(each, last) for each in diagnosis.findings], Settings())
     if diagnosis.servos is not None:
@@ -76,7 +76,7 @@ def make_motion_verdict(diagnosis: MotionDiagnosis) -> VerdictFile:
         story=_story(diagnosis),
         located=_located(diagnosis),
         findings=tuple(
-            _finding(each, share, len(diagnosis.chosen))
+            _finding(each, share, diagnosis.simulation.last_link)
             for each, share in zip(diagnosis.findings, _shares(diagnosis), strict=True)
         ),
         unexplained=_unexplained(diagnosis),
@@ -107,10 +107,13 @@ def _story(diagnosis: MotionDiagnosis) -> tuple[StoryEntry, ...]:
 
 
 def _located(diagnosis: MotionDiagnosis) -> tuple[LocatedEntry, ...]:
+    places, recorded = {each.joint for each in diagnosis.findings}, {each.joint for each in diagnosis.errors}
+    if places - recorded:  # a mass at the tool, where the last joint was not recorded
+        places.add(max(recorded))
     gaps = {
         each.joint: max((each.before if each.before is not None else each.command) ** 2 - each.after**2, 0.0)
         for each in diagnosis.errors
-        if any(finding.joint == each.joint for finding in diagnosis.findings)
+        if each.joint in places
     }
     whole = max(sum(gaps.values()), 1e-300)
     where = WhereEntry(variable="reference_position", regime="wherever the joint is driven")
@@ -153,10 +156,11 @@ def _finding(each: ServoFinding, share: float, last: int) -> FindingEntry:
 def _unexplained(diagnosis: MotionDiagnosis) -> tuple[UnexplainedEntry, ...]:
     """Joints with stretches that their servo does not explain; share: of their windows."""
     entries = []
-    for number, chosen in enumerate(diagnosis.chosen):
+    for row, chosen in enumerate(diagnosis.chosen):
         if chosen is not None and len(chosen.odd):
             share = len(chosen.odd) / (len(chosen.odd) + chosen.fit.windows)
-            entries.append(UnexplainedEntry(joint=number + 1, share=share, depends_on=("time",)))
+            joint = diagnosis.simulation.number_of(row)
+            entries.append(UnexplainedEntry(joint=joint, share=share, depends_on=("time",)))
     return tuple(entries)
 
 
@@ -207,7 +211,7 @@ def _components(diagnosis: MotionDiagnosis) -> list[dict[str, Any]]:
     claimed = {(each.effect, each.joint) for each in diagnosis.findings}
     entries = []
     for row, chosen in enumerate(diagnosis.chosen):
-        joint = diagnosis.simulation.joints[row] + 1
+        joint = diagnosis.simulation.number_of(row)
         ends = chosen.fit.interval() if chosen is not None else None
         for place, parameter in enumerate(PARAMETERS):
             assert diagnosis.servos is not None
@@ -217,7 +221,7 @@ def _components(diagnosis: MotionDiagnosis) -> list[dict[str, Any]]:
             fitted = chosen is not None and bool(chosen.fit.free[place])
             interval = [float(ends[0, place]), float(ends[1, place])] if fitted and ends is not None else None
             entry = {"effect": parameter.effect, "joint": joint, "joints": [joint]}
-            entry |= {"claimed": (parameter.effect, row + 1) in claimed}
+            entry |= {"claimed": (parameter.effect, joint) in claimed}
             entries.append(entry | {"parameters": {parameter.name: _number(value, interval, parameter.unit)}})
         entries += _stribeck_component(diagnosis, row, joint, claimed)
     return entries
@@ -241,7 +245,7 @@ def _stribeck_component(
             "exponent": _number(2.0, None, "1"),
         }
         entry = {"effect": "stribeck_friction", "joint": joint, "joints": [joint]}
-        yield entry | {"claimed": ("stribeck_friction", row + 1) in claimed, "parameters": numbers}
+        yield entry | {"claimed": ("stribeck_friction", joint) in claimed, "parameters": numbers}
 
 
 def controller_entry(diagnosis: MotionDiagnosis) -> dict[str, Any]:

@@ -72,7 +72,8 @@ def correlate_currents(
         form = max(forms, key=lambda each: follows[each]["found"])
         own = follows[form]
         moved = inside[place("kd")] != values[place("kd")]
-        out.append(CurrentWitness(row + 1, form, own["found"], own.get("given"), own["inside"] if moved else None))
+        damped = own["inside"] if moved else None
+        out.append(CurrentWitness(simulation.number_of(row), form, own["found"], own.get("given"), damped))
     return tuple(out)
 
 

@@ -36,7 +36,7 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     if diagnosis.status == "none":
         first = "The simulation replays the held-out commands as well as any servo of this law."
         return first + _replay_sentence(diagnosis)
-    arm = diagnosis.recording.recorded_arm
+    arm = diagnosis.simulation.arm
     found = findings_by_name(diagnosis)
     listed = join_words([f"{name} at {_places(arm, own)}" for name, own in found.items()])
     if len(listed.split()) > MAX_LISTED_WORDS:
@@ -79,7 +79,7 @@ def _places(arm: Arm, findings: Sequence[ServoFinding]) -> str:
 def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     if not diagnosis.errors:
         return ""
-    arm = diagnosis.recording.recorded_arm
+    arm = diagnosis.simulation.arm
     places = [
         (joint_in_words(arm, each.joint), each.replay_before, each.replay_after, "mrad") for each in diagnosis.errors
     ]
@@ -99,7 +99,7 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
 def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
     if not diagnosis.silent:
         return ""
-    joints = joints_in_words(diagnosis.recording.recorded_arm, diagnosis.silent)
+    joints = joints_in_words(diagnosis.simulation.arm, diagnosis.silent)
     stands = "it stands still or follows" if len(diagnosis.silent) == 1 else "they stand still or follow"
     return f" Of {joints} nothing can be said: {stands} no servo."
 
@@ -107,15 +107,14 @@ def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
 def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
     if not diagnosis.odd:
         return ""
-    stretches = sorted({(run, start, end) for _, run, start, end in diagnosis.odd})
-    shown = ", ".join(f"{run} {start:.0f} to {end:.0f} s" for run, start, end in stretches[:3])
-    more = f" and {len(stretches) - 3} more" if len(stretches) > 3 else ""
+    shown = ", ".join(f"{run} {start:.0f} to {end:.0f} s" for run, start, end in diagnosis.odd[:3])
+    more = f" and {len(diagnosis.odd) - 3} more" if len(diagnosis.odd) > 3 else ""
     return f" Something else than the servos moves the arm in {shown}{more}: contact, or commands that came late."
 
 
 def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
     """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint."""
-    arm = diagnosis.recording.recorded_arm
+    arm = diagnosis.simulation.arm
     yield from wrap(f"{diagnosis.status.upper()}: {summary_of(diagnosis)}", LINE_WIDTH)
     yield from (f"  {each}" for each in finding_phrases(diagnosis))
     for error in diagnosis.errors:
@@ -126,7 +125,7 @@ def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
 
 def finding_phrases(diagnosis: MotionDiagnosis) -> list[str]:
     """Each finding in one line, with the probability of its name."""
-    arm, last = diagnosis.recording.recorded_arm, len(diagnosis.chosen)
+    arm, last = diagnosis.simulation.arm, diagnosis.simulation.last_link
     return [_finding_phrase(arm, each, last) for each in diagnosis.findings]
 
 
@@ -151,7 +150,7 @@ def finding_with_numbers(finding: ServoFinding) -> str:
 
 
 def current_phrase(arm: Arm, current: CurrentWitness) -> str:
-    """What the current of a joint says in one line. arm: with the joints of the recording."""
+    """What the current of a joint says in one line."""
     torque = {"signed": "the torque", "size": "the size of the torque", "squared": "the square of the torque"}
     start = f"{joint_in_words(arm, current.joint)}: correlation of the current with {torque[current.form]}"
     given = "" if current.given is None else f"{current.given:.2f} with the simulation's drive, "
@@ -160,7 +159,7 @@ def current_phrase(arm: Arm, current: CurrentWitness) -> str:
 
 
 def error_phrase(arm: Arm, error: JointError) -> str:
-    """Replay errors of a joint in one line. arm: with the joints of the recording.
+    """Replay errors of a joint in one line.
 
     Where the simulator, which lets joints creep that stick, replays a joint worse with what was found: what each joint
     replays alone.
