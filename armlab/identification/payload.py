@@ -100,6 +100,11 @@ class Payload:
     factor: float
 
     @property
+    def is_there(self) -> bool:
+        """Whether the 95 % interval of the mass is above zero."""
+        return bool(self.parameters[0] > self.half_widths[0])
+
+    @property
     def link(self) -> Link:
         """The load as a body."""
         return link_of(self.parameters)
@@ -258,15 +263,18 @@ def payload_lines(loaded: Path, without: Path, setting: PayloadSetting) -> Resul
         payload = identify_payload(task.structure, task.without, task.loaded, setting.place)
     except DataError as error:
         raise InputError(f"{loaded}: {error}") from None
-    numbers = list(_payload_numbers(payload, mass_alone=setting.place.centre is not None))
+    mass_alone = setting.place.centre is not None
+    numbers = list(_payload_numbers(payload, mass_alone))
     yield from (number_line(each) for each in numbers)
+    if not (mass_alone or payload.is_there):
+        yield "its centre is not determined: the interval of its mass reaches zero"
     return load_document(setting.place.link or len(task.structure.arm), numbers)
 
 
 def _payload_numbers(payload: Payload, mass_alone: bool) -> Iterator[Number]:
     """Each number of a load."""
     rows = list(zip(PARAMETER_NAMES, payload.parameters, payload.half_widths, PARAMETER_UNITS, strict=True))
-    if not mass_alone and payload.parameters[0] > 0:
+    if payload.is_there:
         rows += zip(CENTRE_NAMES, payload.centre, payload.centre_half_widths, ["m"] * 3, strict=True)
     yield from (Number(*row) for row in rows[: 1 if mass_alone else None])
 

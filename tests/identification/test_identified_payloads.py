@@ -104,6 +104,22 @@ def test_a_load_is_a_body_that_can_exist_even_where_noise_says_otherwise() -> No
     assert np.all(np.abs(found.parameters - 0.5 * point_mass(1, (0.0, 0.0, 0.05))) < free)
 
 
+def test_a_load_that_is_not_there_has_no_centre(tmp_path: Path) -> None:
+    pytest.importorskip("cvxpy")
+    folders = [six_joint_recording(tmp_path / str(seed), six_joint_run(np.zeros(10), seed, 1.0)) for seed in (1, 2)]
+    text = invoke(payload, folders[0], "--without", folders[1])
+    assert "its centre is not determined: the interval of its mass reaches zero" in text
+    assert "centre x" not in text
+
+
+def six_joint_recording(folder: Path, run: Run) -> Path:
+    names = ("t", *(f"{name}{joint}" for name in ("q", "tau") for joint in range(1, 7)))
+    table = np.column_stack([run.time, run.position, run.torque])
+    columns = {"time": "t", "position": names[1:7], "torque": names[7:]}
+    units = {"time": "s", "position": "rad", "torque": "N.m"}
+    return write_recording(Draft("irb120", columns, units, (DraftRun("run.csv", "identify", names, table),)), folder)
+
+
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
