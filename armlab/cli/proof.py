@@ -242,20 +242,10 @@ def _write_summary_again(results: Path) -> Iterator[str]:
     metavar="TABLES",
     help="Output folder of `armlab real-concealed --seed SEED`; may be given more than once.",
 )
-@click.option(
-    "--only",
-    "kind",
-    type=click.Choice(["found", "left", "structure"]),
-    help="Learn the weights of this kind of findings alone; all others stay as they are shipped.",
-)
 @click.option("--out", type=OutputPath(), required=True, help="Folder for calibration.json and calibration.md.")
 @prints_lines
 def calibrate_names(
-    sets: tuple[tuple[Path, Path], ...],
-    motion_sets: tuple[Path, ...],
-    real_sets: tuple[Path, ...],
-    kind: Literal["found", "left", "structure"] | None,
-    out: Path,
+    sets: tuple[tuple[Path, Path], ...], motion_sets: tuple[Path, ...], real_sets: tuple[Path, ...], out: Path
 ) -> Iterator[str]:
     """Learn the probabilities of names from concealed sets.
 
@@ -265,14 +255,9 @@ def calibrate_names(
     from armlab.concealed.real.weighed import read_weighed_real
     from armlab.concealed.score.weighed import read_weighed
     from armlab.concealed.servo.score import read_weighed_motion
-    from armlab.diagnosis.naming.calibrate import Finding, calibrate, calibrate_kind
-    from armlab.diagnosis.naming.calibration_page import (
-        calibration_lines,
-        write_calibration,
-        write_calibration_of_kind,
-    )
+    from armlab.diagnosis.naming.calibrate import Finding, calibrate
+    from armlab.diagnosis.naming.calibration_page import calibration_lines, write_calibration
     from armlab.diagnosis.naming.choice import Example
-    from armlab.diagnosis.naming.decide import all_calibrated_weights, shipped_calibration
 
     if not sets and not motion_sets and not real_sets:
         raise click.UsageError("nothing to learn from: give --set SET VERDICTS, --motion WORK or --real TABLES")
@@ -285,13 +270,9 @@ def calibrate_names(
         Finding(each.case, each.tier, Example(each.names, each.right), each.background, recording)
         for each, recording in weighed
     ]
-    found = calibrate(findings) if kind is None else calibrate_kind(findings, kind, all_calibrated_weights())
+    found = calibrate(findings)
     yield from calibration_lines(found)
-    if kind is None:
-        written = write_calibration(found, sources, out)
-    else:
-        written = write_calibration_of_kind(found, kind, sources, shipped_calibration()["from"], out)
-    for path in written:
+    for path in write_calibration(found, sources, out):
         yield f"wrote {path}"
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
 
 from armlab.common.arrays import Array
 from armlab.common.notebook import notebook_html
@@ -16,8 +15,6 @@ from armlab.effects.parameters import ParameterValue
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.reading.answer import Answer
 from armlab.recordings.recording import Finding, Recording
-
-SOMETHING_ELSE: Final = "something_else"
 
 
 @dataclass(frozen=True)
@@ -36,11 +33,8 @@ class Rival:
 
 @dataclass(frozen=True)
 class WeighedName:
-    """A name that a finding could have, `unknown` for what the library lacks, or `something_else`.
-
-    The last one is of structure that only a surrogate knows: a law of the library that was not weighed, or chance.
-    numbers: what speaks for it or against it, by what they say.
-    """
+    """A name that a finding could have, or none of them (`unknown`). numbers: what speaks for it or against it, by what
+    they say."""
 
     effect: str
     joint: int | None
@@ -48,9 +42,9 @@ class WeighedName:
     numbers: Mapping[str, float]
 
     @property
-    def is_name(self) -> bool:
-        """Whether it is the name of an effect."""
-        return self.effect not in (UNKNOWN.id, SOMETHING_ELSE)
+    def is_none(self) -> bool:
+        """Whether it stands for none of the names."""
+        return self.effect == UNKNOWN.id
 
 
 Weighed = tuple[WeighedName, ...]

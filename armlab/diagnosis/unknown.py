@@ -130,13 +130,8 @@ def unknown_evidence(model: FittedModel, each: Structure, before: Array, after: 
         each.validation_gain,
         float(np.sqrt(np.mean(before[rows] ** 2))),
         float(np.sqrt(np.mean(after[rows] ** 2))),
-        structure_score(each),
+        -0.5 * len(before) * float(np.log(max(1 - each.gain, 1e-6))),
     )
-
-
-def structure_score(each: Structure) -> float:
-    """By how much a surrogate that predicts as well everywhere raises the log likelihood of the rows of its joint."""
-    return 0.5 * len(each.prediction) * float(np.log1p(max(each.gain, 0.0)))
 
 
 def make_unknown_claim(model: FittedModel, each: Structure, residual: Array, weighed: Weighed) -> Claim:

@@ -15,13 +15,12 @@ from armlab.concealed.score.weighed import check_development, label_findings
 
 
 def weighed(answer: Truth, folder: Path, names: list[tuple[str, float]], kind: str = "found") -> JudgedCase:
-    """A case with one weighed finding at joint 2: names with their probabilities, none of them, and something else."""
+    """A case with one weighed finding at joint 2: names with their probabilities, and none of them."""
     listed: list[dict[str, Any]] = [
         {"effect": name, "joint": 2, "probability": chance, "numbers": {f"is {name}": 1.0}} for name, chance in names
     ]
-    others = ["unknown", "something_else"] if kind == "structure" else ["unknown"]
-    listed += [{"effect": other, "joint": 2, "probability": 0.05, "numbers": {f"{kind} none": 1.0}} for other in others]
-    (folder / "names.json").write_text(json.dumps({"findings": [{"names": listed}]}), encoding="utf-8")
+    none = {"effect": "unknown", "joint": 2, "probability": 0.1, "numbers": {f"{kind} none": 1.0}}
+    (folder / "names.json").write_text(json.dumps({"findings": [{"names": [*listed, none]}]}), encoding="utf-8")
     case = judged(answer, verdict())
     object.__setattr__(case, "folder", folder)
     return case
@@ -33,9 +32,7 @@ def weighed(answer: Truth, folder: Path, names: list[tuple[str, float]], kind: s
         (COULOMB, "found", (True, False, False)),
         (NULL, "found", (False, False, True)),
         (OUTSIDE, "found", (False, False, True)),
-        (OUTSIDE, "structure", (False, False, True, False)),
-        (NULL, "structure", (False, False, False, True)),
-        (COULOMB, "structure", (True, False, False, False)),
+        (OUTSIDE, "structure", (False, False, True)),
     ],
 )
 def test_a_name_is_right_as_a_claim_is_and_else_none_is(

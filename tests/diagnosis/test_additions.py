@@ -55,7 +55,7 @@ def test_what_is_added_has_the_likeliest_name(model: FittedModel, monkeypatch: p
     for first in (found_as(model, "gravity_compensator"), spring_found):
         (group, _, evidence), names = _named(model, first, ())
         assert (group, evidence.score) == (spring_found[0], spring_found[2].score)
-        assert names[-1].effect == "unknown"
+        assert names[-1].is_none
 
 
 def test_none_of_the_names_changes_nothing(model: FittedModel, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,10 +7,10 @@ import pytest
 
 from armlab.common.errors import InputError
 from armlab.diagnosis.evidence import Evidence
-from armlab.diagnosis.naming.calibrate import Finding, calibrate, calibrate_kind, judge_reliability
+from armlab.diagnosis.naming.calibrate import Finding, calibrate, judge_reliability
 from armlab.diagnosis.naming.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of
-from armlab.diagnosis.result import SOMETHING_ELSE, Claim, Rival, Weighed, WeighedName
+from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings, vary
 from armlab.effects.friction import CoulombFriction
 
@@ -204,32 +204,6 @@ def test_the_cases_of_a_real_recording_are_left_out_together() -> None:
     assert found.left_out["emps"].numbers["a"] > found.weights.numbers["a"]
     assert found.tiers["real"].bins[0].right == 0
     assert found.tiers["real"].bins[0].mean > 0.6
-
-
-def test_the_weights_of_one_kind_are_learnt_alone() -> None:
-    structure = Example(({"structure none": 1.0}, {"is payload": 1.0}), (True, False))
-    link = Example(({"found link": 1.0}, {"is payload": 1.0}), (False, True))
-    findings = [Finding(str(at), "clean", each, False) for each in (structure, link) for at in range(20)]
-    numbers = {"found link": 0.5, "is payload": 0.1, "structure none": 0.0}
-    known = {"": Weights(numbers, 0.02), "emps": Weights({**numbers, "found link": 0.7}, 0.03)}
-    found = calibrate_kind(findings, "structure", known)
-    assert found.findings == 20
-    learnt = found.weights.numbers["structure none"]
-    assert learnt > 1
-    assert found.weights == Weights({**numbers, "structure none": learnt}, 0.02)
-    assert found.left_out["emps"] == Weights({**numbers, "found link": 0.7, "structure none": learnt}, 0.03)
-    with pytest.raises(InputError, match="no finding of these sets is of the kind 'left'"):
-        calibrate_kind(findings, "left", known)
-
-
-def test_something_else_takes_from_all_names_and_is_none_of_them() -> None:
-    names = (*weighed(0.3, payload=0.4), WeighedName(SOMETHING_ELSE, 2, (2,), {"for it": float(np.log(0.3))}))
-    naming = naming_of(names, Settings())
-    assert [(each.effect, pytest.approx(each.probability)) for each in naming.answers] == [
-        ("payload", 0.4),
-        ("unknown", 0.3),
-    ]
-    assert naming.is_unknown
 
 
 def test_findings_of_one_recording_cannot_be_left_out() -> None:

@@ -13,13 +13,11 @@ from armlab.concealed.score.cases import RIGHT_CATEGORIES, UNKNOWN_NAME, JudgedC
 from armlab.concealed.sets import read_checked_manifest
 
 NAMES_FILE = "names.json"  # beside a verdict
-SOMETHING_ELSE = "something_else"  # than the names of structure: chance, or a law of the library that was not weighed
 
 
 @dataclass(frozen=True)
 class WeighedFinding:
-    """A finding of a case. names: numbers of each name that it could have, by what they say, of none of them, and of
-    something else.
+    """A finding of a case. names: numbers of each name that it could have, by what they say, and of none of them.
 
     right: which of them are. background: whether its likeliest name is that of friction or of links that every case of
     the tier has.
@@ -40,9 +38,7 @@ def read_weighed(folder: Path, verdicts: Path) -> tuple[str, list[WeighedFinding
     manifest, _ = read_checked_manifest(folder, SetManifest)
     check_development(manifest.seed, folder)
     cases = read_cases(folder, verdicts, manifest.cases)
-    told = sum(case.verdict["status"] != "invalid" for case in cases)
-    number = f"{told} cases" if told == len(cases) else f"{told} of {len(cases)} cases"
-    about = f"torque, seed {manifest.seed}, {manifest.kind}: {number}"
+    about = f"torque, seed {manifest.seed}, {manifest.kind}: {len(manifest.cases)} cases"
     return about, [each for case in cases for each in label_findings(case, manifest.seed)]
 
 
@@ -61,29 +57,22 @@ def read_names(folder: Path) -> list[list[dict[str, Any]]]:
 
 
 def label_findings(case: JudgedCase, seed: int) -> Iterator[WeighedFinding]:
-    """The weighed findings of a case, each name right or not by its answer.
-
-    Structure that only a surrogate knows is rightly `unknown` wherever an effect outside the library is hidden, and
-    else something else where none of its names is right.
-    """
+    """The weighed findings of a case, each name right or not by its answer."""
     outside = any(effect.outside for effect in case.truth.injected)
     for names in read_names(case.folder):
-        categories = [categorize_finding(case, name) if _is_name(name) else "" for name in names]
-        right = [each in RIGHT_CATEGORIES for each in categories]
-        only_structure = any(name["effect"] == SOMETHING_ELSE for name in names)
-        other = {
-            UNKNOWN_NAME: outside if only_structure else not any(right),
-            SOMETHING_ELSE: not (any(right) or outside),
-        }
+        categories = [categorize_finding(case, name) for name in names]
+        right = [_is_named(name) and each in RIGHT_CATEGORIES for name, each in zip(names, categories, strict=True)]
+        only_structure = any("structure none" in name["numbers"] for name in names)
+        none_right = not any(right) or (outside and only_structure)
         likeliest = max(range(len(names)), key=lambda at: names[at]["probability"])
         yield WeighedFinding(
             case=f"{seed} {case.name}",
             tier=case.truth.tier,
             names=tuple(name["numbers"] for name in names),
-            right=tuple(other.get(name["effect"], own) for name, own in zip(names, right, strict=True)),
+            right=tuple(own if _is_named(name) else none_right for name, own in zip(names, right, strict=True)),
             background=categories[likeliest] == "background",
         )
 
 
-def _is_name(name: dict[str, Any]) -> bool:
-    return name["effect"] not in (UNKNOWN_NAME, SOMETHING_ELSE)
+def _is_named(name: dict[str, Any]) -> bool:
+    return bool(name["effect"] != UNKNOWN_NAME)

@@ -3,13 +3,10 @@
 The check leaves out cases in turn: the probabilities of a case are those of weights that were found without it. Cases
 of one real recording are left out together, for they share the arm and what its model lacks. The lapse is found on
 cases that were left out, too.
-
-The weights of one kind of findings may be learnt alone, from other sets than the rest: each kind has numbers of its
-own, and the numbers that all kinds share, and the lapse, stay as they are.
 """
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +15,7 @@ from sklearn.metrics import brier_score_loss, log_loss
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.statistics import wilson_interval
-from armlab.diagnosis.naming.choice import Example, Numbers, Weights, fit_lapse, fit_weights, probabilities, with_lapse
+from armlab.diagnosis.naming.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
 
 FOLDS = 5
 BINS = (0.0, 0.5, 0.7, 0.9, 1.0)
@@ -98,12 +95,12 @@ class LeftOut:
     loss: float
 
 
-def calibrate(findings: Sequence[Finding], held: Weights | None = None) -> Calibration:
-    """The weights of everything that speaks for a name, and their reliability. held: weights and a lapse that stay.
+def calibrate(findings: Sequence[Finding]) -> Calibration:
+    """The weights of everything that speaks for a name, and their reliability.
 
     Raises InputError where all findings are of one case or recording, so that none can be left out.
     """
-    tried = {narrower: leave_out(findings, narrower, held) for narrower in NARROWER}
+    tried = {narrower: leave_out(findings, narrower) for narrower in NARROWER}
     narrower = min(tried, key=lambda each: tried[each].loss)
     best, tiers = tried[narrower], {}
     for tier in sorted({each.tier for each in findings}):
@@ -112,47 +109,17 @@ def calibrate(findings: Sequence[Finding], held: Weights | None = None) -> Calib
             chances = [best.chances[at] for at in own]
             tiers[tier] = judge_reliability(chances, [findings[at].example.right for at in own])
     whole = Weights(
-        weights_of([each.example for each in findings], narrower, held.numbers if held else None),
+        weights_of([each.example for each in findings], narrower),
         float(np.mean([each.lapse for each in best.weights.values()])),
     )
     left_out = {each.recording: best.weights[each.recording] for each in findings if each.recording}
     return Calibration(whole, dict(sorted(left_out.items())), narrower, len(findings), tiers)
 
 
-def calibrate_kind(findings: Sequence[Finding], kind: str, known: Mapping[str, Weights]) -> Calibration:
-    """The weights of the numbers of one kind of findings, all others that are known as they are; see `calibrate`.
-
-    known: the weights of everything, by the public recording that they do not know, "" for none.
-    """
-    own = [each for each in findings if any(is_of_kind(key, kind) for name in each.example.names for key in name)]
-    if not own:
-        raise InputError(f"no finding of these sets is of the kind '{kind}'")
-    held = {key: value for key, value in known[""].numbers.items() if not is_of_kind(key, kind)}
-    found = calibrate(own, Weights(held, known[""].lapse))
-    learnt = {key: value for key, value in found.weights.numbers.items() if key not in held}
-
-    def completed(each: Weights) -> Weights:
-        others = {key: value for key, value in each.numbers.items() if not is_of_kind(key, kind)}
-        return Weights(others | learnt, each.lapse)
-
-    left_out = {name: completed(each) for name, each in known.items() if name}
-    return replace(found, weights=completed(known[""]), left_out=left_out)
-
-
-def is_of_kind(key: str, kind: str) -> bool:
-    """Whether a number is one of a kind of findings alone."""
-    return key.startswith(f"{kind} ")
-
-
-def weights_of(examples: Sequence[Example], narrower: float, held: Numbers | None = None) -> dict[str, float]:
-    """The likeliest weights near those that were stated before.
-
-    narrower: times the spreads that were stated. held: weights that stay.
-    """
-    held = held or {}
+def weights_of(examples: Sequence[Example], narrower: float) -> dict[str, float]:
+    """The likeliest weights near those that were stated before. narrower: times the spreads that were stated."""
     keys = sorted({key for each in examples for name in each.names for key in name})
-    spread = {key: 0.0 if key in held else narrower * stated_spread(key) for key in keys}
-    return fit_weights(examples, {key: held.get(key, 0.0) for key in keys}, spread)
+    return fit_weights(examples, dict.fromkeys(keys, 0.0), {key: narrower * stated_spread(key) for key in keys})
 
 
 def stated_spread(key: str) -> float:
@@ -162,22 +129,17 @@ def stated_spread(key: str) -> float:
     return EFFECT_SPREAD if key.startswith(EFFECT_PREFIX) else SPREAD
 
 
-def leave_out(findings: Sequence[Finding], narrower: float, held: Weights | None = None) -> LeftOut:
+def leave_out(findings: Sequence[Finding], narrower: float) -> LeftOut:
     """Leaves out each real recording and each fold of simulated cases in turn.
 
     The lapse of a group is found on the other groups, each by weights that do not know it. narrower: times the spreads.
-    held: weights and a lapse that stay.
     """
     groups = _groups(findings)
     if len(set(groups)) < 2:
         raise InputError("all findings are of one case or one real recording: give more, so that some can be left out")
     plain = {
         group: Weights(
-            weights_of(
-                [each.example for each, own in zip(findings, groups, strict=True) if own != group],
-                narrower,
-                held.numbers if held else None,
-            )
+            weights_of([each.example for each, own in zip(findings, groups, strict=True) if own != group], narrower)
         )
         for group in dict.fromkeys(groups)
     }
@@ -187,8 +149,9 @@ def leave_out(findings: Sequence[Finding], narrower: float, held: Weights | None
     weights = {}
     for group, known in plain.items():
         others = [at for at in new if groups[at] != group]
-        lapse = held.lapse if held else fit_lapse([chances[at] for at in others], [rights[at] for at in others])
-        weights[group] = Weights(known.numbers, lapse)
+        weights[group] = Weights(
+            known.numbers, fit_lapse([chances[at] for at in others], [rights[at] for at in others])
+        )
     judged = tuple(with_lapse(each, weights[group].lapse) for each, group in zip(chances, groups, strict=True))
     loss = -sum(float(np.log(judged[at][np.array(rights[at])].sum())) for at in new if any(rights[at]))
     return LeftOut(weights, judged, loss)

@@ -5,13 +5,13 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from armlab.diagnosis.claims import next_experiment
 from armlab.diagnosis.naming.choice import Weights, probabilities
-from armlab.diagnosis.result import SOMETHING_ELSE, Claim, Member, Weighed, WeighedName
+from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
@@ -27,30 +27,14 @@ def calibrated_weights(left_out: str = "") -> Weights:
 
     left_out: a public recording whose own cases they do not know.
     """
-    known = all_calibrated_weights()
-    return known.get(left_out, known[""])
-
-
-@cache
-def all_calibrated_weights() -> dict[str, Weights]:
-    """The calibrated weights by the public recording that they do not know, "" for none."""
-    content = shipped_calibration()
-    return {
-        name: Weights({str(key): float(value) for key, value in own["weights"].items()}, float(own["lapse"]))
-        for name, own in {"": content["all"], **content["left_out"]}.items()
-    }
-
-
-def shipped_calibration() -> dict[str, Any]:
-    """The content of the file of weights, with the sets that they are from."""
-    content: dict[str, Any] = json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8"))
-    return content
+    content = json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8"))
+    known = content["left_out"].get(left_out, content["all"])
+    return Weights({str(key): float(value) for key, value in known["weights"].items()}, float(known["lapse"]))
 
 
 @dataclass(frozen=True)
 class Naming:
-    """What a finding may be called. answers: its names, and `unknown` for none of them, the likeliest first; without
-    something else, so that their probabilities may add up to less than 1.
+    """What a finding may be called. answers: its names, and `unknown` for none of them, the likeliest first.
 
     claimed: the fewest of the likeliest answers that reach the level together, `unknown` perhaps among them; empty
     where more are needed than a class may have, or their names alone are not probable enough. sure: whether names reach
@@ -83,7 +67,7 @@ class Naming:
 
 
 def with_probabilities(weighed: Weighed, settings: Settings) -> list[tuple[WeighedName, float]]:
-    """Each name of a finding, and what else it may be, with its probability."""
+    """Each name of a finding, and none of them, with its probability."""
     chances = probabilities([each.numbers for each in weighed], calibrated_weights(settings.left_out))
     return [(each, float(chance)) for each, chance in zip(weighed, chances, strict=True)]
 
@@ -92,8 +76,7 @@ def naming_of(weighed: Weighed, settings: Settings) -> Naming:
     """The probabilities of the names of a finding, and what of that is claimed."""
     tuning = settings.tuning.naming
     pairs = sorted(with_probabilities(weighed, settings), key=lambda pair: -pair[1])
-    told = [(each, chance) for each, chance in pairs if each.effect != SOMETHING_ELSE]
-    answers = tuple(Member(each.effect, each.joint, each.joints, chance) for each, chance in told)
+    answers = tuple(Member(each.effect, each.joint, each.joints, chance) for each, chance in pairs)
     enough = np.flatnonzero(np.cumsum([each.probability for each in answers])[: tuning.max_class] >= tuning.level)
     together = answers[: enough[0] + 1] if len(enough) else ()
     names = [each.probability for each in answers if each.effect != UNKNOWN.id]

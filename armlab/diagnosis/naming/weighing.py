@@ -21,11 +21,11 @@ from armlab.diagnosis.blocks import rows_of_fit
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import Widths
-from armlab.diagnosis.result import SOMETHING_ELSE, Weighed, WeighedName
+from armlab.diagnosis.result import Weighed, WeighedName
 from armlab.diagnosis.search import Search, contained_groups
 from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.surrogate import Structure
-from armlab.diagnosis.unknown import flexible_gain, is_structured, predicted_share, structure_score
+from armlab.diagnosis.unknown import flexible_gain, is_structured, predicted_share
 from armlab.effects.contract import UNKNOWN, Candidate
 from armlab.effects.library import effect_named
 from armlab.effects.links import INERTIAL_ERROR_FACTS, PAYLOAD_FACTS
@@ -120,26 +120,16 @@ def weigh_addition(
 
 
 def weigh_structure(model: FittedModel, structure: Structure, claimed: Iterable[int]) -> Weighed:
-    """The names of structure that only a surrogate explains. claimed: effects of the model.
-
-    A law of the library may be there whose form no candidate has, or chance: something else than these names, which is
-    no law outside the library.
-    """
+    """The names of structure that only a surrogate explains. claimed: effects of the model."""
     joint = structure.joint + 1
     none = {
         "structure none": 1.0,
         "structure gain": float(np.log1p(structure.gain)),
-        "structure earned": float(np.log1p(structure_score(structure))),
-        "structure p": negative_logarithm(structure.p_value, 30) / 10,
-        "structure chance": negative_logarithm(structure.p_value, 6) / 6,
-        "structure validated": float(np.clip(5 * structure.validation_gain, -1, 1)),
         "structure colour": _colour(model, structure.joint),
         "structure beside": float(_unusual_at(model, joint, claimed)),
-        "structure of velocity": float(structure.depends_on == (f"velocity_{joint}",)),
     }
     trials = _in_place(model, model.state, None, structure.joint)
-    names = _weighed("structure", trials, none, joint, (joint,), model)
-    return (*names, WeighedName(SOMETHING_ELSE, joint, (joint,), {}))
+    return _weighed("structure", trials, none, joint, (joint,), model)
 
 
 def _weighed(

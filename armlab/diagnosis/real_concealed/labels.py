@@ -28,15 +28,14 @@ def label_weighed(
     """Each finding of a case. wanted: what is concealed. joints: of the arm.
 
     A name is right where it is sought; another law of friction is, where friction is withheld. None of the names is
-    right where nothing of the kind is concealed, though the arm itself may have it: `unknown` and something else, for
-    nobody knows which.
+    right where nothing of the kind is concealed, though the arm itself may have it.
     """
     judge = Judge(control, joints)
     for weighed in outcome.weighed:
-        sought = [each.is_name and _is_sought(judge, each, wanted) for each in weighed]
+        sought = [not each.is_none and _is_sought(judge, each, wanted) for each in weighed]
         background = not sought[0] and _is_in_control(judge, weighed[0])
         right = (
-            not background and (own or not (each.is_name or any(sought)))
+            not background and (own or (each.is_none and not any(sought)))
             for own, each in zip(sought, weighed, strict=True)
         )
         yield LabelledFinding(tuple(dict(each.numbers) for each in weighed), tuple(right), background)
@@ -48,7 +47,7 @@ def _is_sought(judge: Judge, name: WeighedName, wanted: tuple[SoughtEffect, ...]
 
 
 def _is_in_control(judge: Judge, name: WeighedName) -> bool:
-    return name.is_name and bool(judge.findings_in_control(_as_finding(name)))
+    return not name.is_none and bool(judge.findings_in_control(_as_finding(name)))
 
 
 def _as_finding(name: WeighedName) -> ReportedFinding:
