@@ -131,7 +131,7 @@ def conceal(
 @click.option("--development", is_flag=True, help="A set for development.")
 @click.option("--score", "scored", type=_FOLDER, help="Folder with the score of a diagnosis of the same set.")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
-@click.option("--asked", type=click.IntRange(min=1), help="Ask about so many of them, drawn at random [default: all].")
+@click.option("--asked", type=click.IntRange(min=1), help="How many of them, drawn at random [default: all].")
 @click.option("--work", type=OutputPath(), help="Folder for answers; an interrupted command continues there.")
 @click.option("--out", type=OutputPath(), help="Folder for oracle.csv and oracle.md [default: that of --score].")
 @prints_lines
@@ -166,6 +166,8 @@ def oracle(
     out = out or scored
     if out is None:
         raise click.UsageError("--out or --score is needed, the folder for oracle.csv and oracle.md")
+    if asked is not None and asked > cases:
+        raise click.UsageError(f"--asked {asked} is more than --cases {cases}: give {cases} or less")
     settings = make_set_settings(cases, seed, tier, "mixed", development)
     effects = None if scored is None else read_scored_effects(settings, scored)
     work = work or Path(".armlab/oracle") / str(seed)

@@ -51,7 +51,7 @@ class ServoSimulation:
     delay: float = 0.0
 
     def number_of(self, row: int) -> int:
-        """Number in the robot, from 1, of the recorded joint of a column, from 0."""
+        """The robot's number, from 1, of the joint that a column of the recording, from 0, belongs to."""
         return self.joints[row] + 1
 
     @property
