@@ -84,12 +84,10 @@ def local_executor(workers: int, timeout_s: float | None, isolated: bool = False
     threading.Thread(target=_watch_workers, args=(executor, over), daemon=True).start()
     try:
         yield executor
-    except BaseException:
-        executor.pool.shutdown(wait=True, kill_workers=True)  # no one waits for what is under way any more
-        raise
-    else:
-        executor.pool.shutdown(wait=True)
     finally:
+        # Nothing under way is waited for any more. Workers that were asked to end would have to read it from their
+        # queue, and one that was killed at this moment would leave the queue locked for the others, without end.
+        executor.pool.shutdown(wait=True, kill_workers=True)
         over.set()
 
 
