@@ -72,6 +72,7 @@ _GROUPS = {
         "conceal": "armlab.cli.proof:conceal",
         "score": "armlab.cli.proof:score",
         "calibrate": "armlab.cli.proof:calibrate_names",
+        "calibrate-unknown": "armlab.cli.proof:calibrate_unknown",
         "oracle": "armlab.cli.proof:oracle",
         "next-loop": "armlab.cli.proof:next_loop",
         "ablate": "armlab.cli.proof:ablate",

@@ -11,7 +11,7 @@ from armlab.cli.options import OutputPath
 from armlab.cli.output import prints_lines, prints_result
 from armlab.common.documents import ResultLines
 
-_FOLDER = click.Path(path_type=Path)
+_PATH = click.Path(path_type=Path)
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
@@ -19,7 +19,7 @@ _Command = TypeVar("_Command", bound=Callable[..., Any])
 @click.option("--seed", type=int, default=1950, show_default=True, help="A development seed, 1000-1999.")
 @click.option("--cases", type=click.IntRange(min=1), default=50, show_default=True, help="Mixed cases, both tiers.")
 @click.option("--nulls", type=click.IntRange(min=1), default=50, show_default=True, help="Cases with nothing hidden.")
-@click.option("--work", type=_FOLDER, default=Path(".armlab/ablation"), show_default=True)
+@click.option("--work", type=_PATH, default=Path(".armlab/ablation"), show_default=True)
 @click.option("--results", type=OutputPath(), default=Path("results/proof"), show_default=True)
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 @click.option(
@@ -129,7 +129,7 @@ def conceal(
 @click.option("--seed", type=int, required=True, help="Of the set.")
 @click.option("--tier", type=click.Choice(["clean", "realistic", "both"]), default="both", show_default=True)
 @click.option("--development", is_flag=True, help="A set for development.")
-@click.option("--score", "scored", type=_FOLDER, help="Folder with the score of a diagnosis of the same set.")
+@click.option("--score", "scored", type=_PATH, help="Folder with the score of a diagnosis of the same set.")
 @click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
 @click.option("--asked", type=click.IntRange(min=1), help="How many of them, drawn at random [default: all].")
 @click.option("--work", type=OutputPath(), help="Folder for answers; an interrupted command continues there.")
@@ -185,8 +185,8 @@ def oracle(
 
 
 @click.command()
-@click.argument("folder", type=_FOLDER)
-@click.option("--verdicts", type=_FOLDER, help="Folder with a verdict.json a case.")
+@click.argument("folder", type=_PATH)
+@click.option("--verdicts", type=_PATH, help="Folder with a verdict.json a case.")
 @click.option("--manifest", help="SHA-256 that `conceal` printed.")
 @click.option("--out", type=OutputPath(), help="Folder for the score [default: VERDICTS/score].")
 @prints_result
@@ -223,7 +223,7 @@ def _write_summary_again(results: Path) -> Iterator[str]:
 @click.option(
     "--set",
     "sets",
-    type=(_FOLDER, _FOLDER),
+    type=(_PATH, _PATH),
     multiple=True,
     metavar="SET VERDICTS",
     help="A concealed development set and its verdicts; may be given more than once.",
@@ -231,7 +231,7 @@ def _write_summary_again(results: Path) -> Iterator[str]:
 @click.option(
     "--motion",
     "motion_sets",
-    type=_FOLDER,
+    type=_PATH,
     multiple=True,
     metavar="WORK",
     help="Folder of `armlab prove-motion --seed SEED`; may be given more than once.",
@@ -239,7 +239,7 @@ def _write_summary_again(results: Path) -> Iterator[str]:
 @click.option(
     "--real",
     "real_sets",
-    type=_FOLDER,
+    type=_PATH,
     multiple=True,
     metavar="TABLES",
     help="Output folder of `armlab real-concealed --seed SEED`; may be given more than once.",
@@ -278,12 +278,39 @@ def calibrate_names(
         yield f"wrote {path}"
 
 
+@click.command("calibrate-unknown")
+@click.option(
+    "--claims",
+    type=_PATH,
+    multiple=True,
+    required=True,
+    help="claims.csv of a judged set of an earlier engine, named after its commit; give two or more.",
+)
+@click.option("--check", "unseen", type=_PATH, multiple=True, help="The same of a set that has no part in the limit.")
+@click.option("--out", type=OutputPath(), required=True, help="Folder for unknown_limit.json and unknown.md.")
+@prints_lines
+def calibrate_unknown(claims: tuple[Path, ...], unseen: tuple[Path, ...], out: Path) -> Iterator[str]:
+    """Learn how sure a finding may be that it is unknown.
+
+    From judged sets of earlier engines, which judge no more; each is left out in turn to see what the limit does.
+    """
+    from armlab.concealed.score.unknown_limit import check_limit, limit_lines, limit_of, read_claims, write_limit
+
+    learnt = [read_claims(each) for each in claims]
+    scores = check_limit(learnt, [read_claims(each) for each in unseen])
+    limit = limit_of(learnt)
+    yield f"{limit.right} of {limit.findings} sure findings without a name were right: limit {limit.value:.2f}"
+    yield from limit_lines(scores)
+    for path in write_limit(learnt, scores, out):
+        yield f"wrote {path}"
+
+
 @click.command()
 @click.option("--quick", is_flag=True, help="A few cases of each tier, of a fixed development seed, not logged.")
 @click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, not logged.")
 @click.option("--cases", type=click.IntRange(min=0), default=400, show_default=True, help="Mixed torque cases.")
 @click.option("--nulls", type=click.IntRange(min=0), default=600, show_default=True, help="Torque nulls.")
-@click.option("--work", type=_FOLDER, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
+@click.option("--work", type=_PATH, help="Folder for sets and verdicts [default: .armlab/proof/<commit>].")
 @click.option("--results", type=OutputPath(), help="Folder for scores [default: results/proof].")
 @click.option(
     "--tier",
@@ -330,9 +357,7 @@ def _sealed_set_options(kind: str, contents: str) -> Callable[[_Command], _Comma
     """Seed, folders and processes of a sealed set."""
     options = (
         click.option("--seed", type=int, help="1000-1999 are for development [default: follows from the commit]."),
-        click.option(
-            "--work", type=_FOLDER, help=f"Folder for {contents} and verdicts [default: .armlab/{kind}/SEED]."
-        ),
+        click.option("--work", type=_PATH, help=f"Folder for {contents} and verdicts [default: .armlab/{kind}/SEED]."),
         click.option(
             "--results", type=OutputPath(), help=f"Folder for {kind}.md and {kind}.json [default: WORK/score]."
         ),

@@ -9,7 +9,7 @@ from armlab.common.errors import InputError
 from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.naming.calibrate import Finding, calibrate, judge_reliability
 from armlab.diagnosis.naming.choice import Example, Weights, fit_lapse, fit_weights, probabilities, with_lapse
-from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of
+from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of, unknown_limit
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings, vary
 from armlab.effects.friction import CoulombFriction
@@ -157,11 +157,21 @@ def test_what_may_be_nothing_needs_names_that_are_probable_without_unknown() -> 
     assert naming_of(weighed(0.08, coulomb_friction=0.5, viscous_friction=0.42), Settings()).sure
 
 
+def test_no_finding_is_surer_to_have_no_name_than_such_findings_were_right() -> None:
+    only = claim("unknown", weighed(1.0))
+    (found,) = named_claims([only], Settings())
+    assert (found.effect, found.probability) == ("unknown", unknown_limit())
+    assert [(each.effect, each.probability) for each in found.members] == [("unknown", unknown_limit())]
+    (found,) = named_claims([claim("coulomb_friction", weighed(0.8, coulomb_friction=0.2))], Settings())
+    assert found.probability == unknown_limit()
+    assert [round(each.probability, 2) for each in found.members] == [round(unknown_limit(), 2), 0.2]
+
+
 def test_two_unknowns_of_a_joint_are_one_finding() -> None:
-    names = weighed(0.9, coulomb_friction=0.1)
-    other = replace(claim("unknown", weighed(0.6, coulomb_friction=0.4)), depends_on=("position_2",))
+    names = weighed(0.6, coulomb_friction=0.4)
+    other = replace(claim("unknown", weighed(0.5, coulomb_friction=0.5)), depends_on=("position_2",))
     (found,) = named_claims([claim("coulomb_friction", names), other], Settings())
-    assert found.probability == pytest.approx(0.9)
+    assert found.probability == pytest.approx(0.6)
     assert np.array_equal(found.prediction, 2 * np.ones((3, 2)))
     assert found.depends_on == ("position_2",)
 

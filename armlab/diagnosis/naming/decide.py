@@ -18,6 +18,7 @@ from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 
 CALIBRATION_FILE: Final = "calibration.json"
+LIMIT_FILE: Final = "unknown_limit.json"
 MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 
@@ -30,6 +31,12 @@ def calibrated_weights(left_out: str = "") -> Weights:
     content = json.loads(files(__package__).joinpath(CALIBRATION_FILE).read_text(encoding="utf-8"))
     known = content["left_out"].get(left_out, content["all"])
     return Weights({str(key): float(value) for key, value in known["weights"].items()}, float(known["lapse"]))
+
+
+@cache
+def unknown_limit() -> float:
+    """How sure a finding may be that it is unknown: as often as such ones were right (`armlab calibrate-unknown`)."""
+    return float(json.loads(files(__package__).joinpath(LIMIT_FILE).read_text(encoding="utf-8"))["limit"])
 
 
 @dataclass(frozen=True)
@@ -107,7 +114,19 @@ def named_claims(claims: Sequence[Claim], settings: Settings, plain: Collection[
             out.append(each)
         else:
             out[there] = _together(out[there], each)
-    return tuple(out)
+    return tuple(map(_limited, out))
+
+
+def _limited(claim: Claim) -> Claim:
+    """A finding that is no surer to have no name than such findings were right."""
+    if claim.effect != UNKNOWN.id or claim.probability is None:
+        return claim
+    limit = unknown_limit()
+    members = (
+        replace(each, probability=min(each.probability, limit)) if each.effect == UNKNOWN.id else each
+        for each in claim.members
+    )
+    return replace(claim, probability=min(claim.probability, limit), members=tuple(members))
 
 
 def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
