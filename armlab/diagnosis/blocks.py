@@ -181,7 +181,7 @@ def split_folds(rows: WhitenedRows, values: Array, precision: Array, count: int)
 
 @dataclass(frozen=True)
 class Gain:
-    """Share by which held-out errors fall, and one-sided p-values of that.
+    """By how much squared held-out errors fall, a share of what is left of them, and one-sided p-values of that.
 
     p_value asks whether stretches of time profit alike: what a few of them hold may be a fault of theirs. chance asks
     whether noise would make it. change: mean square of what the prediction changes by: how much the data excite it.

@@ -112,7 +112,7 @@ def fold_features(made: Features, observed: Observed, joint: int, tuning: Surrog
 class Structure:
     """What a surrogate predicts of a joint's residual.
 
-    gain: share by which the whitened held-out error falls, p_value: of chance making that (see `Gain`); the surer of
+    gain: by how much the whitened held-out error falls, p_value: of chance making that (see `Gain`); the surer of
     validation rows and of identification stretches held out in turn. validation_gain: on validation rows alone. share:
     of the validation variance as it is. prediction: (rows,), N m. depends_on: variables, most important first.
     """

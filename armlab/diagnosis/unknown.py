@@ -130,7 +130,7 @@ def unknown_evidence(model: FittedModel, each: Structure, before: Array, after: 
         each.validation_gain,
         float(np.sqrt(np.mean(before[rows] ** 2))),
         float(np.sqrt(np.mean(after[rows] ** 2))),
-        -0.5 * len(before) * float(np.log(max(1 - each.gain, 1e-6))),
+        0.5 * len(before) * float(np.log1p(max(each.gain, 0.0))),
     )
 
 
