@@ -12,6 +12,7 @@ from problem.motion import Motion
 from problem.pseudo_inertia import least_eigenvalues
 from problem.regressor import inertia_column, rigid_body_torque
 
+MOTION_STEP = 1e-4  # rad (m) of the largest change of position, for differences
 NO_INERTIA = 1e-9  # an eigenvalue of a pseudo-inertia, which rounding leaves of none
 
 
@@ -57,6 +58,33 @@ class Scene:
         arm, position = self.arm, self.motion.position
         columns = (inertia_column(arm, position, joint, self.inertial)[:, joint] for joint in range(len(arm)))
         return np.column_stack(list(columns))
+
+    def own_torque_slopes(self, joint: int) -> tuple[Array, Array]:
+        """By how much the rigid torque of a joint (from 0) grows with its own angle and with its own speed, (samples,).
+
+        N m/rad and N m s/rad (N/m, N s/m). Computed once: hundreds of springs and gaps of a joint ask for it.
+        """
+        if joint not in self._slopes:
+            self._slopes[joint] = self._compute_slopes(joint)
+        return self._slopes[joint]
+
+    @cached_property
+    def _slopes(self) -> dict[int, tuple[Array, Array]]:
+        return {}
+
+    def _compute_slopes(self, joint: int) -> tuple[Array, Array]:
+        motion, ends = self.motion, []
+        for sign in (1, -1):
+            position, velocity = motion.position.copy(), motion.velocity.copy()
+            position[:, joint] += sign * MOTION_STEP
+            velocity[:, joint] += sign * MOTION_STEP
+            changed = (
+                Motion(position, motion.velocity, motion.acceleration),
+                Motion(motion.position, velocity, motion.acceleration),
+            )
+            ends.append([rigid_body_torque(self.arm, each, self.inertial)[:, joint] for each in changed])
+        by_angle, by_speed = ((more - less) / (2 * MOTION_STEP) for more, less in zip(*ends, strict=True))
+        return _read_only(by_angle), _read_only(by_speed)
 
     @cached_property
     def has_bodies(self) -> bool:

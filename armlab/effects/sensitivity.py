@@ -12,11 +12,11 @@ from scipy.signal import savgol_filter
 
 from armlab.common.arrays import Array
 from armlab.effects.contract import Scene
+from armlab.effects.scene import MOTION_STEP
 from problem.arm import Joint
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
-MOTION_STEP = 1e-4  # rad (m) of the largest change of position
 GEOMETRY_STEP = 1e-4  # m, rad
 WINDOW, ORDER = 9, 4  # samples and degree of the light low-pass (Savitzky and Golay 1964) that differentiates
 
@@ -38,25 +38,6 @@ def directional_derivative(scene: Scene, change: Motion) -> Array:
     ]
     forwards, backwards = (rigid_body_torque(scene.arm, end, scene.inertial) for end in ends)
     return (forwards - backwards) / (2 * step)
-
-
-def own_torque_slopes(scene: Scene, joint: int) -> tuple[Array, Array]:
-    """By how much the rigid torque of a joint (from 0) grows with its own angle and with its own speed, (samples,).
-
-    N m/rad and N m s/rad (N/m, N s/m).
-    """
-    motion, ends = scene.motion, []
-    for sign in (1, -1):
-        position, velocity = motion.position.copy(), motion.velocity.copy()
-        position[:, joint] += sign * MOTION_STEP
-        velocity[:, joint] += sign * MOTION_STEP
-        changed = (
-            Motion(position, motion.velocity, motion.acceleration),
-            Motion(motion.position, velocity, motion.acceleration),
-        )
-        ends.append([rigid_body_torque(scene.arm, each, scene.inertial)[:, joint] for each in changed])
-    by_angle, by_speed = ((more - less) / (2 * MOTION_STEP) for more, less in zip(*ends, strict=True))
-    return by_angle, by_speed
 
 
 def joint_displacement(scene: Scene, joint: int, change: Array) -> Motion:

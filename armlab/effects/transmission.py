@@ -26,7 +26,7 @@ from armlab.effects.contract import (
     Value,
 )
 from armlab.effects.friction import mean_within_samples, positions_within_samples
-from armlab.effects.sensitivity import directional_derivative, joint_displacement, own_torque_slopes
+from armlab.effects.sensitivity import directional_derivative, joint_displacement
 from armlab.effects.term import EveryJoint, Term, format_number, joint_moves
 from problem.arm import Arm
 from problem.kernel import pointer
@@ -125,7 +125,7 @@ def _load_slopes(scene: Scene, joint: int, inertia: Array, stiffness: Array | fl
     """
     if not scene.has_bodies:
         return np.zeros(len(inertia)), np.gradient(inertia, scene.step)
-    by_angle, by_speed = own_torque_slopes(scene, joint)
+    by_angle, by_speed = scene.own_torque_slopes(joint)
     return np.maximum(by_angle, -0.5 * stiffness), by_speed
 
 
