@@ -32,7 +32,7 @@ from problem.arm import Limits
 from problem.kernel import lib, pointer
 from problem.trajectories import Excitation, JointFourier
 
-POINTS_PER_HARMONIC = 64  # of the bound between samples; a multiple of the eight lanes of the kernel
+POINTS_PER_HARMONIC = 64  # of the bound between samples; a multiple of the lanes of the kernel
 PEAK_FACTOR = 1 / np.cos(np.pi / POINTS_PER_HARMONIC)
 ROUNDING_SHARE = 1e-12  # of each limit that is kept free: far above rounding, far below what can be measured
 

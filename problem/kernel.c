@@ -1,12 +1,14 @@
 /* Observation matrix, Gram matrix, torques and Fourier series for whole populations of trajectories.
  *
- * Eight samples at a time in one vector; the order of every sum is fixed and no product is fused with a sum
- * (-ffp-contract=off), so that the results are the same to the bit on every processor and for every batch. */
+ * Four samples at a time in one vector, which is as wide as the registers of most processors: wider ones are split into
+ * scalars. The order of every sum is fixed and no product is fused with a sum (-ffp-contract=off), so that the results
+ * are the same to the bit on every processor and for every batch. */
 
 #include <stdint.h>
 #include <string.h>
 
-#define LANES 8
+#define LANES 4
+#define HALVES 2 /* vectors of sums of a Gram matrix: eight partial sums of every eighth sample */
 #define MAX_JOINTS 16
 #define MAX_OWNED 3
 typedef double V __attribute__((vector_size(8 * LANES)));
@@ -45,6 +47,13 @@ INLINE Vec into(const Mat *r, Vec v) {
     const V *m = r->m;
     return (Vec){m[0] * v.x + m[3] * v.y + m[6] * v.z, m[1] * v.x + m[4] * v.y + m[7] * v.z,
                  m[2] * v.x + m[5] * v.y + m[8] * v.z};
+}
+
+/* R v: from the link's frame into the parent's */
+INLINE Vec out_of(const Mat *r, Vec v) {
+    const V *m = r->m;
+    return (Vec){m[0] * v.x + m[1] * v.y + m[2] * v.z, m[3] * v.x + m[4] * v.y + m[5] * v.z,
+                 m[6] * v.x + m[7] * v.y + m[8] * v.z};
 }
 
 /* Sine and cosine: Cody and Waite's reduction by pi/2 in three parts, then the minimax polynomials of
@@ -106,53 +115,117 @@ INLINE void row_of_link(Vec a, Vec al, Vec w, const V *wxx, Screw s, V *out) {
     out[9] = s.angular.y * al.z + s.angular.z * al.y + e.y * w.z + e.z * w.y;
 }
 
-/* rows[(i * joints + j) * 10 + k]: joint i, link j >= i, parameter k, for eight samples (eq. 9-39). */
+/* A link's frame in that of its parent: R, and the shift to the joint's axis in the parent's frame. */
+typedef struct { Mat r; Vec shift; } Frame;
+
+/* Angular velocity and acceleration of a link, and the acceleration of its frame's origin less gravity. */
+typedef struct { Vec w, al, a; } Rates;
+
+INLINE Rates at_rest(const double *gravity) {
+    const double still[3] = {0, 0, 0};
+    const double upward[3] = {-gravity[0], -gravity[1], -gravity[2]};
+    return (Rates){constant(still), constant(still), constant(upward)};
+}
+
+/* From the parent's rates to those of a link; also the link's frame (eq. 9-20). */
+INLINE void move_to_link(const JointData *d, V q, V qd, V qdd, Frame *frame, Rates *rates) {
+    Vec w = rates->w, al = rates->al, a = rates->a;
+    V zero = {0}, c = zero + 1.0, s = zero;
+    if (!d->prismatic) sine_cosine(q, &s, &c);
+    rotation(d, c, s, &frame->r);
+    Vec shift = constant(d->before_shift);
+    if (d->prismatic) {
+        const double along[3] = {d->before_rotation[2], d->before_rotation[5], d->before_rotation[8]};
+        shift = add(shift, scaled(along, q));
+    }
+    frame->shift = shift;
+    if (d->prismatic || d->shifted_before)
+        a = add(a, add(cross(al, shift), cross(w, cross(w, shift))));
+    Vec motion = scaled(d->axis, qd), motion_rate = scaled(d->axis, qdd);
+    w = into(&frame->r, w), al = into(&frame->r, al), a = into(&frame->r, a);
+    Vec carried = cross(w, motion);
+    if (d->prismatic) {
+        a = add(a, add(motion_rate, add(carried, carried)));
+    } else {
+        al = add(al, add(motion_rate, carried));
+        w = add(w, motion);
+    }
+    Vec arm = constant(d->after_shift);
+    if (d->shifted_after) a = add(a, add(cross(al, arm), cross(w, cross(w, arm))));
+    *rates = (Rates){w, al, a};
+}
+
+INLINE Screw axis_of(const JointData *d) {
+    const double still[3] = {0, 0, 0};
+    Vec angular = constant(d->prismatic ? still : d->axis);
+    return (Screw){angular, d->prismatic ? constant(d->axis) : cross(angular, constant(d->after_shift))};
+}
+
+/* rows[(i * joints + j) * 10 + k]: joint i, link j >= i, parameter k, for some samples (eq. 9-39). */
 INLINE void rows_of_samples(int joints, const JointData *data, const double *gravity, const V *q, const V *qd,
                             const V *qdd, V *rows) {
     Screw screws[MAX_JOINTS];
-    const double still[3] = {0, 0, 0};
-    const double upward[3] = {-gravity[0], -gravity[1], -gravity[2]};
-    Vec w = constant(still), al = w, a = constant(upward);
+    Rates rates = at_rest(gravity);
+    Frame frame;
     for (int j = 0; j < joints; j++) {
         const JointData *d = data + j;
-        V zero = {0}, c = zero + 1.0, s = zero;
-        if (!d->prismatic) sine_cosine(q[j], &s, &c);
-        Mat r;
-        rotation(d, c, s, &r);
-        Vec shift = constant(d->before_shift);
-        if (d->prismatic) {
-            const double along[3] = {d->before_rotation[2], d->before_rotation[5], d->before_rotation[8]};
-            shift = add(shift, scaled(along, q[j]));
-        }
-        if (d->prismatic || d->shifted_before)
-            a = add(a, add(cross(al, shift), cross(w, cross(w, shift))));
-        Vec motion = scaled(d->axis, qd[j]), motion_rate = scaled(d->axis, qdd[j]);
-        w = into(&r, w), al = into(&r, al), a = into(&r, a);
-        Vec carried = cross(w, motion);
-        if (d->prismatic) {
-            a = add(a, add(motion_rate, add(carried, carried)));
-        } else {
-            al = add(al, add(motion_rate, carried));
-            w = add(w, motion);
-        }
-        Vec arm = constant(d->after_shift);
-        if (d->shifted_after) a = add(a, add(cross(al, arm), cross(w, cross(w, arm))));
+        move_to_link(d, q[j], qd[j], qdd[j], &frame, &rates);
+        Vec a = rates.a, al = rates.al, w = rates.w, arm = constant(d->after_shift);
         for (int i = 0; i < j; i++) {
             Vec linear = screws[i].linear;
-            if (d->prismatic || d->shifted_before) linear = add(linear, cross(screws[i].angular, shift));
-            screws[i].angular = into(&r, screws[i].angular);
-            screws[i].linear = into(&r, linear);
+            if (d->prismatic || d->shifted_before) linear = add(linear, cross(screws[i].angular, frame.shift));
+            screws[i].angular = into(&frame.r, screws[i].angular);
+            screws[i].linear = into(&frame.r, linear);
             if (d->shifted_after) screws[i].linear = add(screws[i].linear, cross(screws[i].angular, arm));
         }
-        screws[j].angular = constant(d->prismatic ? still : d->axis);
-        screws[j].linear = d->prismatic ? constant(d->axis) : cross(screws[j].angular, arm);
+        screws[j] = axis_of(d);
         V products[6] = {w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z, w.y * w.z};
         for (int i = 0; i <= j; i++)
             row_of_link(a, al, w, products, screws[i], rows + 10 * (i * joints + j));
     }
 }
 
-/* Eight samples of one trajectory, (samples, joints) in memory, as one vector a joint; missing ones are 0. */
+/* A force and a moment about the origin of a frame. */
+typedef struct { Vec force, moment; } Wrench;
+
+/* What moves a link, from its ten parameters: mass, first moment, inertia about its own origin. */
+INLINE Wrench wrench_of_link(const Rates *rates, const double *p) {
+    Vec w = rates->w, al = rates->al, first = constant(p + 1);
+    Vec turned = {p[4] * w.x + p[7] * w.y + p[8] * w.z, p[7] * w.x + p[5] * w.y + p[9] * w.z,
+                  p[8] * w.x + p[9] * w.y + p[6] * w.z};
+    Vec pushed = {p[4] * al.x + p[7] * al.y + p[8] * al.z, p[7] * al.x + p[5] * al.y + p[9] * al.z,
+                  p[8] * al.x + p[9] * al.y + p[6] * al.z};
+    Vec carried = {p[0] * rates->a.x, p[0] * rates->a.y, p[0] * rates->a.z};
+    Vec force = add(carried, add(cross(al, first), cross(w, cross(w, first))));
+    return (Wrench){force, add(add(pushed, cross(w, turned)), cross(first, rates->a))};
+}
+
+/* torque[i]: of joint i, for some samples, from the last link to the first (Luh, Walker and Paul 1980). */
+INLINE void torques_of_samples(int joints, const JointData *data, const double *gravity, const V *q, const V *qd,
+                               const V *qdd, const double *parameters, V *torque) {
+    Frame frames[MAX_JOINTS];
+    Wrench wrenches[MAX_JOINTS];
+    Rates rates = at_rest(gravity);
+    for (int j = 0; j < joints; j++) {
+        move_to_link(data + j, q[j], qd[j], qdd[j], frames + j, &rates);
+        wrenches[j] = wrench_of_link(&rates, parameters + 10 * j);
+    }
+    for (int j = joints - 1; j >= 0; j--) {
+        const JointData *d = data + j;
+        Wrench own = wrenches[j];
+        Screw axis = axis_of(d);
+        torque[j] = dot(axis.angular, own.moment) + dot(axis.linear, own.force);
+        if (j == 0) break;
+        Vec moment = own.moment;
+        if (d->shifted_after) moment = add(moment, cross(constant(d->after_shift), own.force));
+        Vec force = out_of(&frames[j].r, own.force);
+        moment = out_of(&frames[j].r, moment);
+        if (d->prismatic || d->shifted_before) moment = add(moment, cross(frames[j].shift, force));
+        wrenches[j - 1] = (Wrench){add(wrenches[j - 1].force, force), add(wrenches[j - 1].moment, moment)};
+    }
+}
+
+/* Some samples of one trajectory, (samples, joints) in memory, as one vector a joint; missing ones are 0. */
 INLINE void load(int joints, int count, const double *from, V *to) {
     for (int j = 0; j < joints; j++) {
         double lanes[LANES] = {0};
@@ -196,10 +269,11 @@ void gram_matrices(int joints, const JointData *data, const double *gravity, int
     V *sums = (V *)(((uintptr_t)scratch + sizeof(V) - 1) & ~(uintptr_t)(sizeof(V) - 1));
     int width = 10 * joints, n = chosen + owned * joints;
     for (int64_t p = 0; p < trajectories; p++) {
-        memset(sums, 0, sizeof(V) * n * n);
+        memset(sums, 0, sizeof(V) * HALVES * n * n);
         for (int64_t s = 0; s < samples; s += LANES) {
             int64_t at = (p * samples + s) * joints;
             int count = at_most_lanes(samples - s);
+            V *half = sums + (s / LANES % HALVES) * n * n;
             load(joints, count, q + at, vq);
             load(joints, count, qd + at, vqd);
             load(joints, count, qdd + at, vqdd);
@@ -214,20 +288,19 @@ void gram_matrices(int joints, const JointData *data, const double *gravity, int
                 if (count < LANES)
                     for (int k = first[i]; k < chosen; k++) row[k] *= present;
                 for (int k = first[i]; k < chosen; k++) {
-                    V value = row[k], *sum = sums + k * n;
+                    V value = row[k], *sum = half + k * n;
                     for (int c = k; c < chosen; c++) sum[c] += value * row[c];
                     for (int c = 0; c < owned; c++) sum[behind + c] += value * mine[c];
                 }
                 for (int k = 0; k < owned; k++)
-                    for (int c = k; c < owned; c++) sums[(behind + k) * n + behind + c] += mine[k] * mine[c];
+                    for (int c = k; c < owned; c++) half[(behind + k) * n + behind + c] += mine[k] * mine[c];
             }
         }
         double *gram = out + p * n * n;
         for (int k = 0; k < n; k++)
             for (int c = k; c < n; c++) {
-                V v = sums[k * n + c];
-                gram[k * n + c] = gram[c * n + k] =
-                    ((v[0] + v[1]) + (v[2] + v[3])) + ((v[4] + v[5]) + (v[6] + v[7]));
+                V v = sums[k * n + c], u = sums[(n + k) * n + c];
+                gram[k * n + c] = gram[c * n + k] = ((v[0] + v[1]) + (v[2] + v[3])) + ((u[0] + u[1]) + (u[2] + u[3]));
             }
     }
 }
@@ -236,19 +309,15 @@ void gram_matrices(int joints, const JointData *data, const double *gravity, int
 FOR_EACH_PROCESSOR
 void torques(int joints, const JointData *data, const double *gravity, int64_t samples, const double *q,
              const double *qd, const double *qdd, const double *parameters, double *out) {
-    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], rows[MAX_JOINTS * MAX_JOINTS * 10];
-    int width = 10 * joints;
+    V vq[MAX_JOINTS], vqd[MAX_JOINTS], vqdd[MAX_JOINTS], torque[MAX_JOINTS];
     for (int64_t s = 0; s < samples; s += LANES) {
         int count = at_most_lanes(samples - s);
         load(joints, count, q + s * joints, vq);
         load(joints, count, qd + s * joints, vqd);
         load(joints, count, qdd + s * joints, vqdd);
-        rows_of_samples(joints, data, gravity, vq, vqd, vqdd, rows);
-        for (int i = 0; i < joints; i++) {
-            V torque = {0};
-            for (int k = 10 * i; k < width; k++) torque += rows[i * width + k] * parameters[k];
-            for (int l = 0; l < count; l++) out[(s + l) * joints + i] = torque[l];
-        }
+        torques_of_samples(joints, data, gravity, vq, vqd, vqdd, parameters, torque);
+        for (int i = 0; i < joints; i++)
+            for (int l = 0; l < count; l++) out[(s + l) * joints + i] = torque[i][l];
     }
 }
 
@@ -270,7 +339,7 @@ void series(int64_t trajectories, int64_t samples, int joints, int terms, const 
 INLINE V blend(I where, V chosen, V other) { return (V)(((I)chosen & where) | ((I)other & ~where)); }
 
 /* Lowest and highest of sums of basis functions, (trajectories, joints, 2), of the sum over k of
- * coefficients (trajectories, joints, terms) * basis (terms, samples); samples: a multiple of eight. */
+ * coefficients (trajectories, joints, terms) * basis (terms, samples); samples: a multiple of four. */
 FOR_EACH_PROCESSOR
 void series_extremes(int64_t trajectories, int64_t samples, int joints, int terms, const double *basis,
                      const double *coefficients, double *out) {

@@ -17,7 +17,7 @@ from problem.kernel import ffi, lib, pointer
 from problem.motion import Motion
 
 MAX_JOINTS, MAX_OWNED = 16, 3  # as in kernel.c
-LANES = 8
+PARTIAL_SUMS = 8  # of each entry of a Gram matrix: LANES * HALVES of kernel.c
 
 
 def observation_matrix(arm: Arm, motion: Motion) -> Array:
@@ -56,7 +56,7 @@ def extended_gram_matrix(arm: Arm, motion: Motion, columns: NDArray[np.intp], ow
         raise ValueError(f"own columns should have the shape {motion.position.shape} and up to {MAX_OWNED} a joint")
     size = len(columns) + joints * owned
     out = np.empty((*motion.batch, size, size))
-    scratch = np.empty(LANES * (size**2 + 1))
+    scratch = np.empty(PARTIAL_SUMS * (size**2 + 1))
     chosen, first = _check_columns(np.asarray(columns, dtype=np.int32).tobytes(), joints)
     trajectories = math.prod(motion.batch)
     lib.gram_matrices(

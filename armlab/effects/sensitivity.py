@@ -1,6 +1,6 @@
 """How the rigid torque changes with the motion, the geometry and gravity: central differences.
 
-The rigid torque of ten thousand samples costs a fraction of a millisecond, so differences of it are cheaper
+The rigid torque of ten thousand samples costs a millisecond or two, so differences of it are cheaper
 than any formula, and have no errors of their own kind.
 """
 
