@@ -85,8 +85,8 @@ def local_executor(workers: int, timeout_s: float | None, isolated: bool = False
     try:
         yield executor
     finally:
-        # Nothing under way is waited for any more. Workers that were asked to end would have to read it from their
-        # queue, and one that was killed at this moment would leave the queue locked for the others, without end.
+        # Nobody waits for what is under way any more, so workers are killed, not asked to end. Asked, they would read
+        # that from a queue that they share; a worker that died there would leave the queue locked for the others.
         executor.pool.shutdown(wait=True, kill_workers=True)
         over.set()
 

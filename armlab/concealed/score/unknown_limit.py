@@ -17,6 +17,7 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.cases import UNKNOWN_NAME
 from armlab.concealed.score.measures import Measure, is_right_name, reliability_measures
+from armlab.concealed.score.page import format_measure
 from armlab.concealed.score.rows import CLAIM_COLUMNS, read_table
 
 LIMIT_FILE, LIMIT_SCHEMA, PAGE_FILE = "unknown_limit.json", "unknown-limit/1", "unknown.md"
@@ -127,21 +128,14 @@ def write_limit(learnt: Sequence[JudgedClaims], scores: Sequence[LimitedScore], 
 
 
 def _row(score: LimitedScore) -> tuple[str, ...]:
-    figures = [_words(own[each]) for each in SCORES for own in (score.stated, score.limited)]
+    figures = [format_measure(own[each]) for each in SCORES for own in (score.stated, score.limited)]
     return (f"{score.name} (marked)" if score.checked else score.name, score.tier, f"{score.limit:.2f}", *figures)
 
 
 def limit_lines(scores: Sequence[LimitedScore]) -> list[str]:
     """What the limit does to the log skill, a line a tier of a set, for the terminal."""
     return [
-        f"{each.name}, {each.tier}: log skill {_words(each.stated['log_skill'])}, "
-        f"with the limit {_words(each.limited['log_skill'])}"
+        f"{each.name}, {each.tier}: log skill {format_measure(each.stated['log_skill'])}, "
+        f"with the limit {format_measure(each.limited['log_skill'])}"
         for each in scores
     ]
-
-
-def _words(measure: Measure) -> str:
-    if measure.value is None:
-        return "–"
-    interval = "" if measure.low is None else f" ({measure.low:.2f} to {measure.high:.2f})"
-    return f"{measure.value:.2f}{interval}"
