@@ -1,6 +1,7 @@
 """Executors on this machine: in this process, or in processes of loky, the engine of joblib."""
 
 import os
+import queue
 import signal
 import threading
 import time
@@ -59,9 +60,21 @@ class LokyExecutor:
         try:
             return self._submit_to_pool(work)
         except BrokenProcessPool:
-            self.pool.shutdown(wait=True, kill_workers=True)
+            self.end()
             self.pool = self._start_pool()
             return self._submit_to_pool(work)
+
+    def end(self) -> None:
+        """Kill the workers, whatever they do.
+
+        Asked to end, they would read that from a queue that they share; a worker that died there would leave the queue
+        locked for the others. What no worker was given yet is taken back first: loky would still look for it when it
+        has forgotten it.
+        """
+        with suppress(queue.Empty):
+            while True:
+                self.pool._work_ids.get_nowait()
+        self.pool.shutdown(wait=True, kill_workers=True)
 
     def _submit_to_pool(self, work: Work) -> "Future[WorkReport]":
         future: Future[WorkReport] = self.pool.submit(run_in_worker, list(work), self.timeout_s)
@@ -85,9 +98,7 @@ def local_executor(workers: int, timeout_s: float | None, isolated: bool = False
     try:
         yield executor
     finally:
-        # Nobody waits for what is under way any more, so workers are killed, not asked to end. Asked, they would read
-        # that from a queue that they share; a worker that died there would leave the queue locked for the others.
-        executor.pool.shutdown(wait=True, kill_workers=True)
+        executor.end()
         over.set()
 
 

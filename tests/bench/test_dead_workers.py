@@ -1,4 +1,4 @@
-"""A worker of loky that dies at a bad moment: while it writes a report, or when the driver ends its workers."""
+"""Workers of loky that end at a bad moment: while they write a report, or when work was just handed in."""
 
 import subprocess
 import sys
@@ -43,6 +43,18 @@ if __name__ == "__main__":
     print("ended")
 """
 
+STOPPED_WITH_WORK_HANDED_IN = """\
+from bench.executors.local import local_executor
+
+if __name__ == "__main__":
+    for _ in range(15):  # the moment is short: some of them hit it
+        with local_executor(2, None) as executor:
+            executor.submit([]).result(timeout=60)
+            for _ in range(3):
+                executor.submit([])
+    print("ended")
+"""
+
 
 def test_half_a_report_of_a_dead_worker_does_not_stop_the_driver() -> None:
     command = [sys.executable, "-c", HALF_A_REPORT]
@@ -54,3 +66,9 @@ def test_a_worker_that_dies_when_the_work_is_done_does_not_stop_the_driver() -> 
     command = [sys.executable, "-c", KILLED_AT_THE_END]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.stdout.split() == ["ended"], done.stderr
+
+
+def test_a_driver_that_stops_when_it_has_just_handed_in_work_stops_without_a_word() -> None:
+    command = [sys.executable, "-c", STOPPED_WITH_WORK_HANDED_IN]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert (done.stdout.split(), done.stderr) == (["ended"], "")
