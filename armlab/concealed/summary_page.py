@@ -23,8 +23,10 @@ from armlab.concealed.servo.score import MOTION_FILE, read_motion_measures
 from armlab.concealed.setup.score import SETUP_FILE, read_setup_measures
 
 SUMMARY_PAGE = "summary.md"
+_SETS = {"clean": "mixed", "realistic": "mixed", "reading simulated": "setup", "reading real": "setup"}
+_NULLS = "false_claims_on_nulls"
 SHOWN = (
-    "false_claims_on_nulls",
+    _NULLS,
     "wrong_names_beyond_background",
     "wrong_names_of_named",
     "right_name_or_class",
@@ -46,7 +48,7 @@ truth may be on its other side.
 
 - *Clean*, *realistic*: torques simulated by two engines ([score](mixed/score.md)); large enough is above
   {MIN_NAMED_MULTIPLE:g} detection limits, a class has four names at most. Nulls, with nothing hidden, are a set of
-  their own ([nulls](nulls/score.md)).
+  their own, which may have been judged on another commit ([nulls](nulls/score.md)).
 - *Reading*: mistakes in how a recording is read, put into simulated and real recordings ([score](setup/setup.md));
   large enough is what can be seen, a class has three names at most.
 - *Motion*: commands and positions without torque ([score](motion/motion.md)), {MIN_NAMED_MULTIPLE:g} limits.
@@ -80,7 +82,7 @@ def write_summary(results: Path) -> Path:
     page = markdown_page(
         "What was wanted and found",
         "The last judged run of each tier.",
-        markdown_table(("measure", "wanted", *columns), [_commits(results, columns), *rows]),
+        markdown_table(("measure", "wanted", *columns), [*_commit_rows(results, columns), *rows]),
         HOW_TO_READ,
         *_engines(results),
     )
@@ -92,7 +94,7 @@ def _columns(results: Path) -> Iterator[tuple[str, list[Measure]]]:
     if (results / "mixed" / SCORE_FILE).is_file():
         nulls = _torque(results / "nulls")
         for tier, measures in _torque(results / "mixed").items():
-            more = {each.id: each for each in nulls.get(tier, []) if each.id == "false_claims_on_nulls"}
+            more = {each.id: each for each in nulls.get(tier, []) if each.id == _NULLS}
             yield tier, [more.get(each.id, each) for each in measures]
     if (results / "setup" / SETUP_FILE).is_file():
         yield from ((f"reading {source}", each) for source, each in read_setup_measures(results / "setup").items())
@@ -137,13 +139,18 @@ def _oracle_rows(id: str, columns: Columns, results: Path) -> Iterator[list[str]
     yield ["&nbsp;&nbsp;too small", "-", *(each.below for each in found)]
 
 
-def _commits(results: Path, columns: Columns) -> list[str]:
-    """The last commit that each column was judged on."""
+def _commit_rows(results: Path, columns: Columns) -> Iterator[list[str]]:
+    """The last commit that each column was judged on, and its nulls, which may be a set of their own."""
     lines = (results / LOG_FILE).read_text(encoding="utf-8").splitlines()
     last = {entry["set"]: entry["commit"][:7] for entry in map(json.loads, lines)}
-    sets = {"clean": "mixed", "realistic": "mixed"}
-    names = (sets.get(name, "setup" if name.startswith("reading") else name) for name in columns)
-    return ["commit", "-", *(last.get(name, "-") for name in names)]
+    sets = {name: _SETS.get(name, name) for name in columns}
+    null_sets = {
+        name: "nulls" if judged == "mixed" else judged
+        for name, judged in sets.items()
+        if _cell(columns[name].get(_NULLS)) != "-"
+    }
+    yield ["commit", "-", *(last.get(sets[name], "-") for name in columns)]
+    yield ["commit of the nulls", "-", *(last.get(null_sets.get(name, ""), "-") for name in columns)]
 
 
 def _engines(results: Path) -> list[str]:
