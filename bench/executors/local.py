@@ -67,9 +67,9 @@ class LokyExecutor:
     def end(self) -> None:
         """Kill the workers, whatever they do.
 
-        Asked to end, they would read that from a queue that they share; a worker that died there would leave the queue
-        locked for the others. What no worker was given yet is taken back first: loky would still look for it when it
-        has forgotten it.
+        Workers that are asked to end read this from a queue that they share. If one dies while it reads, the queue
+        stays locked, and the others never end. Work that no worker has taken is removed from loky's list first: loky
+        deletes its records of all work before it reads this list once more, and fails where a record is missing.
         """
         with suppress(queue.Empty):
             while True:

@@ -1,4 +1,4 @@
-"""Workers of loky that end at a bad moment: while they write a report, or when work was just handed in."""
+"""Workers of loky that end at a bad moment: in the middle of a report, when all is done, just after a submission."""
 
 import subprocess
 import sys
@@ -43,7 +43,7 @@ if __name__ == "__main__":
     print("ended")
 """
 
-STOPPED_WITH_WORK_HANDED_IN = """\
+STOPPED_AFTER_SUBMITTING = """\
 from bench.executors.local import local_executor
 
 if __name__ == "__main__":
@@ -68,7 +68,7 @@ def test_a_worker_that_dies_when_the_work_is_done_does_not_stop_the_driver() -> 
     assert done.stdout.split() == ["ended"], done.stderr
 
 
-def test_a_driver_that_stops_when_it_has_just_handed_in_work_stops_without_a_word() -> None:
-    command = [sys.executable, "-c", STOPPED_WITH_WORK_HANDED_IN]
+def test_a_driver_that_stops_just_after_it_submitted_work_prints_no_error() -> None:
+    command = [sys.executable, "-c", STOPPED_AFTER_SUBMITTING]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert (done.stdout.split(), done.stderr) == (["ended"], "")
