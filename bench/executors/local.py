@@ -19,6 +19,7 @@ _ONE_THREAD_ENVIRONMENT = dict.fromkeys(
     ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "NUMEXPR_NUM_THREADS"), "1"
 )
 _BATCHES_PER_WORKER = 2  # batches a worker, so that none waits for the next one
+_FEEDER_WAIT_S = 5.0  # it has nothing to do any more, and ends at once
 _POLL_INTERVAL_S = 1.0  # long against the milliseconds in which loky sees that a worker died
 
 
@@ -70,11 +71,16 @@ class LokyExecutor:
         Workers that are asked to end read this from a queue that they share. If one dies while it reads, the queue
         stays locked, and the others never end. Work that no worker has taken is removed from loky's list first: loky
         deletes its records of all work before it reads this list once more, and fails where a record is missing.
+        loky does not wait for the thread that feeds its workers. Python could end while that thread, the last to use
+        the semaphores of the queue, removes them; loky's tracker of resources would then warn of a leak.
         """
         with suppress(queue.Empty):
             while True:
                 self.pool._work_ids.get_nowait()
+        feeder = getattr(self.pool._call_queue, "_thread", None)  # none before the first work, or after the end
         self.pool.shutdown(wait=True, kill_workers=True)
+        if feeder is not None:
+            feeder.join(_FEEDER_WAIT_S)
 
     def _submit_to_pool(self, work: Work) -> "Future[WorkReport]":
         future: Future[WorkReport] = self.pool.submit(run_in_worker, list(work), self.timeout_s)
@@ -94,12 +100,14 @@ def local_executor(workers: int, timeout_s: float | None, isolated: bool = False
         return
     executor = LokyExecutor(workers, timeout_s)
     over = threading.Event()
-    threading.Thread(target=_watch_workers, args=(executor, over), daemon=True).start()
+    watcher = threading.Thread(target=_watch_workers, args=(executor, over), daemon=True)
+    watcher.start()
     try:
         yield executor
     finally:
         executor.end()
         over.set()
+        watcher.join()  # it, too, refers to the pool and its semaphores
 
 
 def _watch_workers(executor: LokyExecutor, over: threading.Event) -> None:

@@ -68,8 +68,8 @@ def test_a_worker_that_dies_when_the_work_is_done_does_not_stop_the_driver() -> 
     assert done.stdout.split() == ["ended"], done.stderr
 
 
-def test_a_driver_that_stops_just_after_it_submitted_work_prints_no_traceback() -> None:
+def test_a_driver_that_stops_just_after_it_submitted_work_prints_nothing() -> None:
     command = [sys.executable, "-c", STOPPED_AFTER_SUBMITTING]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.stdout.split() == ["ended"], done.stderr
-    assert "Traceback" not in done.stderr  # loky may warn of a worker that was killed while it started
+    assert not done.stderr
