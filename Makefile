@@ -56,7 +56,7 @@ search-space: .venv/run ## what a search space within all limits does for each a
 	$(BIN)/armlab search-space
 
 tune: .venv/dev ## every algorithm tuned with the same budget, judged on problems that took no part: results/tune/
-	$(BIN)/armlab tune
+	$(BIN)/armlab tune --overwrite
 
 landscape: .venv/run ## what makes an algorithm win, and which optimiser to take: results/landscape/, docs/which-optimiser.md
 	$(BIN)/armlab landscape

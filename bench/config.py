@@ -104,7 +104,7 @@ class Experiment(Settings):
     output: Literal["table", "convergence", "swarm_sizes", "rivals"] = "table"
     printed: bool = False
     executor: ExecutorSettings | None = None
-    trial_timeout_s: Annotated[float, Field(gt=0)] | None = None
+    trial_timeout_s: Annotated[float, Field(gt=0, le=10**9)] | None = None
 
     @model_validator(mode="after")
     def _one_budget(self) -> Self:
@@ -165,6 +165,8 @@ def parse_params(params_type: type[Any], data: dict[str, Any], where: str) -> An
 
 
 def _field_default(field: Any) -> Any:
+    if field.default_factory is not MISSING:
+        return Field(default_factory=field.default_factory)
     return ... if field.default is MISSING else field.default
 
 

@@ -1,6 +1,8 @@
 """The folder of results: it never mixes the results of two configurations."""
 
+import re
 import tempfile
+from hashlib import sha256
 from itertools import zip_longest
 from pathlib import Path
 
@@ -12,10 +14,17 @@ def settings_path(folder: Path, name: str) -> Path:
     return folder / f"{name}.settings.yaml"
 
 
-def check_folder(folder: Path, name: str, settings: str) -> None:
+def file_name(label: str) -> str:
+    """A label as a part of a file's name, another one for each label."""
+    plain = re.sub(r"[^A-Za-z0-9.-]+", "_", label)
+    return plain if plain == label and plain.strip(".") else f"{plain}_{sha256(label.encode()).hexdigest()[:6]}"
+
+
+def check_folder(folder: Path, name: str, settings: str, overwrite: bool = False) -> None:
     """Check, before hours of work, that results of these settings may be written into a folder.
 
-    Raises InputError if the folder cannot be written, or if it holds results of that name and other settings.
+    Raises InputError if the folder cannot be written, or if it holds results of that name and other settings, which
+    are kept unless `overwrite`.
     """
     there = settings_path(folder, name)
     try:
@@ -25,6 +34,8 @@ def check_folder(folder: Path, name: str, settings: str) -> None:
         found = there.read_bytes().decode(errors="replace") if there.exists() else None
     except OSError as error:
         raise InputError(f"cannot write to the results folder {folder}: {error.strerror}") from None
+    if overwrite:
+        return
     way_out = "choose another folder with --results, or replace them with --overwrite"
     if found is None and (folder / f"{name}.csv").exists():
         raise InputError(f"{folder}/{name}.csv stands without {there.name}, which would say how it was made: {way_out}")

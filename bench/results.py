@@ -15,7 +15,8 @@ Files = dict[str, str | bytes]
 def write_results(experiment: Experiment, entries: Plan, settings: str, store: RunStore, folder: Path) -> list[Path]:
     """Write the files that the experiment's `output` names; returns their paths.
 
-    The settings are written last, so that incomplete results are never taken for complete ones.
+    The settings are written last, and old ones are removed first, so that incomplete results are never taken for
+    complete ones.
     """
     make = {
         "table": _table_files,
@@ -24,6 +25,7 @@ def write_results(experiment: Experiment, entries: Plan, settings: str, store: R
         "rivals": _rivals_files,
     }[experiment.output]
     files = make(experiment, entries, store) | {settings_path(folder, experiment.name).name: settings}
+    settings_path(folder, experiment.name).unlink(missing_ok=True)
     for name, content in files.items():
         write_whole(folder / name, content)
     return [folder / name for name in files]

@@ -58,8 +58,7 @@ def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Pa
     """
     loaded = load_experiment(path)  # validate the configuration, plan its trials
     experiment, entries = loaded.experiment, loaded.entries
-    if not options.overwrite:
-        check_folder(options.results, experiment.name, loaded.settings)
+    check_folder(options.results, experiment.name, loaded.settings, options.overwrite)
     with open_store(options.store) as store:
         if options.fresh:
             store.forget(entry.key for entry in entries)
@@ -72,6 +71,7 @@ def run_experiment(path: Path, options: RunOptions, bar: ProgressBar) -> list[Pa
                 progress=progress.update,
                 executor=options.executor or experiment.executor,
                 timeout_s=experiment.trial_timeout_s,
+                continued_by="the same command without --fresh" if options.fresh else "the same command",
             )
         from bench.results import write_results  # pandas takes longer to import than a small run
 
@@ -126,15 +126,17 @@ def run_missing(
     progress: Callable[[int], object] = lambda trials: None,
     executor: ExecutorSettings | None = None,
     timeout_s: float | None = None,
+    continued_by: str = "the same command",
 ) -> None:
     """Run the entries that the store lacks and store each outcome as it comes; a failure is never stored.
 
     workers: processes, where no cluster is named. progress: is called with the number of trials of each batch that is
     done. timeout_s: a trial that takes longer is ended and counts as failed. None of them changes an outcome.
+    continued_by: what goes on after Ctrl-C.
     Raises StoppedError on Ctrl-C, and TrialsFailedError at the end if trials failed.
     """
     missing, batches = count_missing_work(entries, store)
-    trials = [entry.trial for entry in entries]
+    trials = [entry.trial for entry in (entries.first_entries() if isinstance(entries, Plan) else entries)]
     isolated = any(map(is_plug_in, {trial.algorithm for trial in trials}))  # it may end its process
     isolated = isolated or any(is_plug_in_problem(trial.problem) for trial in trials)
     failures = _Failures()
@@ -151,8 +153,7 @@ def run_missing(
     except KeyboardInterrupt:
         left = count_missing(entries, store)
         raise StoppedError(
-            f"stopped: {missing - left} trials are finished and kept, {left} are left; "
-            "the same command goes on from here"
+            f"stopped: {missing - left} trials are finished and kept, {left} are left; {continued_by} goes on from here"
         ) from None
     if failures.count:
         raise failures.error()
@@ -201,7 +202,7 @@ def describe_run(path: Path, options: RunOptions) -> ResultLines:
 
 def _count_missing_by_series(entries: Plan, options: RunOptions) -> dict[Series, int]:
     """How many repetitions of each series are missing."""
-    if not options.store.exists():
+    if options.fresh or not options.store.exists():
         return dict.fromkeys(entries.series, entries.repetitions)
     with open_store(options.store) as store:
         return {

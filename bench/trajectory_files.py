@@ -3,6 +3,7 @@
 A trajectory that breaks a limit at that rate is refused.
 """
 
+import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -114,7 +115,7 @@ def to_csv(trajectory: SampledTrajectory) -> str:
 
 def to_ros2(trajectory: SampledTrajectory) -> str:
     """A message trajectory_msgs/msg/JointTrajectory as YAML: rad (m), s from the start of the motion."""
-    names = ", ".join(trajectory.joint_names)
+    names = ", ".join(map(json.dumps, trajectory.joint_names))  # in quotes: `1` and `on` would be no texts
     lines = ["header: {stamp: {sec: 0, nanosec: 0}, frame_id: ''}", f"joint_names: [{names}]", "points:"]
     for index, parts in enumerate(zip(*_motion_parts(trajectory), strict=True)):
         seconds, nanoseconds = divmod(round(index * 1e9 / trajectory.rate_hz), 10**9)

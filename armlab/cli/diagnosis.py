@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armlab.cli.options import FiniteNumber, OutputPath, lock_option
+from armlab.cli.options import FiniteNumber, JobCount, OutputPath, lock_option
 from armlab.cli.output import prints_lines, prints_result, tell_progress
 from armlab.cli.safety_options import safety_options
 from armlab.common.documents import ResultLines
@@ -271,7 +271,7 @@ def relations(
 @click.option("--seed", type=int, help="Draws random cases; 1000-1999 are for development [default: a fixed plan].")
 @click.option("--cases", type=click.IntRange(min=1), default=16, show_default=True, help="Random ones of a recording.")
 @click.option("--out", type=OutputPath(), help="Folder for the tables of random cases [default: RESULTS].")
-@click.option("--jobs", type=int, default=1, show_default=True, help="Processes for random cases.")
+@click.option("--jobs", type=JobCount(), default=1, show_default=True, help="Processes for random cases.")
 @prints_lines
 def real_concealed(
     results: Path,

@@ -130,7 +130,7 @@ def _examine_folders() -> Iterator[Examined]:
         yield Examined(LOCAL_COPIES_VARIABLE, "ok", "not set: public recordings are downloaded")
     else:
         there = copies.is_dir()
-        text = str(copies) if there else f"{copies} is no folder: public recordings are downloaded"
+        text = str(copies) if there else f"{copies} is no folder, and public recordings are looked for there alone"
         yield Examined(LOCAL_COPIES_VARIABLE, "ok" if there else "missing", text)
     if cache is None:
         yield Examined("download cache", "missing", "no downloads without pooch: pip install 'armlab[recordings]'")

@@ -404,9 +404,16 @@ def published(results: Path) -> ResultLines:
 @click.option("--workers", type=click.IntRange(min=1), help="Number of processes [default: one a core].")
 @_STORE_OPTION
 @click.option("--results", type=click.Path(path_type=Path), default=Path("results/tune"), show_default=True)
+@click.option("--overwrite", is_flag=True, help="Replace results of other settings.")
 @prints_result
 def tune(
-    algorithms: tuple[str, ...], config: Path, budget: int | None, workers: int | None, store: Path, results: Path
+    algorithms: tuple[str, ...],
+    config: Path,
+    budget: int | None,
+    workers: int | None,
+    store: Path,
+    results: Path,
+    overwrite: bool,
 ) -> ResultLines:
     """Tune ALGORITHMS, the same budget for each [default: all].
 
@@ -418,7 +425,7 @@ def tune(
     from bench.studies.tuning.study import TuningOptions, tune_algorithms
 
     records = Path("results/best_known.json")
-    options = TuningOptions(algorithms, budget, store, results, records, workers or cpu_count())
+    options = TuningOptions(algorithms, budget, store, results, records, workers or cpu_count(), overwrite)
     return written_files(tune_algorithms(config, options, trial_bar))
 
 

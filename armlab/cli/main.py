@@ -150,6 +150,9 @@ class _CommandGroup(click.Group):
         except StoppedError as error:
             click.echo(f"armlab: {error}", err=True)
             ctx.exit(130)  # what a shell reports for Ctrl-C
+        except KeyboardInterrupt:
+            click.echo("armlab: stopped", err=True)
+            ctx.exit(130)
         except TrialsFailedError as error:
             click.echo(f"armlab: {error}", err=True)
             ctx.exit(1)

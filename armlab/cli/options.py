@@ -18,6 +18,17 @@ class FiniteNumber(click.FloatRange):
         return number
 
 
+class JobCount(click.types.IntParamType):
+    """A number of processes, as joblib counts them: -1 is one a core; zero, which does nothing, is refused."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The number; a usage error for zero."""
+        number = super().convert(value, param, ctx)
+        if number == 0:
+            self.fail("0 processes do nothing; -1 is one a core.", param, ctx)
+        return number
+
+
 class OutputPath(click.Path):
     """A file or folder to write; an empty name, which would be the working folder, is refused."""
 

@@ -7,7 +7,7 @@ from typing import Any, Literal, TypeVar
 
 import click
 
-from armlab.cli.options import OutputPath
+from armlab.cli.options import JobCount, OutputPath
 from armlab.cli.output import prints_lines, prints_result
 from armlab.common.documents import ResultLines
 
@@ -21,7 +21,7 @@ _Command = TypeVar("_Command", bound=Callable[..., Any])
 @click.option("--nulls", type=click.IntRange(min=1), default=50, show_default=True, help="Cases with nothing hidden.")
 @click.option("--work", type=_PATH, default=Path(".armlab/ablation"), show_default=True)
 @click.option("--results", type=OutputPath(), default=Path("results/proof"), show_default=True)
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@click.option("--jobs", type=JobCount(), default=-1, show_default=True, help="Processes.")
 @click.option(
     "--vary",
     "changes",
@@ -63,7 +63,7 @@ def ablate(
     help="Folder for recordings, answers and verdicts; an interrupted loop continues.",
 )
 @click.option("--results", type=OutputPath(), help="Folder for table and picture [default: OUT/score].")
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@click.option("--jobs", type=JobCount(), default=-1, show_default=True, help="Processes.")
 @prints_lines
 def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int) -> Iterator[str]:
     """Measure how well a second motion decides between rivals.
@@ -96,7 +96,7 @@ def next_loop(cases: int, seed: int, out: Path, results: Path | None, jobs: int)
 @click.option("--tier", type=click.Choice(["clean", "realistic", "both"]), default="both", show_default=True)
 @click.option("--kind", type=click.Choice(["mixed", "nulls"]), default="mixed", show_default=True)
 @click.option("--development", is_flag=True, help="Leave out the kinds of noise of judged sets.")
-@click.option("--jobs", type=int, default=1, show_default=True, help="Processes.")
+@click.option("--jobs", type=JobCount(), default=1, show_default=True, help="Processes.")
 @click.option("--out", type=OutputPath(), required=True, help="Folder for observations, truth and manifest.")
 @prints_result
 def conceal(
@@ -130,7 +130,7 @@ def conceal(
 @click.option("--tier", type=click.Choice(["clean", "realistic", "both"]), default="both", show_default=True)
 @click.option("--development", is_flag=True, help="A set for development.")
 @click.option("--score", "scored", type=_PATH, help="Folder with the score of a diagnosis of the same set.")
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@click.option("--jobs", type=JobCount(), default=-1, show_default=True, help="Processes.")
 @click.option("--asked", type=click.IntRange(min=1), help="How many of them, drawn at random [default: all].")
 @click.option("--work", type=OutputPath(), help="Folder for answers; an interrupted command continues there.")
 @click.option("--out", type=OutputPath(), help="Folder for oracle.csv and oracle.md [default: that of --score].")
@@ -170,18 +170,18 @@ def oracle(
         raise click.UsageError(f"--asked {asked} is more than --cases {cases}: give {cases} or less")
     settings = make_set_settings(cases, seed, tier, "mixed", development)
     effects = None if scored is None else read_scored_effects(settings, scored)
-    work = work or Path(".armlab/oracle") / str(seed)
+    answers = work or Path(".armlab/oracle") / str(seed)
     numbers = draw_cases(settings, asked or cases)
-    for _ in tqdm(ask_about_set(settings, numbers, work, jobs), total=len(numbers), unit="case", desc="asked"):
+    for _ in tqdm(ask_about_set(settings, numbers, answers, jobs), total=len(numbers), unit="case", desc="asked"):
         pass
-    for path in write_oracle(collect_answers(settings, numbers, work), (len(numbers), cases), effects, out):
+    for path in write_oracle(collect_answers(settings, numbers, answers), (len(numbers), cases), effects, out):
         yield f"wrote {path}"
-    if len(numbers) == cases:
-        shutil.rmtree(work)
     if (out / SCORE_FILE).is_file():
         write_page_again(out)
         yield f"{out / PAGE_FILE}: written again with the distance to the oracle"
         yield from _write_summary_again(out.parent)
+    if work is None and len(numbers) == cases:  # a folder of the user's own may hold more
+        shutil.rmtree(answers)
 
 
 @click.command()
@@ -319,7 +319,7 @@ def calibrate_unknown(claims: tuple[Path, ...], unseen: tuple[Path, ...], out: P
     multiple=True,
     help="Only this tier; may be given more than once [default: all].",
 )
-@click.option("--jobs", type=int, default=-1, show_default=True, help="Processes.")
+@click.option("--jobs", type=JobCount(), default=-1, show_default=True, help="Processes.")
 @prints_lines
 def prove(
     quick: bool,
@@ -361,7 +361,7 @@ def _sealed_set_options(kind: str, contents: str) -> Callable[[_Command], _Comma
         click.option(
             "--results", type=OutputPath(), help=f"Folder for {kind}.md and {kind}.json [default: WORK/score]."
         ),
-        click.option("--jobs", type=int, default=-1, show_default=True, help="Processes."),
+        click.option("--jobs", type=JobCount(), default=-1, show_default=True, help="Processes."),
     )
 
     def decorate(command: _Command) -> _Command:

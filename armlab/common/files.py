@@ -3,7 +3,7 @@
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from armlab.common.errors import InputError
@@ -24,7 +24,8 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from None
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):  # there is no draft where it could not be written
+            draft.unlink()
 
 
 def refuse_inputs(inputs: Iterable[Path], outputs: Iterable[Path], made: str) -> None:

@@ -106,7 +106,7 @@ def _try_import(name: str, value: str, limit_s: float) -> str:
     known = _read_tried()
     if key in known:
         return ""
-    command = [sys.executable, "-m", __spec__.name, name, value]
+    command = [sys.executable, "-P", "-m", __spec__.name, name, value]
     surroundings = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     try:
         done = subprocess.run(

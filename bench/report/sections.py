@@ -141,6 +141,8 @@ def count_sentence(results: ResultSet, cells: Sequence[Cell]) -> str:
 def headline(cells: Sequence[Cell], found: CriticalDifference) -> tuple[str, str]:
     """Who has the best average rank, whom it beats and with whom it ties; then who of the others beats whom."""
     best, *others = found.ranks
+    if not others:
+        return f"{best} is the only algorithm: nothing was compared.", ""
     equal = [name for name in others if np.isclose(found.ranks[name], found.ranks[best])]
     leads = f"{join_words([best, *equal])} share" if equal else f"{best} has"
     first = f"{leads} the best average rank, {found.ranks[best]:.2f} of {len(found.ranks)}"

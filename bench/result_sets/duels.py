@@ -9,6 +9,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import suggest_name
+from bench.files import file_name
 from bench.printed import display_name
 from bench.result_sets.formats import make_folder, read_results
 from bench.result_sets.result_set import CELL_COLUMNS
@@ -31,8 +32,10 @@ def write_duels(where: Path, store: Path, subject: str, folder: Path) -> list[Pa
     labels = [str(label) for label in results.trials["algorithm"].unique()]
     if subject not in labels:
         raise InputError(f"{results.name} has no algorithm '{subject}': {suggest_name(subject, labels)}")
+    if len(labels) == 1:
+        raise InputError(f"{results.name} has no algorithm beside '{subject}': a duel needs two")
     table = subject_duels_table(results.trials, subject)
-    stem = f"{results.name}_{subject}_duels"
+    stem = f"{results.name}_{file_name(subject)}_duels"
     make_folder(folder)
     files = {f"{stem}.csv": as_csv(table), f"{stem}.md": _duels_page(results.name, subject, table, results.trials)}
     for name, content in files.items():

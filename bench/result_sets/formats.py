@@ -24,6 +24,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from armlab.common.report.printed_table import TABLE_FORMS
 from bench.config import NAME_PATTERN
+from bench.files import file_name
 from bench.result_sets.result_set import (
     CELL_COLUMNS,
     TRIAL_COLUMNS,
@@ -61,17 +62,34 @@ def write_tidy(results: ResultSet, folder: Path, form: str) -> list[Path]:
         "README.md": _README_TEXT.format(name=results.name, settings=SETTINGS, origins=ORIGINS),
         SETTINGS: results.settings,
     }
-    make_folder(folder)
+    _check_shared_folder(folder, results, files)
+    for name in TABLES:
+        for other in _WRITERS.keys() - {form}:  # a reader would not know which table counts
+            (folder / f"{name}.{other}").unlink(missing_ok=True)
     for name, content in files.items():
         write_whole(folder / name, content)
     return [folder / name for name in files]
+
+
+def _check_shared_folder(folder: Path, results: ResultSet, names: Iterable[str]) -> None:
+    """Makes the folder; raises InputError where files of others would be replaced."""
+    make_folder(folder)
+    try:
+        if (folder / SETTINGS).read_text() == results.settings:
+            return
+    except (OSError, ValueError):
+        pass
+    tables = [f"{name}.{form}" for name in TABLES for form in _WRITERS]
+    there = sorted(name for name in {*names, *tables} if (folder / name).exists())
+    if there:
+        raise InputError(f"{folder} holds {there[0]}, which is not of these results: choose another folder with --out")
 
 
 def read_tidy(folder: Path) -> ResultSet:
     """The result set in a folder that `write_tidy` wrote; raises InputError, in one line, if it is none."""
     try:
         settings = (folder / SETTINGS).read_text()
-        origins = json.loads((folder / ORIGINS).read_text())
+        origins = _check_origins(json.loads((folder / ORIGINS).read_text()))
         name = _check_settings(yaml.safe_load(settings))
     except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
         raise InputError(f"{folder} is no folder of results: {error!s}".splitlines()[0]) from None
@@ -79,7 +97,14 @@ def read_tidy(folder: Path) -> ResultSet:
     trials, curves = _read_table(trials_file, []), _read_table(curves_file, ["evaluations"])
     _check_repetitions(trials, trials_file)
     _check_same_trials(trials, curves, trials_file, curves_file)
-    return ResultSet(name, settings, tuple(origins), trials, TableOfCurves(curves))
+    return ResultSet(name, settings, origins, trials, TableOfCurves(curves))
+
+
+def _check_origins(origins: Any) -> tuple[dict[str, Any], ...]:
+    """The machines that took part; raises ValueError where they are not as `share` writes them."""
+    if not isinstance(origins, list) or not all(isinstance(each, dict) for each in origins):
+        raise ValueError(f"{ORIGINS} should be a list with a mapping for each machine")
+    return tuple(origins)
 
 
 def _check_settings(settings: Any) -> str:
@@ -119,7 +144,7 @@ def _read_table(path: Path, also_key: Sequence[str]) -> pd.DataFrame:
     if table.empty:
         raise InputError(f"{path} has no rows: share the results again")
     for column in ("problem", "algorithm"):
-        _check_cells(table[column].notna(), table, column, path, "a name")
+        _check_cells(table[column].notna() & (table[column] != ""), table, column, path, "a name")
     for column in ("value", *_LEAST):
         unit = "whole number" if column in _COUNTED else "number"
         numbers = pd.to_numeric(table[column], errors="coerce")
@@ -195,7 +220,20 @@ def _to_parquet(pieces: Iterator[pd.DataFrame]) -> bytes:
 
 
 _WRITERS: dict[str, Callable[[Iterator[pd.DataFrame]], Any]] = {"csv": _to_csv, "parquet": _to_parquet}
-_READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": pd.read_csv, "parquet": pd.read_parquet}
+
+
+def _from_csv(path: Path) -> pd.DataFrame:
+    return pd.read_csv(path, converters=dict.fromkeys(("problem", "algorithm"), str))  # `1` and `none` are names, too
+
+
+def _from_parquet(path: Path) -> pd.DataFrame:
+    try:
+        return pd.read_parquet(path)
+    except ImportError:
+        raise InputError(f"{path}: to read Parquet install the package `pyarrow`") from None
+
+
+_READERS: dict[str, Callable[[Path], pd.DataFrame]] = {"csv": _from_csv, "parquet": _from_parquet}
 
 
 def write_summary(results: ResultSet, folder: Path, form: str) -> list[Path]:
@@ -213,10 +251,12 @@ _IOH_VERSION = "0.3.5"  # of the format
 
 def write_iohprofiler(results: ResultSet, folder: Path) -> list[Path]:
     """Write a result set into a folder; returns the JSON files."""
+    if "dimension" not in results.trials:
+        raise InputError(f"the trials of {results.name} have no column `dimension`, which IOHprofiler needs")
     written = []
     for number, (label, trials, curves) in enumerate(results.cells(), start=1):
         for algorithm, runs in runs_by_algorithm(curves).items():
-            place = folder / _file_name(algorithm)
+            place = folder / file_name(algorithm)
             written.append(
                 _write_ioh_problem(
                     place, number, label, int(trials["dimension"].iloc[0]), algorithm, list(runs.values())
@@ -226,7 +266,7 @@ def write_iohprofiler(results: ResultSet, folder: Path) -> list[Path]:
 
 
 def _write_ioh_problem(place: Path, number: int, label: str, dimension: int, algorithm: str, runs: list[Run]) -> Path:
-    name = f"f{number}_{_file_name(label)}"
+    name = f"f{number}_{file_name(label)}"
     table = f"data_{name}/IOHprofiler_f{number}_DIM{dimension}.dat"
     make_folder(place / f"data_{name}")
     write_whole(place / table, "\n".join(["evaluations raw_y", *map(_ioh_rows, runs)]) + "\n")
@@ -262,10 +302,6 @@ def _ioh_run_summary(run: Run) -> dict[str, Any]:
 
 def _finite_best(run: Run) -> Array:
     return np.asarray(np.minimum(run.best, NOTHING_KNOWN))
-
-
-def _file_name(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9.-]+", "_", text)
 
 
 SHARED_FORMATS: Mapping[str, Callable[[ResultSet, Path], list[Path]]] = MappingProxyType(

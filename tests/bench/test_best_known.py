@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from refusals import refusal
 
-from bench.studies.best_known.descent import descend, evaluate_point
+from bench.studies.best_known.descent import SearchEnd, descend, evaluate_point
 from bench.studies.best_known.records import (
     RECORDS_FILE,
     Record,
@@ -19,7 +19,7 @@ from bench.studies.best_known.records import (
     records_by_problem,
     write_records,
 )
-from bench.studies.best_known.search import improve_best_known, record_point
+from bench.studies.best_known.search import SearchStart, improve_best_known, record_point
 from problem.excitation import ExcitationProblem
 from problem.registry import ProblemSettings, parse_problem
 
@@ -215,3 +215,23 @@ def test_a_file_that_is_no_record_is_told(tmp_path: Path) -> None:
     assert f"'schema' in {path}: should be 'best-known/1', not 'other/1'" == refusal(read_records, path)
     path.write_text("{")
     assert f"{path}: not valid JSON" in refusal(read_records, path)
+
+
+def test_what_another_search_found_meanwhile_is_kept(
+    tmp_path: Path, plan: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = plan(PLAN)
+    list(improve_best_known(tmp_path, 0.0, config=config))
+    file = tmp_path / RECORDS_FILE
+    found = read_records(file)["tiny"]
+    better = found.model_copy(update={"value": 1.0, "ends": found.ends | {"kick": (1.0,)}})
+
+    def run(start: SearchStart, *arguments: object) -> tuple[str, SearchEnd]:
+        write_records(file, {"tiny": better, "other": found})
+        return "gradient", evaluate_point(tiny(), record_point(found))
+
+    monkeypatch.setattr(SearchStart, "run", run)
+    list(improve_best_known(tmp_path, 0.0, config=config))
+    after = read_records(file)
+    assert set(after) == {"tiny", "other"}
+    assert (after["tiny"].value, after["tiny"].starts) == (1.0, better.starts + 1)

@@ -8,7 +8,7 @@ from refusals import refusal
 from small_results import Ran, ran
 
 from bench.result_sets.duels import write_duels
-from bench.result_sets.formats import read_results
+from bench.result_sets.formats import read_results, share_results
 from bench.statistics.pairwise import duels_against_all
 
 
@@ -44,3 +44,12 @@ def test_the_counts_of_the_page_are_those_of_the_table(small: Ran, tmp_path: Pat
 def test_an_algorithm_that_took_no_part_is_refused_with_the_nearest_name(small: Ran, tmp_path: Path) -> None:
     told = refusal(lambda: write_duels(small.config, small.store, "l-shad", tmp_path))
     assert told.startswith("small has no algorithm 'l-shad': did you mean 'l-shade'?")
+
+
+def test_an_algorithm_alone_is_refused(small: Ran, tmp_path: Path) -> None:
+    share_results(small.config, small.store, "csv", tmp_path)
+    for table in ("trials.csv", "curves.csv"):
+        rows = pd.read_csv(tmp_path / table)
+        rows[rows["algorithm"] == "spso"].to_csv(tmp_path / table, index=False)
+    told = refusal(lambda: write_duels(tmp_path, small.store, "spso", tmp_path / "out"))
+    assert told == "small has no algorithm beside 'spso': a duel needs two"

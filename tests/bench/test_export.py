@@ -2,6 +2,7 @@
 
 import csv
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,12 @@ def test_rapid_is_a_module_of_timed_moves_through_all_targets_in_degrees(tmp_pat
     assert [move[2] for move in moves] == ["1", of["loop"][1], "201"]
     assert [of["loop"][2], of["loop"][3]] == ["2", "200"]
     assert [("\\T:=" in move[0], "fine" in move[0]) for move in moves] == [(False, True), (True, False), (True, True)]
+
+
+def test_joint_names_are_texts_whatever_they_are(tmp_path: Path) -> None:
+    trajectory, _ = exported(tmp_path, "ros2")
+    message = yaml.safe_load(to_ros2(replace(trajectory, joint_names=("1", "on", "a,b"))))
+    assert message["joint_names"] == ["1", "on", "a,b"]
 
 
 @pytest.mark.parametrize("form", TRAJECTORY_FORMATS)

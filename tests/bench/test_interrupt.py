@@ -25,7 +25,7 @@ def slow(small: Path, plug_in: Callable[[str], Path]) -> Path:
 def test_ctrl_c_keeps_what_is_finished_and_a_second_start_does_the_rest(
     tmp_path: Path, slow: Path, armlab: Callable[..., object], workers: str
 ) -> None:
-    said, code = _stopped_after_three(tmp_path, slow, workers)
+    said, code = _stopped_after_three(tmp_path, slow, "--workers", workers)
     kept = stored(tmp_path)
     assert 3 <= len(kept) < 12
     assert code == 130
@@ -40,10 +40,16 @@ def test_ctrl_c_keeps_what_is_finished_and_a_second_start_does_the_rest(
     assert (tmp_path / "results" / "small.csv").exists()
 
 
+def test_a_stopped_fresh_start_goes_on_without_being_fresh_again(tmp_path: Path, slow: Path) -> None:
+    said, code = _stopped_after_three(tmp_path, slow, "--workers", "1", "--fresh")
+    assert code == 130
+    assert said.endswith("are left; the same command without --fresh goes on from here\n")
+
+
 def test_a_killed_run_leaves_a_sound_store_and_a_second_start_does_the_rest(
     tmp_path: Path, slow: Path, armlab: Callable[..., object]
 ) -> None:
-    _stopped_after_three(tmp_path, slow, "1", signal.SIGKILL)
+    _stopped_after_three(tmp_path, slow, "--workers", "1", how=signal.SIGKILL)
     kept = stored(tmp_path)
     assert 3 <= len(kept) < 12
     armlab("run", slow, "--workers", "1")
@@ -52,10 +58,10 @@ def test_a_killed_run_leaves_a_sound_store_and_a_second_start_does_the_rest(
 
 
 def _stopped_after_three(
-    folder: Path, config: Path, workers: str, how: signal.Signals = signal.SIGINT
+    folder: Path, config: Path, *options: str, how: signal.Signals = signal.SIGINT
 ) -> tuple[str, int]:
     """What the command says, and its exit code, after a signal when three trials are in the store."""
-    command = [sys.executable, "-m", "armlab.cli.main", "run", str(config), "--workers", workers]
+    command = [sys.executable, "-m", "armlab.cli.main", "run", str(config), *options]
     running = subprocess.Popen(
         command, cwd=folder, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=_hear_ctrl_c
     )

@@ -10,6 +10,7 @@ from refusals import refusal
 from small_results import CONFIG, Ran, ran
 
 from bench.config import read_experiment
+from bench.files import file_name
 from bench.plan import plan_trials
 from bench.report.analysis import analyse_cells
 from bench.result_sets.formats import NOTHING_KNOWN, read_results, share_results
@@ -185,3 +186,42 @@ def test_an_unknown_suite_is_told_with_the_nearest_name(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(CONFIG.replace(CONFIG.splitlines()[1], "problem: {suite: suit-1}"))
     assert "unknown suite 'suit-1': did you mean 'suite-1'?" in refusal(read_experiment, path)
+
+
+def test_files_of_others_are_not_replaced(small_run: Ran, tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("mine")
+    told = refusal(share_results, *small_run, "csv", tmp_path)
+    assert told == f"{tmp_path} holds README.md, which is not of these results: choose another folder with --out"
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("README.md", "mine")]
+
+
+def test_a_folder_has_the_tables_of_one_form(small_run: Ran, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow", reason="Parquet needs the package pyarrow")
+    share_results(*small_run, "csv", tmp_path)
+    share_results(*small_run, "parquet", tmp_path)
+    assert sorted(path.name for path in tmp_path.glob("*.*") if path.suffix in (".csv", ".parquet")) == [
+        "curves.parquet",
+        "trials.parquet",
+    ]
+
+
+def test_names_that_look_like_numbers_or_gaps_stay_names(small_run: Ran, tmp_path: Path) -> None:
+    share_results(*small_run, "csv", tmp_path)
+    for table in ("trials.csv", "curves.csv"):
+        text = (tmp_path / table).read_text()
+        (tmp_path / table).write_text(text.replace("random-search", "none").replace("l-shade", "1"))
+    assert set(read_results(tmp_path, small_run.store).trials["algorithm"]) == {"spso", "1", "none"}
+
+
+def test_labels_that_differ_have_files_that_differ() -> None:
+    labels = ["spso", "a b", "a_b", "a/b", "..", "l-shade"]
+    names = [file_name(label) for label in labels]
+    assert names[0] == "spso"
+    assert len(set(names)) == len(labels)
+    assert not any("/" in name or not name.strip(".") for name in names)
+
+
+def test_origins_that_are_no_list_of_machines_are_refused(small_run: Ran, tmp_path: Path) -> None:
+    share_results(*small_run, "csv", tmp_path)
+    (tmp_path / "origins.json").write_text("3")
+    assert "origins.json should be a list" in refusal(read_results, tmp_path, small_run.store)

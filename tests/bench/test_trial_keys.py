@@ -1,12 +1,12 @@
 """A trial's key is the hash of everything that decides its outcome, and of nothing else."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 
 from armlab.common.settings import Settings
-from bench.config import Experiment, find_algorithm, read_experiment
+from bench.config import Experiment, find_algorithm, parse_params, read_experiment
 from bench.execute import Trial
 from bench.fingerprint import fingerprint
 from bench.plan import plan_trials
@@ -95,3 +95,11 @@ def test_a_file_that_the_problem_names_belongs_to_the_fingerprint(tmp_path: Path
 
 def _keys(experiment: Experiment) -> list[str]:
     return [entry.key for entry in plan_trials(experiment, "small.yaml")]
+
+
+def test_a_parameter_may_have_a_default_that_is_made_for_each() -> None:
+    @dataclass(frozen=True)
+    class Params:
+        powers: tuple[int, ...] = field(default_factory=lambda: (1, 2))
+
+    assert parse_params(Params, {}, "mine").powers == (1, 2)

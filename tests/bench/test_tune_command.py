@@ -87,7 +87,9 @@ def test_the_first_configurations_do_not_depend_on_how_many_follow_and_the_first
     path = config(sweep=None)
     lines = []
     for budget in (3, 5):
-        list(tune_algorithms(path, options(tmp_path, configurations=budget, algorithms=("de",)), no_bar))
+        list(
+            tune_algorithms(path, options(tmp_path, configurations=budget, algorithms=("de",), overwrite=True), no_bar)
+        )
         lines.append((tmp_path / "results" / "small_configurations.csv").read_text().splitlines())
     assert lines[1][:4] == lines[0]
     assert len(lines[1]) == 6
@@ -134,3 +136,16 @@ def test_the_projects_own_configuration_is_right_and_every_range_holds_the_publi
     settings = read_tuning(ROOT / "configs" / "tune.yaml")
     for name, ranges in settings.algorithms.items():
         assert set(search._published_params(name, ranges)) == set(ranges)
+
+
+def test_results_of_other_settings_stay(config: Callable[..., Path], tmp_path: Path) -> None:
+    list(tune_algorithms(config(), options(tmp_path, configurations=3), no_bar))
+    told = refusal(lambda: list(tune_algorithms(config(), options(tmp_path, configurations=2), no_bar)))
+    assert "holds results of another configuration ('configurations: 3' there, 'configurations: 2' here)" in told
+    list(tune_algorithms(config(), options(tmp_path, configurations=2, overwrite=True), no_bar))
+
+
+def test_a_mistake_in_what_judges_is_told_before_anything_runs(config: Callable[..., Path], tmp_path: Path) -> None:
+    wrong = config(sweep={"algorithm": "mupso", "parameter": "inertai", "values": [0.1]})
+    assert "'inertai'" in refusal(lambda: list(tune_algorithms(wrong, options(tmp_path), no_bar)))
+    assert not (tmp_path / "runs.sqlite").exists()

@@ -38,3 +38,9 @@ def test_texts_are_written_all_or_none_and_other_files_stay(tmp_path: Path) -> N
     assert sorted(path.name for path in folder.iterdir()) == ["a.txt", "c.txt", "other", "sub"]
     write_texts({"a.txt": "5"}, folder)
     assert ((folder / "a.txt").read_text(), (folder / "other").read_text()) == ("5", "kept")
+
+
+def test_a_place_below_a_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("kept")
+    with pytest.raises(InputError, match=r"cannot write .*file/table\.csv: Not a directory"):
+        write_whole(tmp_path / "file" / "table.csv", "new")

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
+from armlab.cli.main import main
 from armlab.common.errors import InputError
 from armlab.concealed import naming_oracle
 from armlab.concealed.effects.channels import Gain, Skew
@@ -143,3 +145,19 @@ def test_the_score_of_another_set_is_refused_before_the_work(tmp_path: Path) -> 
             assert len(read_scored_effects(settings, tmp_path)) == 1
     with pytest.raises(InputError, match="another set: seed 1004"):
         read_scored_effects(settings, tmp_path)
+
+
+@pytest.mark.parametrize("given", [True, False])
+def test_the_command_removes_its_own_folder_and_none_of_the_user(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: bool
+) -> None:
+    page = "armlab.concealed.naming_oracle_page"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(f"{page}.simulate_case", lambda plan: plan)
+    monkeypatch.setattr(f"{page}.ask_oracle", lambda plan, _: [replace(ANSWER, case=plan.name)])
+    work = tmp_path / ("mine" if given else ".armlab/oracle/1003")
+    words = ["oracle", "--cases", "1", "--seed", "1003", "--development", "--jobs", "1", "--out", "out"]
+    result = CliRunner().invoke(main, words + (["--work", str(work)] if given else []))
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "out" / "oracle.md").exists()
+    assert work.exists() == given

@@ -282,3 +282,19 @@ def test_an_algorithm_that_writes_into_what_it_is_told_changes_no_result() -> No
         ).best_fitness
 
     assert best(Scribbler) == best(RandomSearch) > 0
+
+
+@pytest.mark.parametrize("command", ["conceal", "prove", "real-concealed"])
+def test_no_processes_are_refused(command: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, [command, "--jobs", "0"])
+    assert result.exit_code == 2
+    assert "0 processes do nothing" in result.output
+
+
+def test_ctrl_c_ends_any_command_with_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bench.studies.best_known.search.improve_best_known", interrupted)
+    result = CliRunner().invoke(main, ["best-known"])
+    assert (result.exit_code, result.stdout, result.stderr) == (130, "", "armlab: stopped\n")

@@ -14,6 +14,7 @@ from servo_arms import arm_text, commands, simulate, write_recording
 
 from armlab.cli.main import main
 from armlab.recordings.check import check_recording
+from armlab.recordings.imports.lerobot import read_lerobot
 from armlab.recordings.motion import load_motion_recording
 from problem.mjcf import read_mjcf
 from problem.motion import Motion
@@ -175,3 +176,23 @@ def test_a_lerobot_dataset_is_imported_an_episode_a_run(folder: Path, tmp_path: 
     result = CliRunner().invoke(main, ["recording", "import", str(data), "--out", str(tmp_path / "old"), *options])
     assert result.exit_code == 2
     assert "no LeRobot dataset of version 2 or 3" in result.output
+
+
+@pytest.mark.parametrize(
+    ("features", "episode", "message"),
+    [
+        ({"action": None}, 0.0, "features.action.names should be a list of names"),
+        ({}, None, "episode_index has rows without a number"),
+    ],
+)
+def test_a_broken_lerobot_dataset_is_told_in_one_line(
+    tmp_path: Path, features: dict, episode: float | None, message: str
+) -> None:
+    (tmp_path / "meta").mkdir()
+    (tmp_path / "data").mkdir()
+    usual = {key: {"names": ["a", "b"]} for key in ("action", "observation.state")}
+    info = {"codebase_version": "v3.0", "features": usual | features}
+    (tmp_path / "meta" / "info.json").write_text(json.dumps(info))
+    row = {"timestamp": [0.0], "episode_index": [episode], "action": [[0.0, 0.0]], "observation.state": [[0.0, 0.0]]}
+    pd.DataFrame(row).astype({"episode_index": float}).to_parquet(tmp_path / "data" / "file.parquet")
+    assert message in refusal(read_lerobot, tmp_path)

@@ -278,3 +278,28 @@ def test_columns_of_another_order_than_the_positions_are_refused(tmp_path: Path)
         assert "the columns of a joint should stand at one place in both" in told
     both = {**OPTIONS, "torque": "tau2,tau1,tau3", "position": "q2,q1,q3"}
     assert import_files([path], tmp_path / "recording", both).plan.columns["position"] == ("q2", "q1", "q3")
+
+
+def test_a_refused_import_keeps_the_folder_that_the_user_works_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(odd_text().splitlines()[:4]) + "\n")  # too short for a recording
+    (tmp_path / "new").mkdir()
+    monkeypatch.chdir(tmp_path / "new")
+    assert "nothing is written: " in refusal(import_files, [path], Path(), OPTIONS)
+    assert list((tmp_path / "new").iterdir()) == []
+
+
+def test_gains_of_a_torque_that_needs_none_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(odd_text())
+    told = refusal(import_files, [path], tmp_path / "new", {**OPTIONS, "gains": "1,1,1"})
+    assert told == "--gains are N.m per A or V, and the torque is in N.m: leave them out"
+
+
+def test_a_pattern_that_fits_nothing_is_told_though_another_fits_an_empty_column(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    frame().assign(q2="").to_csv(path, index=False)
+    told = refusal(import_files, [path], tmp_path / "new", {**OPTIONS, "position": "q?,p*"})
+    assert told.startswith("no column 'p*' for position")

@@ -105,12 +105,22 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     try:
         (load_motion_recording if is_motion_only(folder) else load_recording)(folder)
     except InputError as error:
-        shutil.rmtree(folder)
-        if was_there:
-            folder.mkdir()
+        _remove_written(folder, was_there)
         raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
     whole = folder / plan.robot.whole_name if plan.robot.whole_name in copies else None
     return ImportedRecording(folder, plan, draft, whole)
+
+
+def _remove_written(folder: Path, was_there: bool) -> None:
+    """Removes all that was written, and the folder if it is new: it may be the one that the user works in."""
+    if not was_there:
+        shutil.rmtree(folder)
+        return
+    for path in folder.iterdir():
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink()
 
 
 def describe_plan(plan: ImportPlan) -> list[tuple[str, str]]:

@@ -36,6 +36,8 @@ def read_lerobot(folder: Path) -> dict[str, Table]:
         vectors = [_check_width(frame[key], names[key], key, path) for key in names]
         values = np.column_stack([frame[STAMP][:, None], *vectors])
         columns = (STAMP, *(f"{key}.{name}" for key in names for name in names[key]))
+        if not np.isfinite(frame[EPISODE]).all():
+            raise InputError(f"{path}: {EPISODE} has rows without a number")
         for episode in np.unique(frame[EPISODE]):
             rows = values[frame[EPISODE] == episode]
             name = f"episode-{int(episode):06d}"
@@ -59,7 +61,8 @@ def _entry_names(features: dict[str, Any], vector: str, folder: Path) -> tuple[s
 
     LeRobot writes `shoulder_pan.pos`, in older datasets `main_shoulder_pan`.
     """
-    given = features.get(vector, {}).get("names")
+    entry = features.get(vector)
+    given = entry.get("names") if isinstance(entry, dict) else None
     if isinstance(given, dict):
         given = next(iter(given.values()), None)
     if isinstance(given, list) and len(given) == 1 and isinstance(given[0], list):

@@ -48,7 +48,7 @@ def _read_arrays_in_process(path: Path) -> list[tuple[str, Array]]:
     """Numeric arrays by name, read by a process of its own, which a broken file may crash."""
     with TemporaryDirectory() as folder:
         out = Path(folder) / "arrays.npz"
-        command = [sys.executable, "-m", READER_MODULE, str(path), str(out)]
+        command = [sys.executable, "-P", "-m", READER_MODULE, str(path), str(out)]
         done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
         if done.returncode == REFUSED_EXIT_CODE:
             raise InputError(done.stderr.splitlines()[-1])

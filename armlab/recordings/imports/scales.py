@@ -117,7 +117,11 @@ def choose_gains(
     if gains is not None and names and len(gains) != len(names):
         raise InputError(f"--gains holds {len(gains)} numbers for {len(names)} columns of torque")
     listed = (unit,) if isinstance(unit, str) else unit
-    if gains is not None or not any(each in DRIVE_UNITS for each in listed):
+    if not any(each in DRIVE_UNITS for each in listed):
+        if gains is not None and listed:
+            raise InputError(f"--gains are N.m per A or V, and the torque is in {listed[0]}: leave them out")
+        return gains, ()
+    if gains is not None:
         return gains, ()
     missing = f"give --gains, gains of {', '.join(names)}, N.m per A or V, with commas between them"
     text = f"gains of the joints, N.m per A or V: {len(names)} numbers with commas between them"

@@ -84,7 +84,10 @@ def find_layout(text: str, separator: str | None, decimal: str | None, path: Pat
     layouts = [Layout(*pair) for pair in tried if pair[0] != pair[1] or separator]
     best = max(layouts, key=lambda layout: _score_layout(sample, layout))
     if _score_layout(sample, best) < MIN_DATA_ROWS:
-        raise InputError(f"{path} holds no rows of numbers that could be recognised; give --separator and --decimal")
+        raise InputError(
+            f"{path} holds no rows of numbers that could be recognised; give --separator and --decimal, or leave out "
+            "columns of text"
+        )
     return best
 
 

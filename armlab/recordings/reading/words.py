@@ -80,7 +80,7 @@ def describe(mistake: Mistake, arm: Arm) -> str:
         what = {"centre_sign": "the centre has the other sign", "mass_unit": f"mass data are {value:g} times the true"}
         return f"{link}: {what.get(form, f'inertias are {value:g} times the true')}"
     if mistake.effect in ("time_delay", "channel_skew"):
-        return f"the torque of {place} is {1e3 * value:.0f} ms {'late' if value > 0 else 'early'}".replace("-", "")
+        return f"the torque of {place} is {1e3 * abs(value):.0f} ms {'late' if value > 0 else 'early'}"
     if mistake.effect == "clock_error":
         return f"the clock counts {value:.3g} times the true time"
     if mistake.effect == "gear_ratio":

@@ -4,9 +4,12 @@ Each start is a random point, the end of a CMA-ES run or a perturbation of the b
 each start.
 """
 
+import fcntl
 import json
+import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -170,22 +173,26 @@ class _ProblemSearch:
     def step(self) -> str:
         """Make one more start, or as many as it takes to find the first feasible point; returns a line about it."""
         records = read_records(self.path)
-        record = old = self._check_record(records.get(self.name))
-        spent = _Effort(old.ends, old.evaluations, old.gradients) if old else _Effort({}, 0, 0)
-        while record is None or record is old:
-            start = SearchStart(self.plan.seed, self.name, spent.starts)
-            method, end = self._run(start, old, records)
-            spent = spent.plus(method, end)
-            record = self._update_record(old, start, method, end, spent)
-            if record is None and spent.starts == MAX_INFEASIBLE_STARTS:
+        old = self._check_record(records.get(self.name))
+        made: list[_Start] = []
+        while not made or (old is None and not made[-1].end.feasible):
+            chosen = SearchStart(self.plan.seed, self.name, (old.starts if old else 0) + len(made))
+            method, end = self._run(chosen, old, records)
+            made.append(_Start(chosen.number, method, end))
+            if old is None and not end.feasible and len(made) == MAX_INFEASIBLE_STARTS:
                 return (
                     f"{self.name}: {MAX_INFEASIBLE_STARTS} starts found nothing within all limits, so there "
                     "is no record"
                 )
-        write_records(self.path, read_records(self.path) | {self.name: record})
+        with _alone_in(self.path.parent):
+            records = read_records(self.path)  # another search may have written meanwhile
+            record = self._add_starts(self._check_record(records.get(self.name)), made)
+            write_records(self.path, records | {self.name: record})
         close, of = record.count_agreeing(1e-3)
-        told = f"{end.value:.6g}" if end.feasible else "infeasible"
-        return f"{self.name}: start {start.number}, {method}: {told}; best {record.value:.6g}, met by {close} of {of}"
+        start = made[-1]
+        told = f"{start.end.value:.6g}" if start.end.feasible else "infeasible"
+        best = f"best {record.value:.6g}, met by {close} of {of}"
+        return f"{self.name}: start {start.number}, {start.method}: {told}; {best}"
 
     def _check_record(self, record: Record | None) -> Record | None:
         """The record, if it is of this very problem."""
@@ -206,24 +213,47 @@ class _ProblemSearch:
             raise InputError(f"{self.name} starts from the record of '{source}', which does not exist yet")
         return f"from {source}", descend(self.problem, record_point(records[source]))
 
-    def _update_record(
-        self, old: Record | None, start: SearchStart, method: str, end: SearchEnd, spent: "_Effort"
-    ) -> Record | None:
-        """The old record with the added effort, or the new one; None while nothing is feasible."""
-        if not end.feasible or (old is not None and end.value >= old.value):
-            return old.model_copy(update=vars(spent)) if old else None
+    def _add_starts(self, record: Record | None, made: Sequence["_Start"]) -> Record:
+        """The record with the added effort, or a new one where a start ended better; one of them does without one."""
+        spent = _Effort(record.ends, record.evaluations, record.gradients) if record else _Effort({}, 0, 0)
+        for start in made:
+            spent = spent.plus(start.method, start.end)
+        best = min(made, key=lambda start: start.end.value if start.end.feasible else np.inf)
+        if record is not None and not (best.end.feasible and best.end.value < record.value):
+            return record.model_copy(update=vars(spent))
         return Record(
             settings=self.settings,
-            value=end.value,
-            coefficients=dict(zip(self.problem.trajectory.names, end.point.tolist(), strict=True)),
-            method=method,
-            seed=start.seed,
-            start=start.number,
+            value=best.end.value,
+            coefficients=dict(zip(self.problem.trajectory.names, best.end.point.tolist(), strict=True)),
+            method=best.method,
+            seed=self.plan.seed,
+            start=best.number,
             versions=_package_versions(),
             evaluations=spent.evaluations,
             gradients=spent.gradients,
             ends=spent.ends,
         )
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """Waits until no other search writes into the folder, where the file system has locks."""
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(opened, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(opened)
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A start that was made: its number, how it began, and its end."""
+
+    number: int
+    method: str
+    end: SearchEnd
 
 
 @dataclass(frozen=True)
@@ -233,10 +263,6 @@ class _Effort:
     ends: dict[str, tuple[float | None, ...]]
     evaluations: int
     gradients: int
-
-    @property
-    def starts(self) -> int:
-        return sum(map(len, self.ends.values()))
 
     def plus(self, method: str, end: SearchEnd) -> "_Effort":
         """The effort with one more start."""

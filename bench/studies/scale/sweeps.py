@@ -125,6 +125,8 @@ def measure_scale(config: Path, trials: int, tell: ReportProgress) -> ScaleCost:
     """Run all sweeps in a folder that is removed afterwards; tell: is called with a line about each step."""
     with TemporaryDirectory() as place:
         folder = Path(place)
+        for size in (trials // 10, trials):
+            write_sized_config(config, size, folder)  # refuses a size before the first sweep
         tell("one worker and two in turns")
         turns = [
             [_measure_sweep(config, trials // 10, count, folder) for count in (1, 2)] for _ in range(TURNS_OF_WORKERS)

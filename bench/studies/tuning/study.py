@@ -8,8 +8,8 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_whole
 from armlab.common.settings import settings_to_yaml, suggest_name
 from bench.comparison_figures import draw_ranking
+from bench.files import check_folder, settings_path
 from bench.plan import plan_trials
-from bench.result_sets.formats import make_folder
 from bench.run import ProgressBar
 from bench.store import open_store
 from bench.studies.best_known.records import best_known_values
@@ -33,6 +33,7 @@ class TuningOptions:
     results: Path
     records: Path
     workers: int
+    overwrite: bool = False
 
 
 def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Iterator[Path]:
@@ -42,7 +43,8 @@ def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Ite
     InputError, in one line, for any mistake in the configuration; StoppedError, TrialsFailedError.
     """
     settings = _chosen(read_tuning(path), options)
-    make_folder(options.results)
+    plan_trials(settings.experiment(_published(settings) + _swept(settings), judging=True), str(path))  # before hours
+    check_folder(options.results, settings.name, settings_to_yaml(settings), options.overwrite)
     with open_store(options.store) as store:
         with bar(settings.configurations * len(settings.algorithms), 0) as progress:
             tuned = [tune_algorithm(settings, name, store, progress.update) for name in settings.algorithms]
@@ -57,8 +59,9 @@ def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Ite
         f"{settings.name}_duels.csv": as_csv(runs.duels_table()),
         **{f"{settings.name}_ranking.{suffix}": image for suffix, image in draw_ranking(runs.contest()).items()},
         f"{settings.name}.md": tuning_page(Judgement(tuple(tuned), runs, known)),
-        f"{settings.name}.settings.yaml": settings_to_yaml(settings),
+        settings_path(options.results, settings.name).name: settings_to_yaml(settings),
     }
+    settings_path(options.results, settings.name).unlink(missing_ok=True)  # written last: until then all is incomplete
     for name, content in files.items():
         write_whole(options.results / name, content)
         yield options.results / name
@@ -82,14 +85,21 @@ def _chosen(settings: TuningSettings, options: TuningOptions) -> TuningSettings:
 
 def _contestants(settings: TuningSettings, tuned: Sequence[Tuned]) -> list[dict[str, object]]:
     """Each algorithm as published and as tuned, and the sweep of one hyper-parameter."""
-    published: list[dict[str, object]] = [{"name": one.algorithm} for one in tuned]
     chosen: list[dict[str, object]] = [
         {"name": one.algorithm, "label": f"{one.algorithm}{TUNED}", "params": dict(one.best.params)} for one in tuned
     ]
+    return _published(settings) + chosen + _swept(settings)
+
+
+def _published(settings: TuningSettings) -> list[dict[str, object]]:
+    return [{"name": name} for name in settings.algorithms]
+
+
+def _swept(settings: TuningSettings) -> list[dict[str, object]]:
     sweep = settings.sweep
     if sweep is None:
-        return published + chosen
-    swept: list[dict[str, object]] = [
+        return []
+    return [
         {
             "name": sweep.algorithm,
             "label": sweep_label(sweep.algorithm, sweep.parameter, value),
@@ -97,4 +107,3 @@ def _contestants(settings: TuningSettings, tuned: Sequence[Tuned]) -> list[dict[
         }
         for value in sweep.values
     ]
-    return published + chosen + swept
