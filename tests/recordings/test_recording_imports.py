@@ -295,7 +295,7 @@ def test_gains_of_a_torque_that_needs_none_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text(odd_text())
     told = refusal(import_files, [path], tmp_path / "new", {**OPTIONS, "gains": "1,1,1"})
-    assert told == "--gains are N.m per A or V, and the torque is in N.m: leave them out"
+    assert told == "--gains are N.m per A or V, and the torque is in N.m: leave them out, or give --unit torque=A"
 
 
 def test_a_pattern_that_fits_nothing_is_told_though_another_fits_an_empty_column(tmp_path: Path) -> None:

@@ -119,7 +119,9 @@ def choose_gains(
     listed = (unit,) if isinstance(unit, str) else unit
     if not any(each in DRIVE_UNITS for each in listed):
         if gains is not None and listed:
-            raise InputError(f"--gains are N.m per A or V, and the torque is in {listed[0]}: leave them out")
+            raise InputError(
+                f"--gains are N.m per A or V, and the torque is in {listed[0]}: leave them out, or give --unit torque=A"
+            )
         return gains, ()
     if gains is not None:
         return gains, ()
