@@ -2,16 +2,32 @@
 
 import re
 import tempfile
+from collections.abc import Mapping
 from hashlib import sha256
 from itertools import zip_longest
 from pathlib import Path
 
 from armlab.common.errors import InputError
+from armlab.common.files import write_whole
 
 
 def settings_path(folder: Path, name: str) -> Path:
     """The file with the full settings of the results of that name, beside them."""
     return folder / f"{name}.settings.yaml"
+
+
+def write_with_settings(folder: Path, name: str, files: Mapping[str, str | bytes], settings: str) -> list[Path]:
+    """Write result files by name, and the settings that made them; returns the paths.
+
+    The settings are written last, and old ones are removed first, so that incomplete results are never taken for
+    complete ones. Raises InputError if a file cannot be written.
+    """
+    last = settings_path(folder, name)
+    last.unlink(missing_ok=True)
+    contents = {folder / each: content for each, content in files.items()} | {last: settings}
+    for path, content in contents.items():
+        write_whole(path, content)
+    return list(contents)
 
 
 def file_name(label: str) -> str:

@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from armlab.common.files import write_whole
 from bench.config import Experiment
-from bench.files import settings_path
+from bench.files import write_with_settings
 from bench.plan import Plan, rival_pairs
 from bench.store import RunStore
 from bench.tables import as_csv, convergence_table, summary_page, summary_table, tidy_frame, times_table
@@ -13,22 +12,14 @@ Files = dict[str, str | bytes]
 
 
 def write_results(experiment: Experiment, entries: Plan, settings: str, store: RunStore, folder: Path) -> list[Path]:
-    """Write the files that the experiment's `output` names; returns their paths.
-
-    The settings are written last, and old ones are removed first, so that incomplete results are never taken for
-    complete ones.
-    """
+    """Write the files that the experiment's `output` names; returns their paths."""
     make = {
         "table": _table_files,
         "swarm_sizes": _swarm_size_files,
         "convergence": _convergence_files,
         "rivals": _rivals_files,
     }[experiment.output]
-    files = make(experiment, entries, store) | {settings_path(folder, experiment.name).name: settings}
-    settings_path(folder, experiment.name).unlink(missing_ok=True)
-    for name, content in files.items():
-        write_whole(folder / name, content)
-    return [folder / name for name in files]
+    return write_with_settings(folder, experiment.name, make(experiment, entries, store), settings)
 
 
 def _table_files(experiment: Experiment, entries: Plan, store: RunStore) -> Files:

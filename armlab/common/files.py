@@ -24,7 +24,7 @@ def write_whole(path: Path, content: str | bytes | Iterable[bytes]) -> None:
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from None
     finally:
-        with suppress(OSError):  # there is no draft where it could not be written
+        with suppress(FileNotFoundError, NotADirectoryError):  # no draft was made, or it is in its place
             draft.unlink()
 
 

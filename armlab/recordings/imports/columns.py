@@ -156,9 +156,9 @@ def _expand_names(given: str, table: Table, signal: str, joints: Sequence[str], 
     for part in (part.strip() for part in given.split(",")):
         pattern = part.replace("[", "[[]")
         found = [part] if part in table.names else [name for name in table.filled if fnmatchcase(name, pattern)]
-        without = [] if part in table.names else [name for name in table.empty if fnmatchcase(name, pattern)]
-        empty += without
-        if not found and not without:
+        numberless = [] if part in table.names else [name for name in table.empty if fnmatchcase(name, pattern)]
+        empty += numberless
+        if not found and not numberless:
             raise InputError(f"no column '{part}' for {signal}: {suggest_name(part, table.filled)}")
         listed = listed and part in table.names
         wanted += found

@@ -214,7 +214,7 @@ class _ProblemSearch:
         return f"from {source}", descend(self.problem, record_point(records[source]))
 
     def _add_starts(self, record: Record | None, made: Sequence["_Start"]) -> Record:
-        """The record with the added effort, or a new one where a start ended better; one of them does without one."""
+        """The record with the added effort, or a new one where a start ended better (one is feasible)."""
         spent = _Effort(record.ends, record.evaluations, record.gradients) if record else _Effort({}, 0, 0)
         for start in made:
             spent = spent.plus(start.method, start.end)

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from armlab.common.errors import InputError
-from armlab.common.files import write_whole
 from armlab.common.settings import settings_to_yaml, suggest_name
 from bench.comparison_figures import draw_ranking
-from bench.files import check_folder, settings_path
+from bench.files import check_folder, write_with_settings
 from bench.plan import plan_trials
 from bench.run import ProgressBar
 from bench.store import open_store
@@ -43,7 +42,9 @@ def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Ite
     InputError, in one line, for any mistake in the configuration; StoppedError, TrialsFailedError.
     """
     settings = _chosen(read_tuning(path), options)
-    plan_trials(settings.experiment(_published(settings) + _swept(settings), judging=True), str(path))  # before hours
+    plan_trials(
+        settings.experiment(_published(settings) + _swept(settings), judging=True), str(path)
+    )  # a mistake is told before the hours of tuning
     check_folder(options.results, settings.name, settings_to_yaml(settings), options.overwrite)
     with open_store(options.store) as store:
         with bar(settings.configurations * len(settings.algorithms), 0) as progress:
@@ -59,12 +60,8 @@ def tune_algorithms(path: Path, options: TuningOptions, bar: ProgressBar) -> Ite
         f"{settings.name}_duels.csv": as_csv(runs.duels_table()),
         **{f"{settings.name}_ranking.{suffix}": image for suffix, image in draw_ranking(runs.contest()).items()},
         f"{settings.name}.md": tuning_page(Judgement(tuple(tuned), runs, known)),
-        settings_path(options.results, settings.name).name: settings_to_yaml(settings),
     }
-    settings_path(options.results, settings.name).unlink(missing_ok=True)  # written last: until then all is incomplete
-    for name, content in files.items():
-        write_whole(options.results / name, content)
-        yield options.results / name
+    yield from write_with_settings(options.results, settings.name, files, settings_to_yaml(settings))
 
 
 def _chosen(settings: TuningSettings, options: TuningOptions) -> TuningSettings:
