@@ -85,7 +85,7 @@ def base_parameters(arm: Arm, preference: Preference = "later_columns") -> BaseP
     lengths = np.linalg.norm(matrix, axis=0)
     effective = lengths > DEPENDENCE_TOLERANCE * lengths.max()
     unit = matrix / np.where(effective, lengths, 1.0)
-    kept = _independent_columns(unit, [column for column in _column_order(arm, preference) if effective[column]])
+    kept = independent_columns(unit, [column for column in _column_order(arm, preference) if effective[column]])
     dependent = np.flatnonzero(effective & ~np.isin(np.arange(matrix.shape[1]), kept))
     combination = np.linalg.lstsq(unit[:, kept], unit[:, dependent], rcond=None)[0]
     combination *= lengths[dependent] / lengths[kept, None]
@@ -119,15 +119,18 @@ def _column_order(arm: Arm, preference: Preference) -> list[int]:
     return wanted + [column for column in columns[::-1] if column not in wanted]
 
 
-def _independent_columns(unit: Array, order: list[int]) -> NDArray[np.intp]:
-    """Columns kept by Gram-Schmidt with reorthogonalisation, in the given order; returned ascending."""
+def independent_columns(unit: Array, order: Sequence[int], tolerance: float = DEPENDENCE_TOLERANCE) -> NDArray[np.intp]:
+    """Columns kept by Gram-Schmidt with reorthogonalisation, in the given order; returned ascending.
+
+    unit: (rows, columns) of unit length. tolerance: length of what the columns before it leave of a dependent one.
+    """
     basis = np.empty((unit.shape[0], 0))
     kept = []
     for column in order:
         rest = unit[:, column]
         for _ in range(2):
             rest = rest - basis @ (basis.T @ rest)
-        if np.linalg.norm(rest) > DEPENDENCE_TOLERANCE:
+        if np.linalg.norm(rest) > tolerance:
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
             kept.append(column)
     return np.sort(np.array(kept, dtype=np.intp))

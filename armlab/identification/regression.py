@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.identification.structure import Structure
-from armlab.recordings.cutoff import choose_cutoff
+from armlab.recordings.cutoff import ROWS_PER_CUTOFF, choose_cutoff
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
 from armlab.recordings.recording import Run
 
 MAX_CUTOFF_SHARE = 0.45  # of the sampling rate: cut-offs
-ROWS_PER_CUTOFF = 4  # rows kept in a period of the cut-off: what the filter leaves holds no more
 
 
 @dataclass(frozen=True, eq=False)

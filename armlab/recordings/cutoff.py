@@ -16,6 +16,7 @@ MIN_CUTOFF_PERIODS = 10  # periods of the lowest candidate within the run
 MAX_CUTOFF_SHARE = 0.4  # of the sampling rate
 MOTION_POWER_SHARE = 0.99  # of the velocity, below the bandwidth of the motion
 MAX_BANDWIDTH_MULTIPLE = 10  # of that bandwidth
+ROWS_PER_CUTOFF = 4  # rows kept in a period of the cut-off: what the filter leaves holds no more
 NOISE_BAND_START = 0.3  # of the sampling rate: above it a well sampled motion has nothing but noise
 
 

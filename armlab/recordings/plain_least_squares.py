@@ -1,0 +1,278 @@
+"""Plain least squares on a recording: the yardstick that every model has to beat.
+
+    tau = (base parameters of the arm) + a qdd + c tanh(qd / (0.01 top speed)) + b qd + d
+
+with a rotor inertia, Coulomb and viscous friction and an offset at each joint, all fitted. It uses the kinematics of
+the arm, never its links, and no law of the library of effects, so that those who judge can measure by it, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armlab.common.arrays import Array
+from armlab.common.errors import DataError
+from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, ROWS_PER_CUTOFF, choose_cutoff
+from armlab.recordings.differentiate import resample_evenly
+from armlab.recordings.filters import Butterworth
+from armlab.recordings.load import load_recording
+from armlab.recordings.motion import MotionRecording, is_motion_only, load_motion_recording
+from armlab.recordings.recording import MotionRun, Run
+from problem.arm import Arm
+from problem.base_parameters import independent_columns
+from problem.motion import Motion
+from problem.regressor import observation_matrix
+
+COULOMB_WIDTH = 0.01  # of the top speed: where tanh has taken the place of the jump of a sign
+MIN_EXCITATION = 1e-6  # of the largest eigenvalue of the scaled normal matrix: directions below it stay zero
+WEIGHT_ROUNDS = 3
+TRIMMED_PERIODS = 2  # of the cut-off, at each end
+IDENTIFYING_SHARE = 0.6  # of each run, where no run validates
+DEPENDENCE_TOLERANCE = 1e-7  # of a column's length: below it the rounded angles of a robot file make the difference
+PROBE_STATES = 200  # random states that show which columns depend on others
+LINK_ORDER = (
+    1,
+    2,
+    3,
+    0,
+    4,
+    7,
+    5,
+    8,
+    9,
+    6,
+)  # of a link's parameters: first moments, mass, inertias
+JOINT_COLUMNS = ("rotor_inertia", "coulomb", "viscous", "offset")  # at each joint, after those of the links
+
+
+@dataclass(frozen=True)
+class TrimmedButterworth(Butterworth):
+    """The filter of this module: it leaves out two periods at both ends however short the run is."""
+
+    @property
+    def trim(self) -> int:
+        """Rows at each end that the end of the recording disturbs."""
+        return int(np.ceil(TRIMMED_PERIODS * self.rate_hz / self.cutoff_hz))
+
+
+@dataclass(frozen=True, eq=False)
+class PlainRows:
+    """A run as least squares sees it.
+
+    run: even in time, unfiltered. low_pass: what the torque passed, with the rows that are kept. motion, torque:
+    (kept, joints), filtered; rad (m), N m (N).
+    """
+
+    run: Run
+    low_pass: TrimmedButterworth
+    motion: Motion
+    torque: Array
+
+    @property
+    def time(self) -> Array:
+        """Stamps of the kept rows, (kept,), s."""
+        return self.run.time[self.low_pass.rows]
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutRows:
+    """A run that was held out. residual: (kept, joints), what least squares leaves of `rows.torque`, N m (N)."""
+
+    rows: PlainRows
+    residual: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlainFit:
+    """What plain least squares finds, and what it leaves on the runs that are held out.
+
+    joints: places in the arm, from 0, of the joints with torque. names, values: (columns,), base parameters and then
+    JOINT_COLUMNS at each joint, in SI units; what depends on others has no column. top_speed: (joints,), rad/s (m/s).
+    """
+
+    joints: tuple[int, ...]
+    cutoff_hz: float
+    top_speed: Array
+    names: tuple[str, ...]
+    values: Array
+    held_out: tuple[HeldOutRows, ...]
+
+    @property
+    def residual(self) -> Array:
+        """What is left on all held-out rows, (rows, joints), N m (N)."""
+        return np.concatenate([each.residual for each in self.held_out])
+
+    @property
+    def torque(self) -> Array:
+        """The filtered torque of the held-out rows, (rows, joints), N m (N)."""
+        return np.concatenate([each.rows.torque for each in self.held_out])
+
+    @property
+    def rms(self) -> Array:
+        """The held-out error of each joint, (joints,), N m (N)."""
+        return np.asarray(np.sqrt(np.mean(self.residual**2, axis=0)))
+
+    @property
+    def percent(self) -> Array:
+        """The held-out error of each joint in percent of its torque, (joints,); NaN for a joint without torque."""
+        size = np.sqrt(np.mean(self.torque**2, axis=0))
+        return np.asarray(100 * np.divide(self.rms, size, out=np.full(len(size), np.nan), where=size > 0))
+
+    def value(self, name: str, joint: int) -> float:
+        """One of JOINT_COLUMNS at a joint, from 1, SI units; 0 for a rotor that no motion tells from its link."""
+        return float(dict(zip(self.names, self.values, strict=True)).get(f"{name}{joint}", 0.0))
+
+
+def fit_plain_recording(folder: Path, cutoff_hz: float | None = None) -> PlainFit:
+    """Plain least squares on a recording folder, of motion only, too.
+
+    cutoff_hz: what the positions of the runs that identify suggest if left out. Raises InputError for a folder that
+    cannot be read, ValueError where no rows are left.
+    """
+    if is_motion_only(folder):
+        moving = load_motion_recording(folder)
+        return fit_plain(moving.arm, runs_of_motion(moving), cutoff_hz, moving.joints)
+    recording = load_recording(folder)
+    return fit_plain(recording.arm, recording.runs, cutoff_hz)
+
+
+def fit_plain(
+    arm: Arm, runs: Sequence[Run], cutoff_hz: float | None = None, joints: tuple[int, ...] | None = None
+) -> PlainFit:
+    """Fits the runs that identify and judges on those that validate (none: on the last 40 % of each run).
+
+    joints: places in the arm, from 0, of the joints of the runs; all if left out. The others are held at zero.
+    Raises ValueError where no rows are left.
+    """
+    joints = tuple(range(len(arm))) if joints is None else joints
+    parts = split_runs(runs)
+    cutoff = cutoff_hz or suggested_cutoff_hz([each for each in parts if each.role == "identify"])
+    prepared = [each for run in parts for each in [prepare_rows(run, cutoff)] if len(each.torque)]
+    fitted = [each for each in prepared if each.run.role == "identify"]
+    held_out = [each for each in prepared if each.run.role == "validate"]
+    if not fitted or not held_out:
+        missing = "identifies" if not fitted else "validates"
+        raise DataError(f"no run that {missing} is longer than {2 * TRIMMED_PERIODS} periods of {cutoff:g} Hz")
+    top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
+    layout = _Layout(arm, joints, top_speed)
+    matrix = np.concatenate([layout.matrix(each.motion) for each in fitted])
+    values = _weighted_solution(matrix, np.concatenate([each.torque for each in fitted]))
+    left = [HeldOutRows(each, each.torque - layout.matrix(each.motion) @ values) for each in held_out]
+    return PlainFit(joints, cutoff, top_speed, layout.names, values, tuple(left))
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """The columns of an arm. joints: places of those with torque; top_speed: (joints,), theirs."""
+
+    arm: Arm
+    joints: tuple[int, ...]
+    top_speed: Array
+
+    @cached_property
+    def columns(self) -> NDArray[np.intp]:
+        """Places of independent columns among `_all`: of the links rather than of rotors, of the last link first."""
+        states = np.random.default_rng(0).uniform(-2, 2, (3, PROBE_STATES, len(self.joints)))
+        probe = self._all(Motion(*states), np.ones(len(self.joints))).reshape(PROBE_STATES * len(self.joints), -1)
+        lengths = np.linalg.norm(probe, axis=0)
+        effective = lengths > DEPENDENCE_TOLERANCE * lengths.max()
+        links, own = 10 * len(self.arm), len(self.joints)
+        order = [*range(links + own, probe.shape[1])]
+        order += [10 * link + place for link in reversed(range(len(self.arm))) for place in LINK_ORDER]
+        order += range(links, links + own)
+        chosen = [column for column in order if effective[column]]
+        return independent_columns(probe / np.where(effective, lengths, 1.0), chosen, DEPENDENCE_TOLERANCE)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the columns, like `mcx2` and `coulomb2`."""
+        own = [f"{name}{joint + 1}" for name in JOINT_COLUMNS for joint in self.joints]
+        every = [*self.arm.parameter_names, *own]
+        return tuple(every[column] for column in self.columns)
+
+    def matrix(self, motion: Motion) -> Array:
+        """The columns in a motion of the joints with torque, (samples, joints, columns), N m (N) per unit."""
+        width = COULOMB_WIDTH * np.where(self.top_speed > 0, self.top_speed, 1.0)
+        return self._all(motion, width)[:, :, self.columns]
+
+    def _all(self, motion: Motion, coulomb_width: Array) -> Array:
+        """Columns of all links, then JOINT_COLUMNS. coulomb_width: (joints,), rad/s (m/s)."""
+        chosen, joints = list(self.joints), len(self.joints)
+        whole = np.zeros((3, motion.samples, len(self.arm)))
+        whole[:, :, chosen] = motion.position, motion.velocity, motion.acceleration
+        links = observation_matrix(self.arm, Motion(*whole)).reshape(motion.samples, len(self.arm), -1)[:, chosen]
+        speed = motion.velocity
+        laws = (motion.acceleration, np.tanh(speed / coulomb_width), speed, np.ones(speed.shape))
+        return np.concatenate([links, *(law[:, :, None] * np.eye(joints) for law in laws)], axis=2)
+
+
+def runs_of_motion(recording: MotionRecording) -> tuple[Run, ...]:
+    """Runs of motion only with kp (reference - position) for torque; kp is 1 where it is not known."""
+    known = recording.controller.kp if recording.controller is not None else (None,) * len(recording.joints)
+    gains = np.array([1.0 if each is None else each for each in known])
+    return tuple(_with_torque(run, gains) for run in recording.runs)
+
+
+def _with_torque(run: MotionRun, gains: Array) -> Run:
+    if run.reference_position is None:
+        raise DataError(f"{run.name} has no reference_position")
+    torque = gains * (run.reference_position - run.position)
+    given = {name: value for name, value in vars(run).items() if name != "torque"}
+    return Run(**given, torque=torque)
+
+
+def split_runs(runs: Sequence[Run]) -> list[Run]:
+    """The runs; where none validates, the first 60 % of each as one that identifies, the rest as one that validates."""
+    if any(run.role == "validate" for run in runs):
+        return list(runs)
+    return [part for run in runs for part in _split(run)]
+
+
+def _split(run: Run) -> tuple[Run, Run]:
+    first = int(IDENTIFYING_SHARE * run.samples)
+    return run.rows(slice(None, first)), replace(run.rows(slice(first, None)), role="validate")
+
+
+def suggested_cutoff_hz(runs: Sequence[Run]) -> float:
+    """The largest cut-off that the positions of runs suggest, Hz; ValueError without a run."""
+    if not runs:
+        raise DataError("no run identifies")
+    even = [resample_evenly(run) for run in runs]
+    return max(choose_cutoff(run.position, run.rate_hz, Butterworth).cutoff_hz for run in even)
+
+
+def prepare_rows(run: Run, cutoff_hz: float) -> PlainRows:
+    """Position and torque behind one low-pass, and central differences of the position; no rows of a short run."""
+    even = resample_evenly(run)
+    cutoff = min(cutoff_hz, MAX_CUTOFF_SHARE * even.rate_hz)
+    step = max(int(even.rate_hz / (ROWS_PER_CUTOFF * cutoff)), 1)
+    low_pass = TrimmedButterworth(even.rate_hz, cutoff, even.samples, step)
+    position = low_pass.smooth(even.position)
+    velocity = np.gradient(position, 1 / even.rate_hz, axis=0)
+    acceleration = np.gradient(velocity, 1 / even.rate_hz, axis=0)
+    motion = Motion(*(each[low_pass.rows] for each in (position, velocity, acceleration)))
+    return PlainRows(even, low_pass, motion, low_pass(even.torque))
+
+
+def _weighted_solution(matrix: Array, torque: Array) -> Array:
+    """Least squares with joints weighted by their own residuals. matrix: (samples, joints, columns)."""
+    weights = np.ones(torque.shape[1])
+    for _ in range(WEIGHT_ROUNDS):
+        weighted = matrix * weights[:, None]
+        gram = np.tensordot(matrix, weighted, axes=((0, 1), (0, 1)))
+        values = _solve_excited(gram, np.tensordot(weighted, torque, axes=((0, 1), (0, 1))))
+        weights = 1 / np.maximum(np.mean((torque - matrix @ values) ** 2, axis=0), 1e-18)
+    return values
+
+
+def _solve_excited(gram: Array, right: Array) -> Array:
+    """Solution of the normal equations, columns scaled to unit length; directions hardly excited stay zero."""
+    scale = np.sqrt(np.diag(gram))
+    scale = np.where(scale > 0, scale, 1.0)
+    sizes, directions = np.linalg.eigh(gram / np.outer(scale, scale))
+    kept = directions[:, sizes > MIN_EXCITATION * sizes[-1]]
+    return np.asarray((kept / sizes[sizes > MIN_EXCITATION * sizes[-1]]) @ (kept.T @ (right / scale)) / scale)
