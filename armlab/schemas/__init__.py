@@ -10,6 +10,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
 from armlab.diagnosis.formats import ComparisonFile, VerdictFile
+from armlab.diagnosis.real_folders.facts import FactsFile
 from armlab.identification.model_file import ModelFile
 from armlab.recordings.recording_file import RecordingFile
 from problem.robot_file import RobotFile
@@ -21,6 +22,7 @@ FORMATS: dict[str, type[BaseModel]] = {
     "model": ModelFile,
     "verdict": VerdictFile,
     "comparison": ComparisonFile,
+    "facts": FactsFile,
 }
 
 
