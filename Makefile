@@ -65,7 +65,7 @@ best-known: .venv/run ## ten minutes more for the best trajectories known: resul
 	$(BIN)/armlab best-known
 
 real: .venv/dev ## identify and diagnose the public recordings of real arms: results/real/arms.md
-	$(BIN)/armlab real
+	$(BIN)/armlab real --part public
 
 real-leave-one-out: .venv/dev ## settings chosen on all real arms but one, judged on that one
 	$(BIN)/armlab real --leave-one-out

@@ -193,7 +193,23 @@ def export_model(model: Path, out: Path, into: Path | None, lock: tuple[str, ...
 @click.command()
 @click.option("--results", type=OutputPath(), default=Path("results/real"), show_default=True)
 @click.option("--recordings", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
-@click.option("--only", multiple=True, help="Name of a public recording [default: all].")
+@click.option("--only", multiple=True, help="Name of a public recording or of a folder, repeatable [default: all].")
+@click.option(
+    "--part",
+    type=click.Choice(["all", "folders", "public"]),
+    default="all",
+    show_default=True,
+    help="Recording folders below ARMLAB_RECORDINGS, or the public recordings that are fetched.",
+)
+@click.option("--facts", type=_FILE, help="What is known of the folders: facts/1, see docs/recordings.md.")
+@click.option("--jobs", type=JobCount(), default=2, show_default=True, help="Folders that are diagnosed at a time.")
+@click.option(
+    "--work",
+    type=OutputPath(),
+    default=Path(".armlab/real"),
+    show_default=True,
+    help="Verdicts of the folders, and the page of all of them, the unlicensed included.",
+)
 @click.option(
     "--peers", type=click.Path(path_type=Path), help="Python that has figaroh and mujoco[sysid]: adds peers.md."
 )
@@ -202,22 +218,42 @@ def export_model(model: Path, out: Path, into: Path | None, lock: tuple[str, ...
 )
 @prints_lines
 def real(
-    results: Path, recordings: Path, only: tuple[str, ...], peers: Path | None, leave_one_out: bool
+    results: Path,
+    recordings: Path,
+    only: tuple[str, ...],
+    part: str,
+    facts: Path | None,
+    jobs: int,
+    work: Path,
+    peers: Path | None,
+    leave_one_out: bool,
 ) -> Iterator[str]:
-    """Identify and diagnose public recordings of real arms.
+    """Diagnose recordings of real arms, and judge what is said.
 
-    Writes arms.md, arms.csv and arms.svg; with --leave-one-out leave_one_out.md and .csv instead, and an interrupted
-    command continues.
+    Each folder below ARMLAB_RECORDINGS that holds a recording.yaml, or old/ and new/ with one each, is diagnosed or
+    compared in a process of its own. With --facts FILE the verdict is held against what is known: facts named, told as
+    a class or as a cause, minor or missed; what is wrong or extra. Held-out errors stand beside those of identify and
+    of plain least squares. Writes folders.md, folders.csv and folders_joints.csv with the folders whose facts do not
+    say `licence: none`, and a page of all folders into the work folder. An interrupted command continues.
+
+    Public recordings are identified and diagnosed on the same runs. Writes arms.md, arms.csv and arms.svg; with
+    --leave-one-out leave_one_out.md and .csv instead.
     """
     from armlab.common.errors import InputError
-    from armlab.diagnosis.real_arms.bench import bench_real_arms
     from armlab.diagnosis.real_arms.leave_one_out import leave_arms_out
+    from armlab.diagnosis.real_folders.bench import FolderBench
+    from armlab.diagnosis.real_folders.parts import PublicBench, bench_real
+    from armlab.recordings.public import local_copies
 
-    if leave_one_out and peers is not None:
-        raise InputError("--peers has no part in --leave-one-out: give one of them")
+    if leave_one_out and (peers is not None or facts is not None or part == "folders"):
+        raise InputError("--leave-one-out takes public recordings alone: leave out --peers, --facts, --part folders")
+    if part == "public" and facts is not None:
+        raise InputError("--facts are about folders: leave out --facts or --part public")
     if leave_one_out:
         return leave_arms_out(results, recordings, only, tell_progress)
-    return bench_real_arms(results, recordings, only, peers, tell_progress)
+    folders = None if part == "public" else FolderBench(local_copies(), facts, results, work, jobs)
+    arms = None if part == "folders" else PublicBench(results, recordings, peers)
+    return bench_real(folders, arms, only, tell_progress)
 
 
 @click.command("real-motion")

@@ -151,6 +151,13 @@ def test_facts_with_mistakes_are_refused_in_one_line(tmp_path: Path, content: di
     assert "\n" not in str(caught.value)
 
 
+def test_the_example_of_the_documentation_is_a_facts_file(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "recordings.md").read_text()
+    (tmp_path / "facts.yaml").write_text(page[page.index("schema: facts/1\n") :].partition("```")[0])
+    facts = read_facts(tmp_path / "facts.yaml")
+    assert (len(facts.singles), len(facts.pairs)) == (1, 1)
+
+
 def _other_program() -> Path | None:
     folder = local_copies()
     return folder / "score_facts.py" if folder and (folder / "score_facts.py").is_file() else None
