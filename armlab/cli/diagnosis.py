@@ -308,6 +308,9 @@ def relations(
 @click.option("--cases", type=click.IntRange(min=1), default=16, show_default=True, help="Random ones of a recording.")
 @click.option("--out", type=OutputPath(), help="Folder for the tables of random cases [default: RESULTS].")
 @click.option("--jobs", type=JobCount(), default=1, show_default=True, help="Processes for random cases.")
+@click.option("--make", "made", type=OutputPath(), help="Only write random cases: observations and answers.")
+@click.option("--observation", type=_FILE, help="Only diagnose one of these observations, into --out.")
+@click.option("--judge", "answered", type=_FILE, help="Only judge a folder of random cases that were diagnosed.")
 @prints_lines
 def real_concealed(
     results: Path,
@@ -317,6 +320,9 @@ def real_concealed(
     cases: int,
     out: Path | None,
     jobs: int,
+    made: Path | None,
+    observation: Path | None,
+    answered: Path | None,
 ) -> Iterator[str]:
     """Judge diagnoses of effects concealed in real recordings.
 
@@ -324,12 +330,30 @@ def real_concealed(
     concealed.csv and concealed.svg; with --seed the tables cases.csv, claims.csv and recordings.csv, which
     `armlab prove --tier real` scores.
     """
-    from armlab.diagnosis.real_concealed.at_random import REAL_ARMS, RandomCases, conceal_at_random
+    from armlab.diagnosis.real_concealed.at_random import (
+        REAL_ARMS,
+        RandomCases,
+        conceal_at_random,
+        examine_observation,
+        judge_cases,
+        make_cases,
+    )
     from armlab.diagnosis.real_concealed.report import conceal_in_recordings
 
+    steps = [name for name, given in (("--make", made), ("--observation", observation), ("--judge", answered)) if given]
+    if len(steps) > 1:
+        raise click.UsageError(f"{' and '.join(steps)} are steps of their own: give one of them")
+    if observation is not None:
+        return examine_observation(observation, out or results, tell_progress)
     if seed is None:
+        if steps:
+            raise click.UsageError(f"{steps[0]} needs --seed, that of the random cases")
         return conceal_in_recordings(results, recordings, only, tell_progress)
     settings = RandomCases(only or REAL_ARMS, cases, seed)
+    if made is not None:
+        return make_cases(settings, recordings, results, made, tell_progress)
+    if answered is not None:
+        return judge_cases(settings, answered, out or results)
     return conceal_at_random(settings, recordings, results, out or results, jobs, tell_progress)
 
 

@@ -114,12 +114,13 @@ def conceal(
     """
     from tqdm import tqdm
 
-    from armlab.concealed.sets import MANIFEST_FILE, conceal_cases, make_set_settings, seal_set
+    from armlab.concealed.sealed import MANIFEST_FILE
+    from armlab.concealed.torque import TORQUE, make_set_settings
 
     settings = make_set_settings(cases, seed, tier, kind, development)
-    for _ in tqdm(conceal_cases(settings, out, jobs), total=cases, unit="case", desc="concealed"):
+    for _ in tqdm(TORQUE.conceal(settings, out, jobs), total=cases, unit="case", desc="concealed"):
         pass
-    _, sealed = seal_set(settings, out)
+    sealed = TORQUE.seal(settings, out)
     yield f"{out / MANIFEST_FILE} SHA-256 {sealed}"
     return {"manifest": out / MANIFEST_FILE, "sha256": sealed}
 
@@ -161,7 +162,7 @@ def oracle(
         write_oracle,
     )
     from armlab.concealed.score.scoring import PAGE_FILE, SCORE_FILE, write_page_again
-    from armlab.concealed.sets import make_set_settings
+    from armlab.concealed.torque import make_set_settings
 
     out = out or scored
     if out is None:
@@ -336,8 +337,8 @@ def prove(
     Tier by tier: torque, how recordings are read, motion only, real recordings with something concealed. Logs the
     scores. After an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.prove import choose_proof
     from armlab.concealed.tiers import TIERS, prove_tiers
+    from armlab.concealed.torque import choose_proof
 
     proof = choose_proof(quick, development, cases, nulls)
     folder = work or Path(".armlab/proof") / proof.name
@@ -345,12 +346,15 @@ def prove(
     return prove_tiers(proof, tiers or TIERS, folder, scores, jobs)
 
 
-def _seed_and_folder(seed: int | None, work: Path | None, kind: str) -> tuple[int, Path]:
-    """The seed of a sealed set, which follows from the commit, and its folder, where they are not given."""
-    from armlab.concealed.prove import code_commit, judged_seed
+def _choose_set(seed: int | None, work: Path | None, kind: str) -> tuple[int, Path, str | None]:
+    """The seed of a sealed set, which follows from the commit, and its folder, where they are not given.
+
+    The third is the commit that the set judges, None for any other seed.
+    """
+    from armlab.concealed.sealed import code_commit, judged_commit, judged_seed
 
     chosen = judged_seed(code_commit()) if seed is None else seed
-    return chosen, work or Path(f".armlab/{kind}/{chosen}")
+    return chosen, work or Path(f".armlab/{kind}/{chosen}"), judged_commit(chosen)
 
 
 def _sealed_set_options(kind: str, contents: str) -> Callable[[_Command], _Command]:
@@ -385,10 +389,10 @@ def prove_changes(
     Makes pairs of recordings of one robot, with nothing or one thing changed, compares them blindly, and scores. After
     an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.pairs.prove import PairSet, prove_pairs
+    from armlab.concealed.pairs.prove import CHANGES, PairSet
 
-    chosen, folder = _seed_and_folder(seed, work, "changes")
-    return prove_pairs(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs)
+    chosen, folder, commit = _choose_set(seed, work, "changes")
+    return CHANGES.prove(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs, commit)
 
 
 @click.command("prove-setup")
@@ -411,12 +415,11 @@ def prove_setup(
     Puts mistakes into simulated and public recordings, diagnoses them blindly, and scores: physics, too, where some is
     hidden. After an interruption the same command continues (extra `engines`).
     """
-    from armlab.concealed.setup.prove import SetupSet
-    from armlab.concealed.setup.prove import prove_setup as run_proof
+    from armlab.concealed.setup.prove import SETUP, SetupSet
 
-    chosen, folder = _seed_and_folder(seed, work, "setup")
+    chosen, folder, commit = _choose_set(seed, work, "setup")
     cases = SetupSet(simulated, real, nulls, chosen)
-    return run_proof(cases, folder, results or folder / "score", jobs)
+    return SETUP.prove(cases, folder, results or folder / "score", jobs, commit)
 
 
 @click.command("prove-motion")
@@ -432,8 +435,7 @@ def prove_motion(
     Simulates arms with position servos whose joints stick, on an engine of its own, diagnoses commands and positions
     blindly, and scores. After an interruption the same command continues.
     """
-    from armlab.concealed.servo.prove import MotionSet
-    from armlab.concealed.servo.prove import prove_motion as run_proof
+    from armlab.concealed.servo.prove import MOTION, MotionSet
 
-    chosen, folder = _seed_and_folder(seed, work, "motion")
-    return run_proof(MotionSet(cases, nulls, chosen), folder, results or folder / "score", jobs)
+    chosen, folder, commit = _choose_set(seed, work, "motion")
+    return MOTION.prove(MotionSet(cases, nulls, chosen), folder, results or folder / "score", jobs, commit)

@@ -11,10 +11,10 @@ from joblib import Parallel, delayed
 
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
-from armlab.concealed.prove import FINISHED_MARK, make_development_proof
 from armlab.concealed.score.measures import MEASURE_TEXTS
 from armlab.concealed.score.scoring import compute_score
-from armlab.concealed.sets import conceal_cases, seal_set
+from armlab.concealed.sealed import FINISHED_MARK
+from armlab.concealed.torque import TORQUE, make_development_proof
 
 DONE_FOLDER = "done"  # beside the verdicts: an empty file for each finished case
 GUARD_ORDER_FILE = "guards.txt"  # beside the verdicts: the guards in their order
@@ -54,8 +54,9 @@ def ablate(
     found: dict[str, dict[str, Any]] = {}
     for name, each in proof.sets.items():
         folder, verdicts = work / name, work / "verdicts" / name
-        list(conceal_cases(each, folder, jobs))
-        cases, sealed = seal_set(each, folder)
+        list(TORQUE.conceal(each, folder, jobs))
+        sealed = TORQUE.seal(each, folder)
+        cases = [plan.name for plan in each.plans()]
         missing = [case for case in cases if not _is_done(case, settings.changes, verdicts)]
         todo = (delayed(_write_verdicts)(diagnose, folder / "observations" / case, verdicts) for case in missing)
         for number, _ in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(todo), 1):

@@ -109,28 +109,24 @@ class Truth(Settings):
         return (*self.injected, *self.beside)
 
 
-class SetManifest(Settings):
-    """The seal of a concealed set. cases: names, sorted. files: SHA-256 by path from the set's folder."""
+class Manifest(Settings):
+    """The seal of a set. cases: names, sorted. files: SHA-256 by path from the set's folder."""
 
     schema_: Literal["manifest/1"] = Field(alias="schema")
+    cases: tuple[str, ...]
     seed: int
+    files: dict[str, str]
+
+
+class SetManifest(Manifest):
+    """The seal of a torque set."""
+
     tier: SetTier
     kind: SetKind
     development: bool
-    cases: tuple[str, ...]
-    files: dict[str, str]
 
 
-class LoopManifest(Settings):
-    """The seal of the recordings of a closed loop. cases: names, sorted. files: SHA-256 by path."""
-
-    schema_: Literal["manifest/1"] = Field(alias="schema")
-    cases: tuple[str, ...]
-    seed: int
-    files: dict[str, str]
-
-
-FileModel = TypeVar("FileModel", Truth, SetManifest, LoopManifest)
+FileModel = TypeVar("FileModel", bound=Settings)
 
 
 def read_model(model: type[FileModel], path: Path) -> FileModel:
@@ -138,7 +134,7 @@ def read_model(model: type[FileModel], path: Path) -> FileModel:
     return validate(model, read_json(path), str(path))
 
 
-def write_model(content: Truth | SetManifest | LoopManifest, path: Path) -> None:
+def write_model(content: Truth | Manifest, path: Path) -> None:
     """Writes a file of this module as JSON."""
     path.write_text(json.dumps(content.model_dump(mode="json", by_alias=True), indent=1) + "\n", encoding="utf-8")
 

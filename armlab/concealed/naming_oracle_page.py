@@ -18,8 +18,8 @@ from armlab.concealed.score.distance import ORACLE_PAGE, ORACLE_TABLE, format_sh
 from armlab.concealed.score.measures import MIN_NAMED_MULTIPLE
 from armlab.concealed.score.rows import read_table
 from armlab.concealed.score.scoring import SCORE_FILE
-from armlab.concealed.sets import SetSettings
 from armlab.concealed.sizing import simulate_case
+from armlab.concealed.torque import SetSettings
 
 
 def read_scored_effects(settings: SetSettings, score: Path) -> pd.DataFrame:

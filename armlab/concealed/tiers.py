@@ -12,12 +12,13 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from armlab.concealed.log_page import LOG_FILE
-from armlab.concealed.prove import FINISHED_MARK, QUICK_NAME, QUICK_SEED, Proof, judged_seed, prove
 from armlab.concealed.real.prove import RealSet, prove_real
-from armlab.concealed.servo.prove import MotionSet, prove_motion
+from armlab.concealed.sealed import FINISHED_MARK, judged_seed
+from armlab.concealed.servo.prove import MOTION, MotionSet
 from armlab.concealed.setup.plan import PUBLIC
-from armlab.concealed.setup.prove import SetupSet, prove_setup
+from armlab.concealed.setup.prove import SETUP, SetupSet
 from armlab.concealed.summary_page import write_summary
+from armlab.concealed.torque import QUICK_NAME, QUICK_SEED, Proof, prove_torque
 
 TierName = Literal["torque", "setup", "motion", "real"]
 TIERS: tuple[TierName, ...] = get_args(TierName)
@@ -33,28 +34,28 @@ def prove_tiers(proof: Proof, tiers: Sequence[TierName], work: Path, results: Pa
     for tier in tiers:
         yield f"tier {tier}"
         folder = work / tier
-        if tier == "torque":
-            yield from prove(proof, folder, results, jobs)
-        else:
-            if proof.commit is None and (folder / FINISHED_MARK).is_file():
-                shutil.rmtree(folder)  # as for torque: a finished proof that is not judged starts again from nothing
-            yield from _prove_other(proof, tier, folder, results / tier, jobs)
-            if folder.is_dir():  # a tier that was skipped has none
-                (folder / FINISHED_MARK).touch()
+        if proof.commit is None and (folder / FINISHED_MARK).is_file():
+            shutil.rmtree(folder)  # a finished proof that is not judged starts again from nothing
+        yield from _prove_tier(proof, tier, folder, results, jobs)
+        if folder.is_dir():  # a tier that was skipped has none
+            (folder / FINISHED_MARK).touch()
         if proof.commit is not None and (results / LOG_FILE).is_file():  # other folders than the judged one have no log
             yield f"wrote {write_summary(results)}"
 
 
-def _prove_other(proof: Proof, tier: TierName, work: Path, results: Path, jobs: int) -> Iterator[str]:
-    """A tier whose cases are no torque sets; a proof for development has as many of them as one for a quick look."""
-    judged = proof.commit is not None
+def _prove_tier(proof: Proof, tier: TierName, work: Path, results: Path, jobs: int) -> Iterator[str]:
+    """One tier; but for torque, a proof for development has as many cases as one for a quick look."""
+    judged, folder = proof.commit is not None, results / tier
     seed = judged_seed(proof.commit) if proof.commit else _development_seed(proof)
+    if tier == "torque":
+        return prove_torque(proof, work, results, jobs)
     if tier == "setup":
-        return prove_setup(SetupSet(*(JUDGED_SETUP if judged else QUICK_SETUP), seed), work, results, jobs)
+        setup = SetupSet(*(JUDGED_SETUP if judged else QUICK_SETUP), seed)
+        return SETUP.prove(setup, work, folder, jobs, proof.commit)
     if tier == "real":
-        recordings, cases = JUDGED_REAL if judged else QUICK_REAL
-        return prove_real(RealSet(recordings, cases, seed), work, results, jobs, proof.commit)
-    return prove_motion(MotionSet(*(JUDGED_MOTION if judged else QUICK_MOTION), seed), work, results, jobs)
+        return prove_real(RealSet(*(JUDGED_REAL if judged else QUICK_REAL), seed), work, folder, jobs, proof.commit)
+    motion = MotionSet(*(JUDGED_MOTION if judged else QUICK_MOTION), seed)
+    return MOTION.prove(motion, work, folder, jobs, proof.commit)
 
 
 def _development_seed(proof: Proof) -> int:

@@ -12,7 +12,7 @@ from refusals import refusal
 
 from armlab.common.arrays import Array
 from armlab.concealed.arms import make_machine
-from armlab.concealed.formats import LoopManifest
+from armlab.concealed.formats import Manifest
 from armlab.concealed.loop import case
 from armlab.concealed.loop.case import Forecast, SecondMotion, Tools, play_case
 from armlab.concealed.loop.recordings import (
@@ -23,7 +23,7 @@ from armlab.concealed.loop.recordings import (
     write_loop_recording,
 )
 from armlab.concealed.loop.run import ANSWERS_FILE, LoopSettings, close_loop, play_cases, read_results, seal_loop
-from armlab.concealed.sets import read_checked_manifest
+from armlab.concealed.sealed import read_checked_manifest
 from armlab.recordings.load import load_recording
 
 SECONDS, RATE_HZ = 2.0, 250.0
@@ -127,7 +127,7 @@ def test_an_ambiguous_case_is_played_with_all_three_second_motions(tmp_path: Pat
     assert found["ends"] == {"designed": "right", "random": "right", "condition": "right"}
     assert found["forecast"] == {kind: [0.7, 0.1, 0.2] for kind in ("designed", "random", "condition")}
     close_loop(settings, out, answers)
-    assert read_checked_manifest(out, LoopManifest)[0].cases == (found["name"],)
+    assert read_checked_manifest(out, Manifest)[0].cases == (found["name"],)
     assert seal_loop(settings, out) == answers
     assert not list(play_cases(settings, out, Tools(told, suspect, move), 1))  # nothing is left to do
 

@@ -26,8 +26,8 @@ from armlab.concealed.naming_oracle_page import (
 from armlab.concealed.plan import draw_plan
 from armlab.concealed.score.distance import distance_table, read_oracle_table, remove_oracle
 from armlab.concealed.score.scoring import SCORE_FILE
-from armlab.concealed.sets import make_set_settings
 from armlab.concealed.sizing import limit_noncentrality, simulate_case
+from armlab.concealed.torque import make_set_settings
 
 PLAN_INDEX = next(index for index in range(60) if draw_plan(1003, index, "clean", True, True).machine.name == "scara")
 

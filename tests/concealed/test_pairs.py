@@ -7,7 +7,7 @@ import pytest
 
 from armlab.common.errors import InputError
 from armlab.concealed.pairs.plan import CHANGE_KINDS, PAIRS, DriftingNoise, PairPlan, draw_change, draw_pair
-from armlab.concealed.pairs.prove import PairSet, prove_pairs
+from armlab.concealed.pairs.prove import CHANGES, PairSet
 from armlab.concealed.pairs.score import PairOutcome, count_names, measures_of
 
 
@@ -81,4 +81,4 @@ def test_changes_below_three_detection_limits_do_not_count() -> None:
 def test_a_folder_of_other_pairs_is_refused(tmp_path: Path) -> None:
     (tmp_path / "settings.json").write_text("{}")
     with pytest.raises(InputError, match="holds another set"):
-        next(prove_pairs(PairSet(1, 0, 1700), tmp_path, tmp_path / "score", 1))
+        next(CHANGES.prove(PairSet(1, 0, 1700), tmp_path, tmp_path / "score", 1))

@@ -1,7 +1,7 @@
 """The proof as a whole, with a diagnosis that always says the same: what is kept, what is logged, what starts anew."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +9,13 @@ import pytest
 from made_verdicts import finding, verdict, write
 
 from armlab.common.errors import InputError
-from armlab.concealed import prove as proving
 from armlab.concealed.ablation import AblationSettings, ablate
-from armlab.concealed.prove import LOG_FILE, Proof, choose_proof, prove
+from armlab.concealed.log_page import LOG_FILE
+from armlab.concealed.plan import Plan
 from armlab.concealed.score.measures import MEASURE_TEXTS
-from armlab.concealed.sets import SetSettings
+from armlab.concealed.sealed import VERDICTS, SealedTier, judged_commit, judged_seed
+from armlab.concealed.tiers import prove_tiers
+from armlab.concealed.torque import Proof, SetSettings, choose_proof, prove_torque
 
 SETS = {"mixed": SetSettings(1, 5000, "clean", "nulls")}
 
@@ -23,20 +25,20 @@ def silent(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Stands in for all diagnoses; lists the cases that were looked at."""
     looked: list[str] = []
 
-    def diagnose_all(folder: Path, verdicts: Path, cases: list[str], jobs: int) -> Iterator[str]:
-        for case in cases:
-            write(verdicts, case, verdict())
-            looked.append(case)
-            yield case
+    def ask(_: Any, plans: Sequence[Plan], folder: Path, jobs: int) -> Iterator[str]:
+        for plan in plans:
+            write(folder / VERDICTS, plan.name, verdict())
+            looked.append(plan.name)
+            yield plan.name
 
-    monkeypatch.setattr(proving, "diagnose_all", diagnose_all)
+    monkeypatch.setattr(SealedTier, "ask", ask)
     return looked
 
 
 def test_a_judged_proof_is_logged_once_with_commit_seed_seal_and_score(silent: list[str], tmp_path: Path) -> None:
     proof = Proof(SETS, "judged", "a" * 40)
-    said = list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
-    list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
+    said = list(prove_torque(proof, tmp_path / "work", tmp_path / "results", 1))
+    list(prove_torque(proof, tmp_path / "work", tmp_path / "results", 1))
     entries = [json.loads(line) for line in (tmp_path / "results" / LOG_FILE).read_text().splitlines()]
     assert len(entries) == 1
     assert entries[0]["commit"] == "a" * 40
@@ -58,13 +60,13 @@ def test_the_committed_log_selects_measures_by_id() -> None:
 def test_sets_that_are_proved_one_after_another_are_logged_each(silent: list[str], tmp_path: Path) -> None:
     for name in ("mixed", "nulls"):
         proof = Proof({name: SETS["mixed"]}, "judged", "c" * 40)
-        list(prove(proof, tmp_path / "work", tmp_path / "results", 1))
+        list(prove_torque(proof, tmp_path / "work", tmp_path / "results", 1))
     entries = [json.loads(line) for line in (tmp_path / "results" / LOG_FILE).read_text().splitlines()]
     assert [each["set"] for each in entries] == ["mixed", "nulls"]
 
 
 def test_the_seal_is_printed_before_the_first_diagnosis(silent: list[str], tmp_path: Path) -> None:
-    steps = prove(Proof(SETS, "judged", "b" * 40), tmp_path / "work", tmp_path / "results", 1)
+    steps = prove_torque(Proof(SETS, "judged", "b" * 40), tmp_path / "work", tmp_path / "results", 1)
     for line in steps:
         if "SHA-256" in line:
             break
@@ -75,7 +77,7 @@ def test_the_seal_is_printed_before_the_first_diagnosis(silent: list[str], tmp_p
 
 def test_a_finished_quick_proof_starts_anew_and_is_not_logged(silent: list[str], tmp_path: Path) -> None:
     for _ in range(2):
-        list(prove(Proof(SETS, "quick"), tmp_path / "work", tmp_path / "results", 1))
+        list(prove_tiers(Proof(SETS, "quick"), ["torque"], tmp_path / "work", tmp_path / "results", 1))
     assert len(silent) == 2
     assert not (tmp_path / "results" / LOG_FILE).exists()
 
@@ -86,6 +88,14 @@ def test_a_development_proof_has_a_development_seed_and_no_commit() -> None:
     assert proof.sets == {"mixed": SetSettings(4, 1200, development=True)}
     with pytest.raises(InputError, match="seed 5000 should be one for development, 1000 to 1999"):
         choose_proof(False, 5000, 4, 0)
+
+
+def test_a_seed_that_follows_from_no_commit_judges_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    commit = "a" * 40
+    monkeypatch.setattr("armlab.concealed.sealed.code_commit", lambda: commit)
+    assert judged_commit(judged_seed(commit)) == commit
+    assert judged_commit(judged_seed("b" * 40)) is None
+    assert judged_commit(1200) is None
 
 
 def test_an_ablation_scores_the_same_cases_with_each_guard_off(tmp_path: Path) -> None:

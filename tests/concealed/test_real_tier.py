@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from made_cases import write_made_cases
 
 from armlab.common.errors import InputError
-from armlab.concealed.prove import FINISHED_MARK
+from armlab.concealed import sealed
 from armlab.concealed.real import prove as proving
 from armlab.concealed.real.page import render_page, write_score
 from armlab.concealed.real.prove import RealSet, prove_real
 from armlab.concealed.real.score import RealTables, read_tables, real_measures, recording_table, reliability_of
+from armlab.concealed.sealed import TIME_FILE
 from armlab.recordings.public import PUBLIC_RECORDINGS
 
 SET = RealSet(("emps", "kuka-kr300"), 2, 1001)
@@ -47,17 +49,26 @@ def tables(tmp_path: Path) -> RealTables:
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
-    """Stands in for the command that diagnoses, with copies of `emps` alone; lists its arguments."""
+    """Stands in for the command that makes, diagnoses and judges, with copies of `emps` alone; lists its arguments."""
     given: list[list[str]] = []
 
     def run(arguments: Sequence[str]) -> Iterator[str]:
         given.append(list(arguments))
-        _write_tables(Path(arguments[arguments.index("--out") + 1]))
-        yield "diagnosed"
+        if "--make" in arguments:
+            write_made_cases(Path(arguments[arguments.index("--make") + 1]), "emps", SET.cases)
+        else:
+            _write_tables(Path(arguments[arguments.index("--out") + 1]))
+        yield "done"
+
+    def answer(arguments: Sequence[str], out: Path) -> None:
+        given.append(list(arguments))
+        out.mkdir(parents=True)
+        (out / TIME_FILE).write_text('{"seconds": 1}')
 
     own = PUBLIC_RECORDINGS["emps"]
     monkeypatch.setattr(proving, "_run_command", run)
     monkeypatch.setattr(proving, "is_available", lambda recording: recording is own)
+    monkeypatch.setattr(sealed, "answer", answer)
     return given
 
 
@@ -111,9 +122,11 @@ def test_a_page_without_any_new_claim_can_be_drawn(tables: RealTables, tmp_path:
 def test_recordings_that_are_not_on_this_machine_are_left_out(asked: list[list[str]], tmp_path: Path) -> None:
     lines = list(prove_real(SET, tmp_path / "work", tmp_path / "results", 1))
     assert "kuka-kr300 is left out: it is neither in the folder ARMLAB_RECORDINGS nor in the cache" in lines
-    (arguments,) = asked
-    assert arguments[:3] == ["real-concealed", "--only", "emps"]
-    assert arguments[3:9] == ["--seed", "1001", "--cases", "2", "--jobs", "1"]
+    made, *diagnosed, judged = asked
+    for arguments in (made, judged):
+        assert arguments[:7] == ["real-concealed", "--only", "emps", "--seed", "1001", "--cases", "2"]
+    assert [arguments[:2] for arguments in diagnosed] == [["real-concealed", "--observation"]] * 3
+    assert not any(str(tmp_path / "work") in word for arguments in diagnosed for word in arguments)
     names = {path.name for path in (tmp_path / "results").iterdir()}
     assert names == {"real.md", "cases.csv", "claims.csv", "recordings.csv", "reliability.svg", "strength.svg"}
     assert pd.read_csv(tmp_path / "results" / "cases.csv")["answer"].tolist() == [
@@ -134,16 +147,13 @@ def test_without_any_recording_the_tier_is_skipped_with_a_reason(
     assert not (tmp_path / "results").exists()
 
 
-def test_a_judged_score_is_logged_once_and_others_never(
-    asked: list[list[str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(proving, "JUDGED_LOG", tmp_path / "log.jsonl")
-    work = tmp_path / "work"
-    list(prove_real(SET, work, tmp_path / "results", 1))
-    assert not (tmp_path / "log.jsonl").exists()
+def test_a_judged_score_is_logged_once_and_others_never(asked: list[list[str]], tmp_path: Path) -> None:
+    log = tmp_path / "log.jsonl"
+    found = RealSet(("emps",), 2, 1001)
+    list(prove_real(found, tmp_path / "other", tmp_path / "results", 1))
+    assert not log.exists()
     for _ in range(2):
-        list(prove_real(SET, work, tmp_path / "results", 1, "a" * 40))
-        (work / FINISHED_MARK).touch()
+        list(proving.REAL.prove(found, tmp_path / "other", tmp_path / "results", 1, "a" * 40, log))
     assert "| wrong names among claims beyond background | 0.25 of 4 |" in (tmp_path / "log.md").read_text()
     (entry,) = (json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines())
     assert (entry["set"], entry["seed"], entry["cases"]) == ("real", 1001, 4)

@@ -16,18 +16,10 @@ from armlab.common.errors import InputError
 from armlab.concealed.formats import SetManifest, Truth, read_model
 from armlab.concealed.noise import JUDGED_KINDS, USUAL_KINDS
 from armlab.concealed.plan import DEVELOPMENT_SEEDS, PLAN, draw_plan, target_multiple
-from armlab.concealed.prove import diagnose_all, judged_seed
 from armlab.concealed.score.cases import FAILURE_FILE, read_complaint
 from armlab.concealed.score.scoring import score_set
-from armlab.concealed.sets import (
-    MANIFEST_FILE,
-    SetSettings,
-    conceal_cases,
-    file_digest,
-    make_set_settings,
-    read_checked_manifest,
-    seal_set,
-)
+from armlab.concealed.sealed import DIGESTS, MANIFEST_FILE, VERDICTS, file_digest, judged_seed, read_checked_manifest
+from armlab.concealed.torque import TORQUE, SetSettings, make_set_settings
 from armlab.recordings.load import load_recording
 
 SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
@@ -35,8 +27,8 @@ SETTINGS = SetSettings(3, 1005, "both", "mixed", True)
 
 def make_set(settings: SetSettings, folder: Path, jobs: int) -> list[str]:
     """Conceals the missing cases and seals the set; the names of the cases that were made."""
-    made = list(conceal_cases(settings, folder, jobs))
-    seal_set(settings, folder)
+    made = list(TORQUE.conceal(settings, folder, jobs))
+    TORQUE.seal(settings, folder)
     return made
 
 
@@ -63,18 +55,35 @@ def test_a_set_is_the_same_to_the_byte_for_one_and_two_jobs(made: Path, tmp_path
     assert file_digest(tmp_path / "again" / MANIFEST_FILE) == file_digest(made / MANIFEST_FILE)
 
 
+def _interrupt(folder: Path) -> str:
+    """As if the first case had only begun: its name."""
+    name = sorted(path.name for path in (folder / "observations").iterdir())[0]
+    (folder / MANIFEST_FILE).unlink()
+    (folder / DIGESTS / f"{name}.json").unlink()
+    return name
+
+
 def test_an_interrupted_set_goes_on_where_it_stopped(copy: Path) -> None:
     sealed = file_digest(copy / MANIFEST_FILE)
-    lost = sorted((copy / "observations").iterdir())[0]
-    shutil.rmtree(lost)
-    assert make_set(SETTINGS, copy, 1) == [lost.name]
+    begun = _interrupt(copy)
+    assert make_set(SETTINGS, copy, 1) == [begun]
     assert file_digest(copy / MANIFEST_FILE) == sealed
 
 
-def test_an_incomplete_set_has_no_seal(copy: Path) -> None:
-    shutil.rmtree(sorted((copy / "observations").iterdir())[0])
-    next(conceal_cases(SETTINGS, copy, 1))
+def test_an_incomplete_set_gets_no_seal(copy: Path) -> None:
+    begun = _interrupt(copy)
+    with pytest.raises(InputError, match=f"{begun}.json"):
+        TORQUE.seal(SETTINGS, copy)
     assert not (copy / MANIFEST_FILE).exists()
+
+
+def test_what_was_changed_before_the_seal_is_refused_too(copy: Path, tmp_path: Path) -> None:
+    _interrupt(copy)
+    changed = sorted((copy / "truth").glob("*.json"))[-1]
+    changed.write_text(changed.read_text() + " ")
+    make_set(SETTINGS, copy, 1)
+    with pytest.raises(InputError, match=f"{changed.name} was changed after"):
+        read_checked_manifest(copy, SetManifest)
 
 
 def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
@@ -83,7 +92,7 @@ def test_another_set_in_the_folder_is_refused(copy: Path) -> None:
 
 
 @pytest.mark.parametrize("part", ["truth", "observations"])
-def test_a_file_changed_after_sealing_is_refused(copy: Path, tmp_path: Path, part: str) -> None:
+def test_a_score_is_refused_where_a_file_was_changed_after_sealing(copy: Path, tmp_path: Path, part: str) -> None:
     file = next(path for path in sorted((copy / part).rglob("*")) if path.suffix in (".json", ".yaml"))
     file.write_text(file.read_text() + " ")
     with pytest.raises(InputError, match="was changed after"):
@@ -166,12 +175,12 @@ def test_realistic_links_are_three_to_ten_per_cent_off() -> None:
     assert {effect.effect for effect in plan.background} >= {"coulomb_friction", "viscous_friction"}
 
 
-def test_a_diagnosis_that_fails_is_kept_as_failed(made: Path, tmp_path: Path) -> None:
-    case = json.loads((made / MANIFEST_FILE).read_text())["cases"][0]
-    (tmp_path / "nothing" / "observations" / case).mkdir(parents=True)
-    assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == [case]
-    assert (tmp_path / "v" / case / FAILURE_FILE).is_file()
-    assert list(diagnose_all(tmp_path / "nothing", tmp_path / "v", [case], 1)) == []
+def test_a_diagnosis_that_fails_is_kept_as_failed(tmp_path: Path) -> None:
+    plan = SETTINGS.plan(0)
+    (tmp_path / "observations" / plan.name).mkdir(parents=True)
+    assert list(TORQUE.ask([plan], tmp_path, 1)) == [plan.name]
+    assert (tmp_path / VERDICTS / plan.name / FAILURE_FILE).is_file()
+    assert list(TORQUE.ask([plan], tmp_path, 1)) == []
 
 
 def test_a_complaint_is_one_line_without_the_paths_of_a_traceback(tmp_path: Path) -> None:

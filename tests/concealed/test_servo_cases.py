@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from jsonschema import Draft202012Validator
 
-from armlab.concealed import sealed_set
-from armlab.concealed.prove import judged_seed
-from armlab.concealed.servo import prove
+from armlab.concealed import sealed
 from armlab.concealed.servo.hidden import KINDS, Hidden
 from armlab.concealed.servo.make import MadeCase, make_case, write_case
 from armlab.concealed.servo.oracle import Oracle, find_size
 from armlab.concealed.servo.plan import ServoCase, draw_cases
+from armlab.concealed.servo.prove import MOTION, MotionSet
 from armlab.concealed.servo.score import judge
 from armlab.concealed.servo.truth import TRUTH_SCHEMA_FILE, truth_schema
 from armlab.diagnosis.motion.diagnose import diagnose_motion
@@ -88,16 +87,17 @@ def test_the_shipped_schema_of_answers_is_that_of_the_model():
     assert shipped == truth_schema(), f"write armlab.concealed.servo.truth.truth_schema() to {TRUTH_SCHEMA_FILE}"
 
 
-@pytest.mark.parametrize(("seed", "lines"), [(1990, 0), (judged_seed("a" * 40), 1)])
-def test_a_judged_set_is_logged_once_and_one_for_development_is_not(tmp_path, monkeypatch, seed, lines):
-    monkeypatch.setattr(sealed_set, "JUDGED_LOG", tmp_path / "log.jsonl")
-    monkeypatch.setattr(sealed_set, "code_commit", lambda: "a" * 40)
+@pytest.mark.parametrize(("commit", "lines"), [(None, 0), ("a" * 40, 1)])
+def test_a_judged_set_is_logged_once_and_one_for_development_is_not(tmp_path, commit, lines):
+    log = tmp_path / "log.jsonl"
     for _ in range(2):
-        list(prove.prove_motion(prove.MotionSet(0, 0, seed), tmp_path / "work", tmp_path / "results", 1))
-    logged = (tmp_path / "log.jsonl").read_text().splitlines() if lines else []
+        list(MOTION.prove(MotionSet(0, 0, 1990), tmp_path / "work", tmp_path / "results", 1, commit, log))
+    logged = log.read_text().splitlines() if lines else []
+    assert log.is_file() == bool(lines)
     assert len(logged) == lines
     for line in map(json.loads, logged):
-        assert (line["set"], line["seed"], line["cases"]) == ("motion", seed, 0)
+        assert (line["set"], line["commit"], line["seed"], line["cases"]) == ("motion", commit, 1990, 0)
+        assert line["manifest"] == sealed.file_digest(tmp_path / "work" / "manifest.json")
         assert "nulls_with_a_false_claim" in line["score"]["motion"]
 
 

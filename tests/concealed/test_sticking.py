@@ -7,7 +7,6 @@ from armlab.common.arrays import Array
 from armlab.concealed.effects.friction import Coulomb, Viscous
 from armlab.concealed.engine import Parts, Track
 from armlab.concealed.plan import PLAN, Plan, draw_plan
-from armlab.concealed.sets import SetSettings
 from armlab.concealed.simulate import (
     Controller,
     Reference,
@@ -20,6 +19,7 @@ from armlab.concealed.simulate import (
 )
 from armlab.concealed.sizing import oracle_grid, simulate_case, standstills
 from armlab.concealed.sticking import is_carried, play_sticking
+from armlab.concealed.torque import SetSettings
 
 
 def plan_of(index: int) -> tuple[Plan, Controller, Track]:

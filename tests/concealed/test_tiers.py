@@ -7,11 +7,12 @@ from typing import Any
 import pytest
 
 from armlab.concealed import tiers
-from armlab.concealed.prove import FINISHED_MARK, QUICK_SEED, Proof, judged_seed
 from armlab.concealed.real.prove import RealSet
+from armlab.concealed.sealed import FINISHED_MARK, SealedTier, judged_seed
 from armlab.concealed.servo.prove import MotionSet
 from armlab.concealed.setup.prove import SetupSet
 from armlab.concealed.tiers import TIERS, prove_tiers
+from armlab.concealed.torque import QUICK_SEED, Proof
 
 
 @pytest.fixture
@@ -24,8 +25,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, Path, Path]]:
         work.mkdir(parents=True, exist_ok=True)
         yield "done"
 
-    for name in ("prove", "prove_setup", "prove_motion", "prove_real"):
+    for name in ("prove_torque", "prove_real"):
         monkeypatch.setattr(tiers, name, stand_in)
+    monkeypatch.setattr(SealedTier, "prove", lambda _, *arguments: stand_in(*arguments))
     return given
 
 

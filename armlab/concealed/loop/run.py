@@ -10,10 +10,10 @@ from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError
 from armlab.concealed.folders import claim_folder
-from armlab.concealed.formats import LoopManifest, write_model
+from armlab.concealed.formats import Manifest, write_model
 from armlab.concealed.loop.case import MAX_ATTEMPTS, Tools, play_case
 from armlab.concealed.loop.recordings import draw_case
-from armlab.concealed.sets import MANIFEST_FILE, file_digest, seal_files
+from armlab.concealed.sealed import MANIFEST_FILE, file_digest, seal_files
 
 ANSWERS_FILE = "answers.json"
 
@@ -87,7 +87,7 @@ def close_loop(settings: LoopSettings, out: Path, answers: str) -> str:
     """Checks the results against the sealed answers, and returns the SHA-256 of the manifest of all recordings."""
     check_answers(out / "truth", answers, read_results(settings, out))
     names = sorted(each["name"] for each in read_results(settings, out))
-    manifest = LoopManifest(schema="manifest/1", cases=tuple(names), seed=settings.seed, files=seal_files(out))
+    manifest = Manifest(schema="manifest/1", cases=tuple(names), seed=settings.seed, files=seal_files(out))
     write_model(manifest, out / MANIFEST_FILE)
     return file_digest(out / MANIFEST_FILE)
 

@@ -1,4 +1,4 @@
-"""The proof of a comparison: make pairs, seal the answers, compare each pair in a process of its own, and score."""
+"""The changes tier: pairs of recordings of one robot, with one thing changed between them or nothing."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,8 +8,8 @@ from armlab.concealed.pairs.make import SIDES, make_pair, write_pair
 from armlab.concealed.pairs.plan import PairPlan, draw_pair
 from armlab.concealed.pairs.score import score_lines, score_pairs
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
-from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_judged_set
-from armlab.concealed.sets import TIERS
+from armlab.concealed.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
+from armlab.concealed.torque import TIERS
 
 
 @dataclass(frozen=True)
@@ -32,18 +32,18 @@ class PairSet:
             yield draw_pair(self.seed, number, TIERS[number // 4 % 2], True, development)
 
 
-def prove_pairs(settings: PairSet, work: Path, results: Path, jobs: int) -> Iterator[str]:
-    """Makes, seals, compares and scores; yields the lines that report it. InputError for a folder of another set."""
-    plans = list(settings.plans())
-    yield from SetMaker(_make, _question, "compared").prove(settings, plans, work, jobs)
-    score = score_pairs(work, [plan.name for plan in plans], results)
-    yield from score_lines(score)
-    log_judged_set("changes", settings.seed, len(plans), work, score.measures)
-
-
 def _make(plan: PairPlan, draft: Path) -> None:
     write_pair(make_pair(plan), draft / OBSERVATION, draft / TRUTH_FILE)
 
 
 def _question(_: PairPlan, observation: Path) -> list[str]:
     return ["diagnose", "--compare", *(str(observation / side) for side in SIDES)]
+
+
+def _judge(settings: PairSet, work: Path, results: Path) -> Score:
+    names = [plan.name for plan in settings.plans()]
+    score = score_pairs(work, names, results)
+    return Score(list(score_lines(score)), len(names), {"changes": [each.entry for each in score.measures]})
+
+
+CHANGES = SealedTier("changes", PairSet.plans, _make, _question, _judge, done="compared")

@@ -14,7 +14,7 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.pairs.plan import CHANGE_KINDS, PAIRS
 from armlab.concealed.score.cases import FAILURE_FILE
-from armlab.concealed.sealed_set import Share
+from armlab.concealed.score.share import Share
 
 MAX_CLASS = 3  # names
 

@@ -1,28 +1,52 @@
-"""The proof: `armlab real-concealed` conceals, diagnoses and judges random cases, and its tables are scored here.
+"""The tier of real recordings: `armlab real-concealed` makes, diagnoses and judges random cases, each in a step of its
+own, and its tables are scored here.
 
 The cases follow from the seed and the recordings alone, and the seed of a judged proof from the commit, so that nobody
 has seen them before.
 """
 
-import hashlib
-import os
 import subprocess
-import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryFile
 
 from armlab.common.errors import InputError
 from armlab.concealed.folders import claim_folder
-from armlab.concealed.prove import FINISHED_MARK, append_to_log
+from armlab.concealed.plan import random_stream
 from armlab.concealed.real.page import write_score
-from armlab.concealed.real.score import CASES_TABLE, RealTables, read_tables, real_measures
-from armlab.concealed.sealed_set import JUDGED_LOG
+from armlab.concealed.real.score import TIER, read_tables, real_measures
+from armlab.concealed.sealed import (
+    DRAFTS,
+    OBSERVATION,
+    OBSERVATIONS,
+    SOURCE_ROOT,
+    TRUTH,
+    TRUTH_FILE,
+    Score,
+    SealedTier,
+    command_of,
+    is_made,
+    one_thread_environment,
+)
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, PUBLIC_RECORDINGS, is_available
 
-REPOSITORY = Path(__file__).resolve().parents[3]
-LOOKS_FOLDER = REPOSITORY / "results" / "real"  # of the log of looks at the validation runs of real recordings
+LOOKS_FOLDER = SOURCE_ROOT / "results" / "real"  # of the log of looks at the validation runs of real recordings
+MADE = "made"  # among the drafts: cases as the command makes them, all of one recording at once
+
+
+@dataclass(frozen=True)
+class RealCase:
+    """A random case of a recording. number: from 1; 0 is the control, in which nothing is concealed."""
+
+    seed: int
+    recording: str
+    number: int
+
+    @property
+    def name(self) -> str:
+        """A random name, which says nothing about the case."""
+        return random_stream("real name", self.seed, self.recording, self.number).bytes(6).hex()
 
 
 @dataclass(frozen=True)
@@ -33,48 +57,80 @@ class RealSet:
     cases: int
     seed: int
 
+    def plans(self) -> Iterator[RealCase]:
+        """The cases, the control of each recording first."""
+        return (RealCase(self.seed, name, number) for name in self.recordings for number in range(self.cases + 1))
+
+    @property
+    def options(self) -> list[str]:
+        """The set for the command that makes and judges it."""
+        only = [word for name in self.recordings for word in ("--only", name)]
+        return [*only, "--seed", str(self.seed), "--cases", str(self.cases)]
+
 
 def prove_real(settings: RealSet, work: Path, results: Path, jobs: int, commit: str | None = None) -> Iterator[str]:
-    """Conceals, diagnoses, judges and scores; yields the lines that report it.
+    """Conceals, seals, diagnoses, judges and scores; yields the lines that report it.
 
-    Recordings that are not on this machine are left out; the tier is skipped where none is. work: folder of recordings
-    and outcomes, where an interrupted proof continues. results: folder of page, tables and figures. commit: of a judged
-    proof, which is logged once. InputError for a folder of another set.
+    Recordings that are not on this machine are left out; the tier is skipped where none is. work: folder of recordings,
+    cases and verdicts, where an interrupted proof continues. results: folder of page, tables and figures. commit: of a
+    judged proof, which is logged once. InputError for a folder of another set.
     """
-    found = [name for name in settings.recordings if is_available(PUBLIC_RECORDINGS[name])]
+    found = tuple(name for name in settings.recordings if is_available(PUBLIC_RECORDINGS[name]))
     for name in settings.recordings:
         if name not in found:
             yield f"{name} is left out: it is neither in the folder {LOCAL_COPIES_VARIABLE} nor in the cache"
     if not found:
         yield "tier real is skipped: no recording of a real arm is on this machine"
         return
-    claim_folder(settings, work)
+    chosen = replace(settings, recordings=found)
+    claim_folder(chosen, work)
+    for name in found:
+        own = replace(chosen, recordings=(name,))
+        if not all(is_made(work, case.name) for case in own.plans()):
+            place = work.resolve()
+            made, fetched = str(place / DRAFTS / MADE), str(place / "recordings")
+            folders = ["--make", made, "--recordings", fetched, "--results", str(LOOKS_FOLDER)]
+            yield from _run_command(["real-concealed", *own.options, *folders])
+    yield from REAL.prove(chosen, work, results, jobs, commit)
+
+
+def _make(case: RealCase, draft: Path) -> None:
+    """Takes a case from those that the command made."""
+    made, key = draft.parent / MADE, f"{case.recording}-{case.number}"
+    (made / OBSERVATIONS / key).replace(draft / OBSERVATION)
+    (made / TRUTH / f"{key}.json").replace(draft / TRUTH_FILE)
+
+
+def _question(_: RealCase, observation: Path) -> list[str]:
+    return ["real-concealed", "--observation", str(observation)]
+
+
+def _judge(settings: RealSet, work: Path, results: Path) -> Score:
     tables = (work / "tables").resolve()
-    yield from _run_command(_question(settings, found, work.resolve(), tables, jobs))
+    judging = ["--judge", str(work.resolve()), "--out", str(tables)]
+    lines = list(_run_command(["real-concealed", *settings.options, *judging]))
     scored = read_tables(tables)
-    yield from (f"wrote {path}" for path in write_score(settings.seed, scored, results))
-    for each in real_measures(scored):
-        yield each.line
-    if commit is not None and not (work / FINISHED_MARK).is_file():
-        _log_score(settings, commit, scored, tables)
+    lines += [f"wrote {path}" for path in write_score(settings.seed, scored, results)]
+    measures = real_measures(scored)
+    return Score(
+        [*lines, *(each.line for each in measures)], scored.number, {TIER: [asdict(each.measure) for each in measures]}
+    )
 
 
-def _question(settings: RealSet, found: Sequence[str], work: Path, tables: Path, jobs: int) -> list[str]:
-    """Arguments of the command that judges the cases."""
-    only = [word for name in found for word in ("--only", name)]
-    drawn = ["--seed", str(settings.seed), "--cases", str(settings.cases), "--jobs", str(jobs)]
-    folders = ["--recordings", str(work / "recordings"), "--results", str(LOOKS_FOLDER), "--out", str(tables)]
-    return ["real-concealed", *only, *drawn, *folders]
+REAL = SealedTier("real", RealSet.plans, _make, _question, _judge)
 
 
 def _run_command(arguments: Sequence[str]) -> Iterator[str]:
     """The lines that a command of armlab prints, as they come; InputError with its last error where it fails."""
-    command = [sys.executable, "-m", "armlab.cli.main", *arguments]
-    one_thread = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
     with (
         TemporaryFile("w+", encoding="utf-8") as errors,
         subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=errors, text=True, env=one_thread, cwd=REPOSITORY
+            command_of(arguments),
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            env=one_thread_environment(),
+            cwd=SOURCE_ROOT,
         ) as running,
     ):
         try:
@@ -86,11 +142,3 @@ def _run_command(arguments: Sequence[str]) -> Iterator[str]:
                 raise InputError(f"armlab {arguments[0]}: {complaint[-1]}")
         finally:
             running.kill()
-
-
-def _log_score(settings: RealSet, commit: str, scored: RealTables, tables: Path) -> None:
-    """Adds a judged score to the log, with the SHA-256 of the table of its cases."""
-    manifest = hashlib.sha256((tables / CASES_TABLE).read_bytes()).hexdigest()
-    measures = [asdict(each.measure) for each in real_measures(scored)]
-    about = {"seed": settings.seed, "cases": scored.number, "manifest": manifest}
-    append_to_log(JUDGED_LOG, commit, "real", {**about, "tiers": {"real": measures}})

@@ -22,7 +22,7 @@ from armlab.concealed.score.measures import (
 from armlab.concealed.score.outcomes import list_misses
 from armlab.concealed.score.page import CAPTIONS, format_measure, render_page
 from armlab.concealed.score.rows import ScoreRows, make_rows, read_table
-from armlab.concealed.sets import read_checked_manifest
+from armlab.concealed.sealed import read_checked_manifest
 
 SCORE_FILE, PAGE_FILE, MISSES_FILE = "score.json", "score.md", "misses.csv"
 ROW_TABLES = ("cases", "effects", "claims", "parameters")

@@ -10,7 +10,7 @@ from armlab.common.errors import InputError
 from armlab.concealed.formats import SetManifest
 from armlab.concealed.plan import DEVELOPMENT_SEEDS
 from armlab.concealed.score.cases import RIGHT_CATEGORIES, UNKNOWN_NAME, JudgedCase, categorize_finding, read_cases
-from armlab.concealed.sets import read_checked_manifest
+from armlab.concealed.sealed import read_checked_manifest
 
 NAMES_FILE = "names.json"  # beside a verdict
 

@@ -1,10 +1,10 @@
-"""The proof: make the cases, seal the answers, diagnose each in a process of its own, and score."""
+"""The motion tier: recordings without torque of small arms with position servos."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_judged_set
+from armlab.concealed.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
 from armlab.concealed.servo.make import make_case, write_case
 from armlab.concealed.servo.plan import ServoCase, draw_cases
 from armlab.concealed.servo.score import score_motion
@@ -18,14 +18,9 @@ class MotionSet:
     nulls: int
     seed: int
 
-
-def prove_motion(settings: MotionSet, work: Path, results: Path, jobs: int) -> Iterator[str]:
-    """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
-    plans = list(draw_cases(settings.seed, settings.cases, settings.nulls))
-    yield from SetMaker(_make, _question, "diagnosed").prove(settings, plans, work, jobs)
-    score = score_motion(work, [plan.name for plan in plans], results)
-    yield from score.lines
-    log_judged_set("motion", settings.seed, len(plans), work, [share for share, _ in score.measures])
+    def plans(self) -> Iterator[ServoCase]:
+        """The plans of all cases."""
+        return draw_cases(self.seed, self.cases, self.nulls)
 
 
 def _make(case: ServoCase, draft: Path) -> None:
@@ -34,3 +29,12 @@ def _make(case: ServoCase, draft: Path) -> None:
 
 def _question(_: ServoCase, observation: Path) -> list[str]:
     return ["diagnose", str(observation)]
+
+
+def _judge(settings: MotionSet, work: Path, results: Path) -> Score:
+    names = [plan.name for plan in settings.plans()]
+    score = score_motion(work, names, results)
+    return Score(list(score.lines), len(names), {"motion": [share.entry for share, _ in score.measures]})
+
+
+MOTION = SealedTier("motion", MotionSet.plans, _make, _question, _judge)

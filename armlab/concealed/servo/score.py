@@ -21,12 +21,13 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.common.settings import read_json
-from armlab.concealed.folders import SETTINGS_FILE
+from armlab.concealed.formats import Manifest
 from armlab.concealed.score.cases import UNKNOWN_NAME, read_complaint
 from armlab.concealed.score.measures import NAMES_WANTED, Measure, share_measure
+from armlab.concealed.score.share import Share
 from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
 from armlab.concealed.score.weighed import WeighedFinding, check_development, read_names
-from armlab.concealed.sealed_set import Share
+from armlab.concealed.sealed import VERDICTS, read_checked_manifest
 
 MOTION_FILE = "motion.json"
 MAX_CLASS = 4  # names
@@ -312,15 +313,16 @@ def _compare(
 def read_weighed_motion(work: Path) -> tuple[str, list[WeighedFinding]]:
     """What a development set is, and the names that were weighed for the findings in it.
 
-    Raises InputError for a folder that holds no verdicts, and for a set that judges: nothing is learnt from it.
+    Raises InputError for a folder that holds no verdicts, for a set that was changed since it was sealed, and for one
+    that judges: nothing is learnt from it.
     """
-    settings = read_json(work / SETTINGS_FILE)
-    check_development(settings["seed"], work)
-    cases = sorted(path.stem for path in (work / "truth").glob("*.json") if (work / "verdicts" / path.stem).is_dir())
+    manifest, _ = read_checked_manifest(work, Manifest)
+    check_development(manifest.seed, work)
+    cases = [name for name in manifest.cases if (work / VERDICTS / name).is_dir()]
     if not cases:
         raise InputError(f"{work} holds no verdicts: `armlab prove-motion --seed SEED --work {work}` makes them")
-    about = f"motion, seed {settings['seed']}: {len(cases)} cases"
-    return about, [each for case in cases for each in _weighed_findings(work, case, settings["seed"])]
+    about = f"motion, seed {manifest.seed}: {len(cases)} cases"
+    return about, [each for case in cases for each in _weighed_findings(work, case, manifest.seed)]
 
 
 def _weighed_findings(work: Path, case: str, seed: int) -> Iterator[WeighedFinding]:

@@ -1,4 +1,4 @@
-"""The proof: make the cases, seal the answers, diagnose each in a process of its own, and score."""
+"""The setup tier: recordings with mistakes of reading, and with none."""
 
 import json
 import shutil
@@ -9,7 +9,7 @@ from typing import Any
 
 from armlab.common.errors import DataError, InputError
 from armlab.concealed.case_files import write_observation
-from armlab.concealed.sealed_set import OBSERVATION, TRUTH_FILE, SetMaker, log_judged_set
+from armlab.concealed.sealed import OBSERVATION, TRUTH_FILE, Score, SealedTier
 from armlab.concealed.setup.mistakes import Injected, inject
 from armlab.concealed.setup.oracle import can_be_seen
 from armlab.concealed.setup.plan import SetupCase, draw_cases, draw_mistakes
@@ -29,14 +29,9 @@ class SetupSet:
     nulls: int
     seed: int
 
-
-def prove_setup(settings: SetupSet, work: Path, results: Path, jobs: int) -> Iterator[str]:
-    """Makes, seals, diagnoses and scores; yields the lines that report it. InputError for a folder of another set."""
-    cases = list(draw_cases(settings.seed, settings.simulated, settings.real, settings.nulls))
-    yield from SetMaker(_make, _question, "diagnosed").prove(settings, cases, work, jobs)
-    score = score_setup(work, [case.name for case in cases], results)
-    yield from score.lines
-    log_judged_set("setup", settings.seed, len(cases), work, score.shares)
+    def plans(self) -> Iterator[SetupCase]:
+        """The plans of all cases."""
+        return draw_cases(self.seed, self.simulated, self.real, self.nulls)
 
 
 def _make(case: SetupCase, draft: Path) -> None:
@@ -67,6 +62,15 @@ def _make(case: SetupCase, draft: Path) -> None:
 def _question(case: SetupCase, observation: Path) -> list[str]:
     """A diagnosis; where no physics is hidden that would judge it, of the reading alone."""
     return ["diagnose", str(observation), *([] if case.has_physics else ["--only-setup"])]
+
+
+def _judge(settings: SetupSet, work: Path, results: Path) -> Score:
+    names = [plan.name for plan in settings.plans()]
+    score = score_setup(work, names, results)
+    return Score(list(score.lines), len(names), {"setup": [each.entry for each in score.shares]})
+
+
+SETUP = SealedTier("setup", SetupSet.plans, _make, _question, _judge)
 
 
 def _is_seen_alone(right: Path, draft: Path, mistakes: tuple[Injected, ...], place: int) -> bool:

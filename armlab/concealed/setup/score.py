@@ -20,8 +20,8 @@ from armlab.common.files import write_texts
 from armlab.common.markdown import markdown_page, markdown_table
 from armlab.concealed.score.cases import read_complaint
 from armlab.concealed.score.measures import NAMES_WANTED, Measure, share_measure
+from armlab.concealed.score.share import Share
 from armlab.concealed.score.stated import HEADING, StatedClaim, stated_lines, stated_measures, stated_table
-from armlab.concealed.sealed_set import Share
 from armlab.concealed.setup.lapse import likeliest_odds_ratio
 from armlab.concealed.setup.plan import SetupCase
 

@@ -5,29 +5,31 @@ outcomes are stored, so that an interrupted command continues.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from joblib import Parallel, delayed
+from pydantic import TypeAdapter
 
 from armlab.common.errors import InputError
 from armlab.common.files import write_texts
-from armlab.common.settings import suggest_name
+from armlab.common.settings import read_json, suggest_name
 from armlab.diagnosis.real_concealed.claims import DrawnVerdict, judge_drawn
-from armlab.diagnosis.real_concealed.conceal import Reference, identify_reference
+from armlab.diagnosis.real_concealed.conceal import Reference, SoughtEffect, identify_reference
 from armlab.diagnosis.real_concealed.draw import DrawnCase, draw_cases
 from armlab.diagnosis.real_concealed.examine import (
+    OUTCOME_ADAPTER,
     Outcome,
-    OutcomeStore,
     ReportedFinding,
-    examine_stored,
+    diagnose_concealed,
     open_outcomes,
     sought_in_case,
 )
 from armlab.diagnosis.real_concealed.labels import LabelledFinding, label_weighed
+from armlab.diagnosis.real_concealed.observation import read_observation, write_observation
 from armlab.diagnosis.real_concealed.plan import Case
 from armlab.diagnosis.real_concealed.report import OUTCOMES_FOLDER, finding_in_words, list_findings
 from armlab.identification.real.looks import LOOKS_FILE, Looks
@@ -83,6 +85,24 @@ class RandomStudy:
     labelled: tuple[tuple[LabelledFinding, ...], ...]
 
 
+@dataclass(frozen=True)
+class RandomTruth:
+    """The answer to a random case. number: from 1 among those of its recording, 0 for the control.
+
+    joints: of the arm. reference: how its model was chosen. sought: what should be named.
+    """
+
+    case: Case
+    number: int
+    joints: int
+    reference: str
+    strength: float
+    sought: tuple[SoughtEffect, ...]
+
+
+OBSERVATIONS, TRUTH, VERDICTS, OUTCOME_FILE = "observations", "truth", "verdicts", "outcome.json"
+
+
 def conceal_at_random(
     settings: RandomCases,
     recordings: Path,
@@ -91,50 +111,110 @@ def conceal_at_random(
     jobs: int,
     progress: Callable[[str], None] = lambda message: None,
 ) -> Iterator[str]:
-    """Lines that tell what is done and written.
+    """Makes, diagnoses and judges random cases; lines that tell what is done and written.
 
     recordings: folder of the recordings, which are fetched into it. results: folder of the log of looks. out: folder of
     the tables. What was diagnosed before an interruption is not diagnosed again.
     """
-    drawn = dict[str, tuple[DrawnCase, ...]]()
-    references = dict[str, Reference]()
+    code = open_outcomes(recordings).code
+    folder = recordings / OUTCOMES_FOLDER / f"random-{settings.seed}-{settings.cases}-{code[:20]}"
+    wanted = {name: [f"{name}-{number}" for number in range(settings.cases + 1)] for name in settings.recordings}
+    new = [name for name, keys in wanted.items() if not all(_truth_file(folder, key).is_file() for key in keys)]
+    yield from make_cases(replace(settings, recordings=tuple(new)), recordings, results, folder, progress)
+    keys = [key for each in wanted.values() for key in each]
+    waiting = [key for key in keys if not (folder / VERDICTS / key / OUTCOME_FILE).is_file()]
+    tasks = (delayed(_examine)(folder / OBSERVATIONS / key, folder / VERDICTS / key) for key in waiting)
+    for number, key in enumerate(Parallel(n_jobs=jobs, return_as="generator_unordered")(tasks), 1):
+        yield f"  diagnosed {number} of {len(waiting)}: {key}"
+    yield from judge_cases(settings, folder, out)
+
+
+def make_cases(
+    settings: RandomCases, recordings: Path, results: Path, folder: Path, progress: Callable[[str], None]
+) -> Iterator[str]:
+    """Writes observations and answers into a folder, the control of each recording first, and diagnoses nothing.
+
+    Each look at the validation runs that their diagnosis will take is logged.
+    """
+    looks = Looks(results / LOOKS_FILE)
     for name in settings.recordings:
         progress(f"{name}: the reference model")
-        references[name] = identify_reference(open_public_recording(name, recordings), recipe_named(name))
-        drawn[name] = draw_cases(references[name], settings.seed, settings.cases)
-        yield f"{name}: reference {references[name].description}"
-    tasks = [(references[name], case) for name in drawn for case in (Case(name), *(each.case for each in drawn[name]))]
-    stored, looks = open_outcomes(recordings / OUTCOMES_FOLDER), Looks(results / LOOKS_FILE)
-    outcomes = dict[Case, Outcome]()
-    examined = Parallel(n_jobs=jobs, return_as="generator_unordered")(
-        delayed(_examine)(*task, stored, looks) for task in tasks
-    )
-    for number, (case, outcome) in enumerate(examined, 1):
-        outcomes[case] = outcome
-        yield f"  diagnosed {number} of {len(tasks)}: {case.recording}, {case.name}"
+        reference = identify_reference(open_public_recording(name, recordings), recipe_named(name))
+        yield f"{name}: reference {reference.description}"
+        drawn = (DrawnCase(Case(name), 0.0), *draw_cases(reference, settings.seed, settings.cases))
+        for number, each in enumerate(drawn):
+            write_random_case(reference, number, each, folder)
+            for run in reference.recording.with_role("validate"):
+                looks.note(reference.recording.arm.name, run.name, f"concealed: {each.case.name}")
+
+
+def write_random_case(reference: Reference, number: int, drawn: DrawnCase, folder: Path) -> None:
+    """Writes the observation and the answer of a case, the answer last."""
+    key = f"{drawn.case.recording}-{number}"
+    for part in (OBSERVATIONS, TRUTH):
+        (folder / part).mkdir(parents=True, exist_ok=True)
+    write_observation(reference, drawn.case, folder / OBSERVATIONS / key)
+    sought = () if drawn.case.control else sought_in_case(reference, drawn.case)
+    joints = len(reference.recording.arm)
+    truth = RandomTruth(drawn.case, number, joints, reference.description, drawn.strength, sought)
+    _truth_file(folder, key).write_text(json.dumps(asdict(truth), indent=1) + "\n", encoding="utf-8")
+
+
+def _truth_file(folder: Path, key: str) -> Path:
+    return folder / TRUTH / f"{key}.json"
+
+
+def examine_observation(
+    observation: Path, out: Path, progress: Callable[[str], None] = lambda message: None
+) -> Iterator[str]:
+    """Diagnoses the recording of an observation, and writes what is said into a folder."""
+    _, outcome = diagnose_concealed(*read_observation(observation), progress)
+    text = OUTCOME_ADAPTER.dump_json(outcome, indent=1).decode() + "\n"
+    yield from (f"wrote {path}" for path in write_texts({OUTCOME_FILE: text}, out))
+
+
+def _examine(observation: Path, out: Path) -> str:
+    for _ in examine_observation(observation, out):
+        pass
+    return observation.name
+
+
+def judge_cases(settings: RandomCases, folder: Path, out: Path) -> Iterator[str]:
+    """Judges the cases of a folder by their answers, and writes the tables.
+
+    A case without an outcome counts as refused. InputError where a recording has no case there.
+    """
+    read = TypeAdapter(RandomTruth).validate_python
+    answers = {path.stem: read(read_json(path)) for path in sorted((folder / TRUTH).glob("*.json"))}
     studies = list[RandomStudy]()
-    for name, reference in references.items():
-        control = outcomes[Case(name)]
+    for name in settings.recordings:
+        own = sorted((each.number, key) for key, each in answers.items() if each.case.recording == name)
+        if not own:
+            raise InputError(f"{folder} holds no case of {name}: name the recordings that it was made of")
+        judged = [(answers[key], _read_outcome(folder / VERDICTS / key)) for _, key in own]
+        control = judged[0][1]
         if control.refused:
             yield f"{name} is left out: with nothing concealed it is not diagnosed: {control.refused}"
         else:
-            studies.append(_judge(reference, drawn[name], outcomes, control))
+            studies.append(_judge(name, judged[1:], control))
     texts = random_tables(studies) | {WEIGHED_FILE: weighed_text(settings, studies)}
     yield from (f"wrote {path}" for path in write_texts(texts, out))
 
 
-def _examine(reference: Reference, case: Case, stored: OutcomeStore, looks: Looks) -> tuple[Case, Outcome]:
-    return case, examine_stored(reference, case, stored, looks, lambda message: None)
+def _read_outcome(folder: Path) -> Outcome:
+    try:
+        return OUTCOME_ADAPTER.validate_json((folder / OUTCOME_FILE).read_bytes())
+    except FileNotFoundError:
+        return Outcome(folder.name, (), (), (), (), (), None, 0.0, "no verdict")
 
 
-def _judge(
-    reference: Reference, drawn: Sequence[DrawnCase], outcomes: Mapping[Case, Outcome], control: Outcome
-) -> RandomStudy:
-    name, joints = reference.recording.name, len(reference.recording.arm)
-    cases = [(each, outcomes[each.case], sought_in_case(reference, each.case)) for each in drawn]
-    verdicts = (judge_drawn(*each, control, joints) for each in cases)
-    labelled = (tuple(label_weighed(outcome, wanted, control, joints)) for _, outcome, wanted in cases)
-    return RandomStudy(name, reference.description, control, tuple(verdicts), tuple(labelled))
+def _judge(name: str, judged: Sequence[tuple[RandomTruth, Outcome]], control: Outcome) -> RandomStudy:
+    verdicts = tuple(
+        judge_drawn(DrawnCase(truth.case, truth.strength), outcome, truth.sought, control, truth.joints)
+        for truth, outcome in judged
+    )
+    labelled = tuple(tuple(label_weighed(outcome, truth.sought, control, truth.joints)) for truth, outcome in judged)
+    return RandomStudy(name, judged[0][0].reference, control, verdicts, labelled)
 
 
 def random_tables(studies: Sequence[RandomStudy]) -> dict[str, str]:

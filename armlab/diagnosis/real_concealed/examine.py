@@ -88,9 +88,10 @@ class Outcome:
 
     given: of the error of the simulation that was handed over. found: of the error with the model found, in which
     no surrogate predicts what is unknown. hidden: of the torque that is concealed. torque: of the filtered torque as
-    measured. recovered: share of the hidden torque that the findings sought explain; None in a control. refused: why
-    nothing was diagnosed, empty where something was; there are no errors then. weighed: the names of each finding, and
-    of what was not probable enough for one.
+    measured. recovered: share of the hidden torque that the findings sought explain; None in a control. All of these
+    are empty where nothing was diagnosed, and in random cases, which are judged by their findings alone. refused: why
+    nothing was diagnosed, empty where something was. weighed: the names of each finding, and of what was not probable
+    enough for one.
     """
 
     case: str
@@ -159,21 +160,42 @@ def examine_stored(
 
 def examine_case(reference: Reference, case: Case, path: Path, progress: Callable[[str], None]) -> Outcome:
     """The outcome of a case. path: where the simulation that is handed over is written."""
-    recording, handed = reference.recording, withhold_pieces(reference.model, case.withheld)
-    write_model(handed, path)
-    added: dict[str, TimedTorque] | None = None
+    seen, added = conceal_case(reference, case, path)
+    diagnosis, outcome = diagnose_concealed(seen, case.recording, progress)
+    outcome = replace(outcome, case=case.name)
+    if outcome.refused:
+        return outcome
+    assert diagnosis.observed is not None
+    handed = withhold_pieces(reference.model, case.withheld)
+    hidden = _concealed_torque(diagnosis.observed, reference.model, handed, added)
+    return _measure_outcome(outcome, diagnosis, hidden, sought_in_case(reference, case))
+
+
+def conceal_case(reference: Reference, case: Case, path: Path) -> tuple[Recording, dict[str, TimedTorque] | None]:
+    """The recording that a diagnosis gets, and the torque that was added to each run by its name.
+
+    path: where the simulation that is handed over is written. The torque is None where parts of it are withheld.
+    """
+    recording, added = reference.recording, None
+    write_model(withhold_pieces(reference.model, case.withheld), path)
     runs = recording.runs
     if case.injected is not None:
         pairs = [add_disturbance(run, recording.arm, case.injected) for run in runs]
         runs, added = tuple(run for run, _ in pairs), {run.name: (run.time, torque) for run, torque in pairs}
-    seen, settings = replace(recording, runs=runs, simulation=path), Settings(left_out=case.recording)
-    diagnosis = diagnose(seen, "nominal", settings=settings, progress=progress)
+    return replace(recording, runs=runs, simulation=path), added
+
+
+def diagnose_concealed(seen: Recording, source: str, progress: Callable[[str], None]) -> tuple[Diagnosis, Outcome]:
+    """The diagnosis of a recording with something concealed, and what it says; nothing is measured yet.
+
+    source: name of the public recording, about which the weights of names know nothing.
+    """
+    diagnosis = diagnose(seen, "nominal", settings=Settings(left_out=source), progress=progress)
     findings = tuple(summarise_mistake(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     findings += tuple(summarise_claim(each) for each in diagnosis.claims)
-    if diagnosis.observed is None or diagnosis.final is None:
-        return Outcome(case.name, findings, (), (), (), (), None, diagnosis.seconds, diagnosis.summary)
-    hidden = _concealed_torque(diagnosis.observed, reference.model, handed, added)
-    return _measure_outcome(case, diagnosis, findings, hidden, sought_in_case(reference, case))
+    refused = diagnosis.observed is None or diagnosis.final is None
+    said = (diagnosis.summary, ()) if refused else ("", diagnosis.weighed)
+    return diagnosis, Outcome(seen.name, findings, (), (), (), (), None, diagnosis.seconds, *said)
 
 
 def sought_in_case(reference: Reference, case: Case) -> tuple[SoughtEffect, ...]:
@@ -204,12 +226,9 @@ def _read_at(time: Array, torque: Array, wanted: Array) -> Array:
 
 
 def _measure_outcome(
-    case: Case,
-    diagnosis: Diagnosis,
-    findings: tuple[ReportedFinding, ...],
-    hidden: Array,
-    wanted: tuple[SoughtEffect, ...],
+    outcome: Outcome, diagnosis: Diagnosis, hidden: Array, wanted: tuple[SoughtEffect, ...]
 ) -> Outcome:
+    """The outcome with its errors. hidden: torque of what is concealed at the kept rows, (rows, joints)."""
     assert diagnosis.observed is not None
     assert diagnosis.nominal is not None
     assert diagnosis.final is not None
@@ -217,16 +236,13 @@ def _measure_outcome(
     predictions = [each.prediction for each in diagnosis.claims if is_sought_kind(each, wanted)]
     left = hidden[rows] - sum((each[rows] for each in predictions), np.zeros(1))
     power = float(np.sum(hidden[rows] ** 2))
-    return Outcome(
-        case=case.name,
-        findings=findings,
+    return replace(
+        outcome,
         given=_rms(diagnosis.nominal[rows]),
         found=_rms(diagnosis.final[rows]),
         hidden=_rms(hidden[rows]),
         torque=_rms(diagnosis.observed.torque[rows]),
         recovered=1 - float(np.sum(left**2)) / power if power > 0 else None,
-        seconds=diagnosis.seconds,
-        weighed=diagnosis.weighed,
     )
 
 
