@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from armlab.common.arrays import Array
 
-RATES_HZ = (50, 60, 80, 100, 125, 160, 200, 250, 300, 400, 500)
+RATES_HZ = (50, 100, 100, 125, 200, 200, 250, 250, 400, 500, 500, 500)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +50,8 @@ class DriveLog:
 
 def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
     """Drives of hobby servos, of laboratories, and of industry."""
-    bits = float(rng.uniform(12, 20))
-    noise = np.exp(rng.uniform(np.log(0.003), np.log(0.08)) + rng.normal(0, 0.4, joints))
+    bits = float(rng.uniform(12, 14) if rng.random() < 0.15 else rng.uniform(15, 20))
+    noise = np.exp(rng.uniform(np.log(0.01), np.log(0.25)) + rng.normal(0, 0.4, joints))
     coarse = rng.random() < 0.7
     step = np.exp(rng.uniform(np.log(3e-4), np.log(0.05)) + rng.normal(0, 0.5, joints))
     stumbles = rng.random(4) < 0.35
@@ -67,7 +67,7 @@ def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
         held=float(rng.uniform(0, 0.03)) if stumbles[1] else 0.0,
         dropped=float(rng.uniform(0, 0.02)) if stumbles[2] else 0.0,
         doubled=float(rng.uniform(0, 0.01)) if stumbles[3] else 0.0,
-        slow_torque=int(rng.integers(2, 5)) if rng.random() < 0.15 else 1,
+        slow_torque=int(rng.integers(2, 5)) if rng.random() < 0.08 else 1,
         as_current=bool(rng.random() < 0.3),
         velocity=bool(rng.random() < 0.4),
         suffix=str(rng.choice([".csv", ".parquet"])),

@@ -42,16 +42,16 @@ class Style:
 
 def draw_style(rng: np.random.Generator, joints: int) -> Style:
     """A style of motion, slow as often as fast."""
-    rests = tuple(float(each) for each in rng.uniform(0, 0.12, 2) * (rng.random(2) < 0.5))
+    rests = tuple(float(each) for each in rng.uniform(0, 0.08, 2) * (rng.random(2) < 0.4))
     return Style(
-        vigour=float(np.exp(rng.uniform(np.log(0.08), 0.0))),
-        used_range=float(rng.uniform(0.15, 0.75)),
+        vigour=float(np.exp(rng.uniform(np.log(0.12), 0.0))),
+        used_range=float(rng.uniform(0.3, 0.8)),
         servo_s=np.exp(rng.uniform(np.log(0.01), np.log(0.05), joints)),
-        stuck=np.exp(rng.uniform(np.log(1e-5), np.log(3e-3), joints)),
-        shake=np.exp(rng.uniform(np.log(1e-6), np.log(1e-4), joints)),
+        stuck=np.exp(rng.uniform(np.log(1e-5), np.log(1e-3), joints)),
+        shake=np.exp(rng.uniform(np.log(3e-6), np.log(3e-4), joints)),
         shake_hz=rng.uniform(4, 25, joints),
         rest_share=(rests[0], rests[1]),
-        few=bool(joints > 1 and rng.random() < 0.35),
+        few=bool(joints > 1 and rng.random() < 0.2),
     )
 
 
@@ -71,7 +71,7 @@ def trapezes(rng: np.random.Generator, time: Array, joints: int) -> Array:
     for joint in range(joints):
         places = rng.uniform(-1, 1, int(rng.integers(2, 4)))
         knots, values, at = [time[0] - 1.0], [places[0]], 0
-        pause, speed = float(rng.uniform(0.0, 1.0)), float(np.exp(rng.uniform(np.log(0.3), np.log(1.5))))
+        pause, speed = float(rng.uniform(0.0, 0.5)), float(np.exp(rng.uniform(np.log(0.3), np.log(1.5))))
         while knots[-1] < time[-1] + 1:
             at = (at + 1) % len(places)
             knots += [knots[-1] + 0.3 + abs(places[at] - values[-1]) / speed]
@@ -89,7 +89,7 @@ def by_hand(rng: np.random.Generator, time: Array, joints: int) -> Array:
     for joint in range(joints):
         knots, values = [time[0] - 2.0], [float(rng.normal())]
         while knots[-1] < time[-1] + 2:
-            moves = rng.random() < 0.75
+            moves = rng.random() < 0.85
             knots += [knots[-1] + float(np.exp(rng.normal(np.log(0.7), 0.6)))]
             values += [values[-1] * 0.8 + float(rng.normal(0, 0.8)) if moves else values[-1]]
         out[:, joint] = np.interp(time, knots, values)

@@ -18,7 +18,7 @@ from problem.arm import Arm
 
 FieldKind = Literal["null", "hidden", "mistake", "pair null", "pair changed"]
 FIELD_KINDS: tuple[FieldKind, ...] = get_args(FieldKind)
-LARGE_SHARE = 0.45  # of the cases: more than three joints, or more than LARGE_LENGTH_S
+LARGE_SHARE = 0.48  # of the cases: more than three joints, or more than LARGE_LENGTH_S
 LARGE_LENGTH_S = 20.0
 MIN_SAMPLES = 150  # of a run: who records slowly records longer
 
@@ -44,7 +44,7 @@ class FieldSettings:
     twist: tuple[float, float] = (5e-4, 5e-3)
     gap: tuple[float, float] = (2e-4, 3e-3)
     length_s: tuple[float, float] = (4.0, 20.0)
-    large_length_s: tuple[float, float] = (4.0, 60.0)
+    large_length_s: tuple[float, float] = (6.0, 60.0)
 
 
 FIELD = FieldSettings()
@@ -169,7 +169,7 @@ def _draw_runs(rng: np.random.Generator, large: bool, rate_hz: int) -> tuple[Run
     low, high = FIELD.large_length_s if large else FIELD.length_s
     number = int(rng.integers(2, 4))
     low = max(low, number * MIN_SAMPLES / 0.5 / rate_hz)
-    total = float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    total = float(rng.uniform(low, high))
     shares = rng.uniform(0.6, 1.4, number)
     lengths = total * shares / shares.sum()
     families = [str(rng.choice(list(FIELD_FAMILIES))) for _ in range(number)]

@@ -34,7 +34,7 @@ RestLaw = Callable[[RestRun, np.random.Generator], Array]
 
 def uneven_friction(run: RestRun, rng: np.random.Generator) -> Array:
     """Friction that is higher at some places of the path: a smooth random function of position times direction."""
-    return run.state * _random_curve(run, rng, 2, 12)
+    return run.state * _random_curve(run, rng, 3, 30)
 
 
 def harmonic_ripple(run: RestRun, rng: np.random.Generator) -> Array:
@@ -70,7 +70,7 @@ def rough_contact(run: RestRun, rng: np.random.Generator) -> Array:
     """Contact that is never twice the same: friction that wanders along the way that was travelled."""
     travelled = np.cumsum(np.abs(np.diff(run.track.position[:, run.joint], prepend=run.track.position[0, run.joint])))
     travelled /= run.half_turn
-    length = float(np.exp(rng.uniform(np.log(0.01), np.log(0.3))))
+    length = float(np.exp(rng.uniform(np.log(0.005), np.log(0.1))))
     marks = np.arange(int(travelled[-1] / length) + 8)
     rough = gaussian_filter1d(run.stream.standard_normal(len(marks)), 1.0)
     return np.asarray(run.state * np.interp(travelled / length, marks, rough))
@@ -78,7 +78,7 @@ def rough_contact(run: RestRun, rng: np.random.Generator) -> Array:
 
 def wandering_drive(run: RestRun, rng: np.random.Generator) -> Array:
     """Torque of a drive whose magnets, oil and current sensors wander: noise of first order, more while it turns."""
-    memory_s = float(np.exp(rng.uniform(np.log(0.05), np.log(3.0))))
+    memory_s = float(np.exp(rng.uniform(np.log(0.01), np.log(1.0))))
     kept = float(np.exp(-run.track.step_s / memory_s))
     driven = run.stream.standard_normal(len(run.track.time)) * np.sqrt(1 - kept**2)
     wander = lfilter([1.0], [1.0, -kept], driven)
@@ -107,6 +107,9 @@ KINDS: dict[str, RestLaw] = {
 NAMES = {"cable drag": "cable_stiffness", "base compliance": "flexible_base", "harmonic ripple": "torque_ripple"}
 
 
+STILL_SHARE = 1e-6  # of a column's size, that its spread exceeds where the joint moves
+
+
 @dataclass(frozen=True)
 class JointRest:
     """The rest of one joint: how much of each kind, and the share of the torque's spread that all make together.
@@ -126,7 +129,9 @@ class JointRest:
 
     def factors(self, columns: Array, torque: Array) -> Array:
         """What the columns of all runs are multiplied by, (kinds,), so that they make the share of a torque."""
-        weighted = np.array(list(self.weights.values())) / np.maximum(np.std(columns, axis=0), 1e-12)
+        spread = np.std(columns, axis=0)
+        moves = spread > STILL_SHARE * np.abs(columns).max(axis=0)  # a joint that is held has a constant, which is none
+        weighted = np.where(moves, list(self.weights.values()), 0.0) / np.where(moves, spread, 1.0)
         size = max(float(np.std(columns @ weighted)), 1e-12)
         return np.asarray(weighted * self.share * float(np.std(torque)) / size)
 
