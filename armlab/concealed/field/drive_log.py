@@ -50,11 +50,11 @@ class DriveLog:
 
 def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
     """Drives of hobby servos, of laboratories, and of industry."""
-    bits = float(rng.uniform(12, 14) if rng.random() < 0.15 else rng.uniform(15, 20))
+    bits = float(rng.uniform(12, 14) if rng.random() < 0.15 else rng.uniform(16, 20))
     noise = np.exp(rng.uniform(np.log(0.01), np.log(0.25)) + rng.normal(0, 0.4, joints))
-    coarse = rng.random() < 0.7
-    step = np.exp(rng.uniform(np.log(3e-4), np.log(0.05)) + rng.normal(0, 0.5, joints))
-    stumbles = rng.random(4) < 0.35
+    coarse = rng.random() < 0.5
+    step = np.exp(rng.uniform(np.log(3e-4), np.log(0.02)) + rng.normal(0, 0.5, joints))
+    stumbles = rng.random(4) < 0.3
     return DriveLog(
         rate_hz=int(rng.choice(RATES_HZ)),
         encoder_bits=np.clip(np.rint(bits + rng.normal(0, 0.7, joints)), 12, 20),
@@ -64,7 +64,7 @@ def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
         with_speed=float(rng.uniform(0, 1.5)),
         torque_step=step if coarse else np.zeros(joints),
         jitter=float(np.exp(rng.uniform(np.log(1e-3), np.log(0.1)))) if stumbles[0] else 0.0,
-        held=float(rng.uniform(0, 0.03)) if stumbles[1] else 0.0,
+        held=float(rng.uniform(0, 0.02)) if stumbles[1] else 0.0,
         dropped=float(rng.uniform(0, 0.02)) if stumbles[2] else 0.0,
         doubled=float(rng.uniform(0, 0.01)) if stumbles[3] else 0.0,
         slow_torque=int(rng.integers(2, 5)) if rng.random() < 0.08 else 1,

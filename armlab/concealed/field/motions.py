@@ -44,8 +44,8 @@ def draw_style(rng: np.random.Generator, joints: int) -> Style:
     """A style of motion, slow as often as fast."""
     rests = tuple(float(each) for each in rng.uniform(0, 0.08, 2) * (rng.random(2) < 0.4))
     return Style(
-        vigour=float(np.exp(rng.uniform(np.log(0.12), 0.0))),
-        used_range=float(rng.uniform(0.3, 0.8)),
+        vigour=float(np.exp(rng.uniform(np.log(0.15), 0.0))),
+        used_range=float(rng.uniform(0.4, 0.9)),
         servo_s=np.exp(rng.uniform(np.log(0.01), np.log(0.05), joints)),
         stuck=np.exp(rng.uniform(np.log(1e-5), np.log(1e-3), joints)),
         shake=np.exp(rng.uniform(np.log(3e-6), np.log(3e-4), joints)),

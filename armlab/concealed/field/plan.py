@@ -44,7 +44,7 @@ class FieldSettings:
     twist: tuple[float, float] = (5e-4, 5e-3)
     gap: tuple[float, float] = (2e-4, 3e-3)
     length_s: tuple[float, float] = (4.0, 20.0)
-    large_length_s: tuple[float, float] = (6.0, 60.0)
+    large_length_s: tuple[float, float] = (15.0, 60.0)
 
 
 FIELD = FieldSettings()
@@ -169,7 +169,7 @@ def _draw_runs(rng: np.random.Generator, large: bool, rate_hz: int) -> tuple[Run
     low, high = FIELD.large_length_s if large else FIELD.length_s
     number = int(rng.integers(2, 4))
     low = max(low, number * MIN_SAMPLES / 0.5 / rate_hz)
-    total = float(rng.uniform(low, high))
+    total = float(low + (high - low) * np.sqrt(rng.random()))  # long ones more often than short ones
     shares = rng.uniform(0.6, 1.4, number)
     lengths = total * shares / shares.sum()
     families = [str(rng.choice(list(FIELD_FAMILIES))) for _ in range(number)]
