@@ -50,8 +50,8 @@ class DriveLog:
 
 def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
     """Drives of hobby servos, of laboratories, and of industry."""
-    bits = float(rng.uniform(12, 14) if rng.random() < 0.15 else rng.uniform(16, 20))
-    noise = np.exp(rng.uniform(np.log(0.01), np.log(0.25)) + rng.normal(0, 0.4, joints))
+    bits = float(rng.uniform(12, 14) if rng.random() < 0.1 else rng.uniform(16, 20))
+    noise = np.exp(rng.uniform(np.log(0.005), np.log(0.3)) + rng.normal(0, 0.4, joints))
     coarse = rng.random() < 0.5
     step = np.exp(rng.uniform(np.log(3e-4), np.log(0.02)) + rng.normal(0, 0.5, joints))
     stumbles = rng.random(4) < 0.3
@@ -67,7 +67,7 @@ def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
         held=float(rng.uniform(0, 0.02)) if stumbles[1] else 0.0,
         dropped=float(rng.uniform(0, 0.02)) if stumbles[2] else 0.0,
         doubled=float(rng.uniform(0, 0.01)) if stumbles[3] else 0.0,
-        slow_torque=int(rng.integers(2, 5)) if rng.random() < 0.08 else 1,
+        slow_torque=int(rng.integers(2, 5)) if rng.random() < 0.06 else 1,
         as_current=bool(rng.random() < 0.3),
         velocity=bool(rng.random() < 0.4),
         suffix=str(rng.choice([".csv", ".parquet"])),

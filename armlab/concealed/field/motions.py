@@ -51,7 +51,7 @@ def draw_style(rng: np.random.Generator, joints: int) -> Style:
         shake=np.exp(rng.uniform(np.log(3e-6), np.log(3e-4), joints)),
         shake_hz=rng.uniform(4, 25, joints),
         rest_share=(rests[0], rests[1]),
-        few=bool(joints > 1 and rng.random() < 0.2),
+        few=bool(joints > 1 and rng.random() < 0.15),
     )
 
 

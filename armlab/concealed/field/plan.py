@@ -29,7 +29,7 @@ class FieldSettings:
 
     link_error: relative errors of links. no_links_share: cases whose robot file has no links. offset_share: torque
     offset over the rating. gain_error: largest relative error of the torque of a joint. rest_share: rest over the
-    torque's spread. soft_share, play_share: joints with a soft drive, or with play. twist: of a soft drive at its
+    torque's spread, of the joints of a case; rest_scatter: of its logarithm from joint to joint. soft_share, play_share: joints with a soft drive, or with play. twist: of a soft drive at its
     rating, rad. gap: play, rad. length_s, large_length_s: of all runs together.
     """
 
@@ -37,7 +37,8 @@ class FieldSettings:
     no_links_share: float = 0.4
     offset_share: float = 0.02
     gain_error: float = 0.15
-    rest_share: tuple[float, float] = (0.05, 0.2)
+    rest_share: tuple[float, float] = (0.03, 0.3)
+    rest_scatter: float = 0.35
     presliding_share: float = 0.3
     soft_share: float = 0.15
     play_share: float = 0.15
@@ -119,6 +120,7 @@ def draw_field_plan(seed: int, index: int, kind: FieldKind) -> FieldPlan:
     has_links = rng.random() >= FIELD.no_links_share
     joints = machine.joints
     log = draw_drive_log(rng, joints)
+    share = float(np.exp(rng.uniform(*np.log(FIELD.rest_share))))
     presliding = rng.random() < FIELD.presliding_share
     friction = tuple(
         draw_friction(rng, float(machine.rating[joint]), float(machine.speed[joint]), presliding)
@@ -136,7 +138,7 @@ def draw_field_plan(seed: int, index: int, kind: FieldKind) -> FieldPlan:
         still=_draw_still(rng, joints),
         style=draw_style(rng, joints),
         friction=friction,
-        rest=tuple(draw_rest(rng, FIELD.rest_share) for _ in range(joints)),
+        rest=tuple(draw_rest(rng, share * float(np.exp(rng.normal(0, FIELD.rest_scatter)))) for _ in range(joints)),
         drives=tuple(_draw_drive(rng, float(machine.rating[joint])) for joint in range(joints)),
         log=log,
         side="old" if kind.startswith("pair") else "",

@@ -136,11 +136,11 @@ class JointRest:
         return np.asarray(weighted * self.share * float(np.std(torque)) / size)
 
 
-def draw_rest(rng: np.random.Generator, share: tuple[float, float]) -> JointRest:
+def draw_rest(rng: np.random.Generator, share: float) -> JointRest:
     """Two to four kinds."""
     kinds = [str(each) for each in rng.permutation(list(KINDS))[: int(rng.integers(2, 5))]]
     weights = {kind: float(rng.uniform(0.3, 1.0)) for kind in kinds}
-    return JointRest(weights, float(np.exp(rng.uniform(*np.log(share)))), int(rng.integers(2**31)))
+    return JointRest(weights, share, int(rng.integers(2**31)))
 
 
 def _random_curve(run: RestRun, rng: np.random.Generator, low: float, high: float) -> Array:
