@@ -14,7 +14,8 @@ RATES_HZ = (50, 100, 100, 125, 200, 200, 250, 250, 400, 500, 500, 500)
 class DriveLog:
     """Drawn once a case.
 
-    encoder_bits: (joints,), steps a turn, or the range of a joint that slides, as a power of two. noise: (joints,), of
+    encoder_bits: (joints,), steps a turn, or the range of a joint that slides, as a power of two; encoder_noise: (joints,),
+    of a sample before it is rounded, steps. noise: (joints,), of
     a sample of torque, share of its spread; coloured: share of it of first order, with corner_hz; with_speed: how much
     more at the usual speed. torque_step: (joints,), of the torque, share of its spread; 0 for a number as it is.
     jitter: of the instants, share of a step. held, dropped, doubled: share of the rows. as_current: whether current and
@@ -24,6 +25,7 @@ class DriveLog:
 
     rate_hz: int
     encoder_bits: Array
+    encoder_noise: Array
     noise: Array
     coloured: float
     corner_hz: float
@@ -50,7 +52,7 @@ class DriveLog:
 
 def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
     """Drives of hobby servos, of laboratories, and of industry."""
-    bits = float(rng.uniform(12, 14) if rng.random() < 0.1 else rng.uniform(16, 20))
+    bits = float(rng.uniform(12, 14) if rng.random() < 0.1 else rng.uniform(17, 20))
     noise = np.exp(rng.uniform(np.log(0.005), np.log(0.3)) + rng.normal(0, 0.4, joints))
     coarse = rng.random() < 0.5
     step = np.exp(rng.uniform(np.log(3e-4), np.log(0.02)) + rng.normal(0, 0.5, joints))
@@ -58,6 +60,7 @@ def draw_drive_log(rng: np.random.Generator, joints: int) -> DriveLog:
     return DriveLog(
         rate_hz=int(rng.choice(RATES_HZ)),
         encoder_bits=np.clip(np.rint(bits + rng.normal(0, 0.7, joints)), 12, 20),
+        encoder_noise=rng.uniform(0, 1.5, joints) * (rng.random() < 0.7),
         noise=noise,
         coloured=float(rng.uniform(0.2, 0.9)),
         corner_hz=float(np.exp(rng.uniform(np.log(2), np.log(40)))),

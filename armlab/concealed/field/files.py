@@ -45,7 +45,8 @@ def log_field_run(case: FieldCase, number: int) -> FieldLog:
     torque = _in_steps(clean + noise, log.torque_step * case.spread)
     torque = torque[np.arange(len(torque)) // log.slow_torque * log.slow_torque]
     encoder = 2 * plan.half_turns / 2.0**log.encoder_bits
-    position = _in_steps(sampled.position + case.shift, encoder)
+    dither = encoder * log.encoder_noise * rng.standard_normal(sampled.position.shape)
+    position = _in_steps(sampled.position + case.shift + dither, encoder)
     kept = np.maximum.accumulate(np.where(rng.random(len(even)) < log.held, 0, np.arange(len(even))))
     position, torque = position[kept], torque[kept]
     return FieldLog(run.plan.role, instant, position, sampled.velocity[kept], torque, clean[kept])

@@ -42,7 +42,7 @@ class Style:
 
 def draw_style(rng: np.random.Generator, joints: int) -> Style:
     """A style of motion, slow as often as fast."""
-    rests = tuple(float(each) for each in rng.uniform(0, 0.08, 2) * (rng.random(2) < 0.4))
+    rests = tuple(float(each) for each in rng.uniform(0, 0.1, 2) * (rng.random(2) < 0.5))
     return Style(
         vigour=float(np.exp(rng.uniform(np.log(0.15), 0.0))),
         used_range=float(rng.uniform(0.4, 0.9)),
@@ -71,7 +71,7 @@ def trapezes(rng: np.random.Generator, time: Array, joints: int) -> Array:
     for joint in range(joints):
         places = rng.uniform(-1, 1, int(rng.integers(2, 4)))
         knots, values, at = [time[0] - 1.0], [places[0]], 0
-        pause, speed = float(rng.uniform(0.0, 0.5)), float(np.exp(rng.uniform(np.log(0.3), np.log(1.5))))
+        pause, speed = float(rng.uniform(0.0, 0.8)), float(np.exp(rng.uniform(np.log(0.3), np.log(1.5))))
         while knots[-1] < time[-1] + 1:
             at = (at + 1) % len(places)
             knots += [knots[-1] + 0.3 + abs(places[at] - values[-1]) / speed]

@@ -30,7 +30,8 @@ class FieldSettings:
     link_error: relative errors of links. no_links_share: cases whose robot file has no links. offset_share: torque
     offset over the rating. gain_error: largest relative error of the torque of a joint. rest_share: rest over the
     torque's spread, of the joints of a case; rest_scatter: of its logarithm from joint to joint. soft_share, play_share: joints with a soft drive, or with play. twist: of a soft drive at its
-    rating, rad. gap: play, rad. length_s, large_length_s: of all runs together.
+    rating, rad. gap: play, rad. length_s, large_length_s: of all runs together; long_exponent: of a
+    share of the range, so that long ones are more usual than short ones.
     """
 
     link_error: tuple[float, float] = (0.1, 0.6)
@@ -46,6 +47,7 @@ class FieldSettings:
     gap: tuple[float, float] = (2e-4, 3e-3)
     length_s: tuple[float, float] = (4.0, 20.0)
     large_length_s: tuple[float, float] = (15.0, 60.0)
+    long_exponent: float = 0.5
 
 
 FIELD = FieldSettings()
@@ -171,7 +173,7 @@ def _draw_runs(rng: np.random.Generator, large: bool, rate_hz: int) -> tuple[Run
     low, high = FIELD.large_length_s if large else FIELD.length_s
     number = int(rng.integers(2, 4))
     low = max(low, number * MIN_SAMPLES / 0.5 / rate_hz)
-    total = float(low + (high - low) * np.sqrt(rng.random()))  # long ones more often than short ones
+    total = float(low + (high - low) * rng.random() ** FIELD.long_exponent)  # long ones more often than short ones
     shares = rng.uniform(0.6, 1.4, number)
     lengths = total * shares / shares.sum()
     families = [str(rng.choice(list(FIELD_FAMILIES))) for _ in range(number)]
