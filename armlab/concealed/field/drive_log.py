@@ -14,13 +14,12 @@ RATES_HZ = (50, 100, 100, 125, 200, 200, 250, 250, 400, 500, 500, 500)
 class DriveLog:
     """Drawn once a case.
 
-    encoder_bits: (joints,), steps a turn, or the range of a joint that slides, as a power of two; encoder_noise: (joints,),
-    of a sample before it is rounded, steps. noise: (joints,), of
-    a sample of torque, share of its spread; coloured: share of it of first order, with corner_hz; with_speed: how much
-    more at the usual speed. torque_step: (joints,), of the torque, share of its spread; 0 for a number as it is.
-    jitter: of the instants, share of a step. held, dropped, doubled: share of the rows. as_current: whether current and
-    gains are written. velocity: whether velocity is. suffix: of the files. slow_torque: rows that the torque channel
-    stays the same for.
+    encoder_bits: (joints,), steps a turn, or the range of a joint that slides, as a power of two; encoder_noise:
+    (joints,), of a sample before it is rounded, steps. noise: (joints,), of a sample of torque, share of its spread;
+    coloured: share of it of first order, with corner_hz; with_speed: how much more at the usual speed. torque_step:
+    (joints,), of the torque, share of its spread; 0 for a number as it is. jitter: of the instants, share of a step.
+    held, dropped, doubled: share of the rows. slow_torque: rows that the torque channel stays the same for. as_current:
+    whether current and gains are written. velocity: whether velocity is. suffix: of the files.
     """
 
     rate_hz: int

@@ -29,8 +29,9 @@ class FieldSettings:
 
     link_error: relative errors of links. no_links_share: cases whose robot file has no links. offset_share: torque
     offset over the rating. gain_error: largest relative error of the torque of a joint. rest_share: rest over the
-    torque's spread, of the joints of a case; rest_scatter: of its logarithm from joint to joint. soft_share, play_share: joints with a soft drive, or with play. twist: of a soft drive at its
-    rating, rad. gap: play, rad. length_s, large_length_s: of all runs together; long_exponent: of a
+    torque's spread, of the joints of a case; rest_scatter: of its logarithm from joint to joint. presliding_share:
+    cases with a noticeable way of presliding. soft_share, play_share: joints with a soft drive, or with play. twist: of
+    a soft drive at its rating, rad. gap: play, rad. length_s, large_length_s: of all runs together; long_exponent: of a
     share of the range, so that long ones are more usual than short ones.
     """
 

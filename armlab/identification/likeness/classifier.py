@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.identification.likeness.features import FEATURES
 
 TREES, MIN_LEAF = 300, 5  # of the forest
 DRAWS = 2000  # of the bootstrap over arms
@@ -43,11 +42,6 @@ class Separation:
     importance: Array
     alone: Array
 
-    def strongest(self, number: int) -> list[str]:
-        """Names of the features that the forest uses most."""
-        names = list(FEATURES)
-        return [names[place] for place in np.argsort(-self.importance)[:number]]
-
 
 def separate(arms: Sequence[LikenessArm], seed: int = 0) -> Separation:
     """Trains and scores with arms left out; ValueError unless there are two arms of each side."""
@@ -60,7 +54,7 @@ def separate(arms: Sequence[LikenessArm], seed: int = 0) -> Separation:
     fold = np.empty(len(arms), dtype=int)
     fold[real] = np.arange(real.sum())
     fold[~real] = rng.permutation((~real).sum()) % real.sum()
-    scores, importance = np.empty(len(arms)), np.zeros(len(FEATURES))
+    scores, importance = np.empty(len(arms)), np.zeros(arms[0].values.shape[1])
     for number in range(int(real.sum())):
         train = [arm for arm, place in zip(arms, fold, strict=True) if place != number]
         forest = RandomForestClassifier(TREES, min_samples_leaf=MIN_LEAF, random_state=seed)
