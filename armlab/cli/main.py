@@ -76,6 +76,8 @@ _GROUPS = {
         "oracle": "armlab.cli.proof:oracle",
         "next-loop": "armlab.cli.proof:next_loop",
         "ablate": "armlab.cli.proof:ablate",
+        "prove-field": "armlab.cli.proof:prove_field",
+        "likeness": "armlab.cli.likeness:likeness",
         "real": "armlab.cli.diagnosis:real",
         "real-motion": "armlab.cli.diagnosis:real_motion",
         "real-concealed": "armlab.cli.diagnosis:real_concealed",

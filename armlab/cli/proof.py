@@ -395,6 +395,35 @@ def prove_changes(
     return CHANGES.prove(PairSet(nulls, changed, chosen), folder, results or folder / "score", jobs, commit)
 
 
+@click.command("prove-field")
+@click.option("--cases", type=click.IntRange(min=0), default=100, show_default=True, help="Something is hidden.")
+@click.option("--nulls", type=click.IntRange(min=0), default=100, show_default=True, help="Nothing but what arms have.")
+@click.option("--mistakes", type=click.IntRange(min=0), default=100, show_default=True, help="A reading mistake.")
+@click.option("--pairs", type=click.IntRange(min=0), default=60, show_default=True, help="Every other pair is changed.")
+@_sealed_set_options("field", "cases")
+@prints_lines
+def prove_field(
+    cases: int,
+    nulls: int,
+    mistakes: int,
+    pairs: int,
+    seed: int | None,
+    work: Path | None,
+    results: Path | None,
+    jobs: int,
+) -> Iterator[str]:
+    """Prove the diagnosis on recordings that resemble real ones.
+
+    Makes recordings with every law at once and a rest that no law explains, diagnoses or compares them blindly, and
+    scores physics, reading and changes. After an interruption the same command continues (extra `engines`).
+    """
+    from armlab.concealed.field.prove import FIELD_TIER, FieldSet
+
+    chosen, folder, commit = _choose_set(seed, work, "field")
+    chosen_set = FieldSet(cases, nulls, mistakes, pairs, chosen)
+    return FIELD_TIER.prove(chosen_set, folder, results or folder / "score", jobs, commit)
+
+
 @click.command("prove-setup")
 @click.option("--simulated", type=click.IntRange(min=0), default=300, show_default=True, help="Simulated recordings.")
 @click.option("--real", type=click.IntRange(min=0), default=200, show_default=True, help="Public recordings.")

@@ -88,7 +88,7 @@ def _make_pair(plan: FieldPlan, observation: Path) -> FieldTruth:
 
 def _cycled(plan: FieldPlan, what: str, names: tuple[str, ...], attempt: int) -> str:
     """Each name comes once in a set before any comes twice; another one at a further attempt."""
-    order = random_stream("field order", what, plan.seed).permutation(len(names)).tolist()
+    order: list[int] = random_stream("field order", what, plan.seed).permutation(len(names)).tolist()
     return names[order[(plan.index + 5 * attempt) % len(names)]]
 
 

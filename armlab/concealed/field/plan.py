@@ -1,8 +1,7 @@
 """The plan of a field case: robot, motions, physics, drives and logging, drawn from its seed and number alone."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from armlab.concealed.plan import RunPlan, random_stream
 from problem.arm import Arm
 
 FieldKind = Literal["null", "hidden", "mistake", "pair null", "pair changed"]
-FIELD_KINDS: tuple[FieldKind, ...] = get_args(FieldKind)
 LARGE_SHARE = 0.48  # of the cases: more than three joints, or more than LARGE_LENGTH_S
 LARGE_LENGTH_S = 20.0
 MIN_SAMPLES = 150  # of a run: who records slowly records longer
@@ -155,13 +153,6 @@ def new_side(plan: FieldPlan) -> FieldPlan:
     warmth = float(rng.uniform(0, 300))
     friction = tuple(replace(each, running_s=warmth) for each in plan.friction)
     return replace(plan, side="new", friction=friction)
-
-
-def field_plans(seed: int, counts: dict[FieldKind, int]) -> Iterator[FieldPlan]:
-    """The plans of a set, kind by kind."""
-    for kind, count in counts.items():
-        for index in range(count):
-            yield draw_field_plan(seed, index, kind)
 
 
 def _is_large(seed: int, index: int, kind: FieldKind) -> bool:

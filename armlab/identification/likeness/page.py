@@ -17,7 +17,7 @@ COLUMNS = 3  # of the figure
 
 def likeness_texts(sides: dict[str, Likeness], looks: Sequence[Look]) -> dict[str, str]:
     """The page and its figure by file name. sides: comparisons with the same real arms, by their simulated tier."""
-    return {PAGE_FILE: _page(sides, looks), FIGURE_FILE: svg_text(_figure(sides))}
+    return {PAGE_FILE: _page(sides, looks), FIGURE_FILE: svg_text(_figure(sides), FIGURE_FILE)}
 
 
 def _page(sides: dict[str, Likeness], looks: Sequence[Look]) -> str:

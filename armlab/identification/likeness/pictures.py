@@ -42,7 +42,7 @@ def draw_pictures(found: Sequence[Pictured], number: int, seed: int) -> dict[str
     rng = np.random.default_rng(seed)
     drawn: list[tuple[Pictured, bytes]] = []
     for real in (True, False):
-        own = []
+        own: list[tuple[Pictured, bytes]] = []
         for each in (each for each in found if each.real == real):
             window = _window(each.folder, rng) if len(own) < number else None
             if window is not None:

@@ -124,4 +124,4 @@ def looks_text(looks: Sequence[Look]) -> str:
 def _weighted_quantiles(values: Array, weights: Array) -> Array:
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
-    return np.interp(np.array(QUANTILES) * reached[-1], reached, values[order])
+    return np.asarray(np.interp(np.array(QUANTILES) * reached[-1], reached, values[order]))
