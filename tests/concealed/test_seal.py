@@ -10,6 +10,7 @@ import pytest
 from made_cases import write_made_cases
 
 from armlab.common.errors import InputError
+from armlab.concealed.field.prove import FIELD_TIER, FieldSet
 from armlab.concealed.folders import claim_folder
 from armlab.concealed.pairs.prove import CHANGES, PairSet
 from armlab.concealed.real.prove import MADE, REAL, RealSet
@@ -24,6 +25,7 @@ SMALLEST: dict[str, tuple[SealedTier[Any, Any], Any]] = {  # seeds of one null o
     "motion": (MOTION, MotionSet(0, 1, 1025)),
     "changes": (CHANGES, PairSet(1, 0, 1017)),
     "real": (REAL, RealSet(("emps",), 0, 1001)),
+    "field": (FIELD_TIER, FieldSet(0, 1, 0, 0, 1000)),
 }
 
 
