@@ -66,11 +66,6 @@ class FieldTruth(Settings):
     mistakes: tuple[TrueMistake, ...] = ()
     change: tuple[SizedEffect, ...] = ()
 
-    @property
-    def is_large(self) -> bool:
-        """Whether it is one of the cases that take long."""
-        return self.joints > 3 or self.length_s > 20
-
 
 def make_field_truth(
     case: FieldCase,
