@@ -35,7 +35,7 @@ def likeness(
     from armlab.concealed.sealed import code_commit
     from armlab.identification.likeness.page import likeness_texts
     from armlab.identification.likeness.pictures import Pictured, draw_pictures
-    from armlab.identification.likeness.real_arms import real_folders
+    from armlab.identification.likeness.real_arms import drawable_folders, real_folders
     from armlab.identification.likeness.study import (
         LOOKS_FILE,
         compare,
@@ -50,7 +50,7 @@ def likeness(
     local = local_copies()
     if local is None:
         raise InputError(f"set {LOCAL_COPIES_VARIABLE} to a folder with recordings of real arms")
-    folder = work or Path(f".armlab/likeness/{seed}")
+    commit, folder = code_commit(), work or Path(f".armlab/likeness/{seed}")
     made = {
         "realistic": make_realistic_nulls(seed, realistic, folder / "realistic", jobs),
         "field": make_field_nulls(seed, cases, folder / "field", jobs),
@@ -59,12 +59,12 @@ def likeness(
     real, looks, sides = list(read_real_arms(folders)), read_looks(results), {}
     for tier, simulated in made.items():
         sides[tier] = compare([*real, *read_simulated_arms(simulated)])
-        look = look_of(sides[tier], code_commit(), tier, seed)
+        look = look_of(sides[tier], commit, tier, seed)
         looks += [] if look in looks else [look]
         yield f"{tier}: area {look.area:.3f} ({look.low:.3f} to {look.high:.3f}), most used {', '.join(look.strongest)}"
     texts: dict[str, str | bytes] = {**likeness_texts(sides, looks), LOOKS_FILE: looks_text(looks)}
     if pictures:
-        licensed = [Pictured(each.path, each.name, True) for each in folders if each.licensed]
+        licensed = [Pictured(each.path, each.name, True) for each in drawable_folders(folders)]
         drawn = [Pictured(each, each.name, False) for each in made["field"]]
         texts |= draw_pictures([*licensed, *drawn], pictures, seed)
     for path in write_texts(texts, results):

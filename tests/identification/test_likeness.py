@@ -13,7 +13,7 @@ from armlab.identification.likeness.classifier import LikenessArm, area_under_cu
 from armlab.identification.likeness.features import FEATURES, recording_features
 from armlab.identification.likeness.page import FIGURE_FILE, PAGE_FILE, likeness_texts
 from armlab.identification.likeness.pictures import KEY_FILE, Pictured, draw_pictures
-from armlab.identification.likeness.real_arms import arm_of
+from armlab.identification.likeness.real_arms import RealFolder, arm_of, drawable_folders
 from armlab.identification.likeness.study import compare, look_of, looks_text, read_looks
 
 ROBOT = {
@@ -108,6 +108,14 @@ def test_folders_of_one_arm_are_one_arm() -> None:
     assert {arm_of("lwr4-null"), arm_of("lwr4-friction")} == {"lwr4"}
     assert {arm_of("panda-marcocognetti"), arm_of("unisa-panda")} == {"panda"}
     assert arm_of("emps") == "emps"
+
+
+def test_pictures_are_of_each_arm_once_before_any_twice_and_of_none_without_a_licence(tmp_path: Path) -> None:
+    def folder(name: str, arm: str, licensed: bool = True) -> RealFolder:
+        return RealFolder(_write_drive(tmp_path / name, 0.1, 0.02), arm, licensed, name)
+
+    found = [folder("a1", "a"), folder("a2", "a"), folder("b", "b"), folder("c", "c", licensed=False)]
+    assert [each.name for each in drawable_folders([*found, folder("d", "friction-damper")])] == ["a1", "b", "a2"]
 
 
 def test_a_look_is_logged_and_its_page_names_what_tells_most(tmp_path: Path) -> None:
