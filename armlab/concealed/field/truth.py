@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field
 
 from armlab.common.settings import Settings
-from armlab.concealed.field.friction import LAW_NUMBERS, LEAST_WAY
+from armlab.concealed.field.friction import LAW_NUMBERS
 from armlab.concealed.field.hidden import FieldEffect
 from armlab.concealed.field.plan import FieldKind, FieldPlan
 from armlab.concealed.field.rest import NAMES
@@ -106,10 +106,9 @@ def make_field_truth(
 def background_effects(plan: FieldPlan) -> list[tuple[str, int | None]]:
     """Names of what every arm has, each with its joint or link: a finding of one of them is true."""
     out: list[tuple[str, int | None]] = []
-    for joint, (friction, drive, rest) in enumerate(zip(plan.friction, plan.drives, plan.rest, strict=True), 1):
+    for joint, (drive, rest) in enumerate(zip(plan.drives, plan.rest, strict=True), 1):
         names = ["coulomb_friction", "viscous_friction", "torque_offset", "torque_gain_error", *LAW_NUMBERS]
-        names += ["friction_curve", "early_friction"]
-        names += ["presliding_hysteresis"] * (friction.way > LEAST_WAY)
+        names += ["friction_curve", "presliding_hysteresis", "early_friction"]  # a state with memory is in every joint
         names += ["joint_elasticity"] * (drive.twist > 0) + ["backlash"] * (drive.gap > 0)
         names += [NAMES[kind] for kind in rest.weights if kind in NAMES and NAMES[kind] != "flexible_base"]
         names += ["inertial_parameter_error"] if plan.has_links else ["rotor_inertia"]
