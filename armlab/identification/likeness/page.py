@@ -60,8 +60,8 @@ def _area_cells(likeness: Likeness) -> tuple[str, ...]:
 
 def _look_cells(look: Look) -> tuple[str, ...]:
     area, interval = f"{look.area:.2f}", f"{look.low:.2f} to {look.high:.2f}"
-    used = ", ".join(look.strongest)
-    return look.maker[:7], look.tier, str(look.seed), str(look.cases), area, interval, f"{look.free_area:.2f}", used
+    used, maker = ", ".join(look.strongest), look.maker[:7] + look.maker[40:]  # behind a commit, what was not kept
+    return maker, look.tier, str(look.seed), str(look.cases), area, interval, f"{look.free_area:.2f}", used
 
 
 def _feature_rows(likeness: Likeness) -> list[tuple[str, ...]]:
