@@ -112,8 +112,6 @@ def diagnose(
     better it predicts with them. With --compare OLD: what changed from OLD to RECORDING, and to each further one.
     """
     from armlab.common.errors import InputError
-    from armlab.diagnosis.compare.report import compare_recordings
-    from armlab.diagnosis.report.write import diagnose_recording
     from armlab.recordings.motion import is_motion_only
 
     if old is not None and changes:
@@ -142,7 +140,11 @@ def diagnose(
 
         return compare_motion_recordings((old, *recordings), out, tell_progress)
     if old is not None:
+        from armlab.diagnosis.compare.report import compare_recordings
+
         return compare_recordings((old, *recordings), out, baseline, seed, _parse_dates(dates), tell_progress)
+    from armlab.diagnosis.report.write import diagnose_recording
+
     return diagnose_recording(
         recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap, tables
     )

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
-from scipy.stats import t as student
+from scipy.sparse import csr_array
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import fisher_tail, student_tail
 from armlab.diagnosis.columns import Columns
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.noise import Noise
@@ -44,7 +44,7 @@ class BlockCovariance:
         told = (variances > 0) & (variances < max_variance_ratio * max(variances[0], ROUNDING * variances[-1]))
         wald = float(np.sum((vectors[:, told].T @ values) ** 2 / variances[told]))
         rank = max(int(np.sum(told)), 1)
-        return float(fisher.sf(wald / rank, rank, max(self.degrees - rank, 1)))
+        return fisher_tail(wald / rank, rank, max(self.degrees - rank, 1))
 
 
 def whitened_rows(
@@ -111,7 +111,8 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
         return BlockCovariance(model, degrees)
     sums = np.zeros((int(max(block.max() for block in rows.blocks)) + 1, len(gram)))
     for design, error, block in zip(rows.designs, rows.errors, rows.blocks, strict=True):
-        np.add.at(sums, block, design * error[:, None])
+        rows_by_block = csr_array((error, (block, np.arange(len(block)))), shape=(len(sums), len(block)))
+        sums += rows_by_block @ design
     # squares are taken last: where the prior alone holds a direction, rounding of earlier ones would hide the others
     shares = sums @ inverse * np.sqrt(count / max(count - 1, 1))
     spread = np.asarray(shares.T @ shares + held, dtype=np.float64)
@@ -157,11 +158,12 @@ class Folds:
 
     def errors_of(self, values: Array) -> list[Array]:
         """Errors (rows,) for each joint, where each fold is predicted by its own parameters (parameters, folds)."""
-        count = len(self.grams)
-        return [
-            target - (design @ values)[np.arange(len(block)), block % count]
-            for target, design, block in zip(self.targets, self.rows.designs, self.rows.blocks, strict=True)
-        ]
+        return [self.errors_at(joint, values) for joint in range(len(self.targets))]
+
+    def errors_at(self, joint: int, values: Array) -> Array:
+        """The same at one joint (from 0)."""
+        block, predicted = self.rows.blocks[joint], self.rows.designs[joint] @ values
+        return np.asarray(self.targets[joint] - predicted[np.arange(len(block)), block % len(self.grams)])
 
 
 def split_folds(rows: WhitenedRows, values: Array, precision: Array, count: int) -> Folds:
@@ -205,8 +207,8 @@ def held_out_gain(without: Array, with_it: Array, blocks: NDArray[np.intp]) -> G
     carried = np.bincount(blocks, with_it * predicted)[places]
     gain = float(np.sum(better))
     spread = float(np.std(better, ddof=1)) * np.sqrt(len(better)) if len(better) > 2 else 0.0
-    p_value = float(student.sf(gain / spread, len(better) - 1)) if spread > 0 else 1.0
+    p_value = student_tail(gain / spread, len(better) - 1) if spread > 0 else 1.0
     noise = 2 * float(np.sqrt(carried @ carried))
     count = float(np.sum(power)) ** 2 / max(float(power @ power), 1e-300)
-    chance = float(student.sf(gain / noise, count)) if noise > 0 else 1.0
+    chance = student_tail(gain / noise, count) if noise > 0 else 1.0
     return Gain(gain / max(float(with_it @ with_it), 1e-300), p_value, chance, float(np.mean(predicted**2)))

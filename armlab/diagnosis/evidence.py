@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import chi2
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import chi_square_tail
 from armlab.diagnosis.blocks import (
     BlockCovariance,
     Folds,
@@ -78,7 +78,7 @@ class Comparison:
 
     def gains(self, fit: Fit, less: Fit, joints: tuple[int, ...]) -> dict[int, tuple[Gain, Gain]]:
         """Per joint the gain on validation rows, and on identification stretches held out in turn."""
-        pair = [self._in_turn(each.state) for each in (less, fit)]
+        pair = [self._in_turn(each.state, joints) for each in (less, fit)]
         blocks = self.folds.rows.blocks
         return {
             joint: (
@@ -88,13 +88,17 @@ class Comparison:
             for joint in joints
         }
 
-    def _in_turn(self, state: State) -> list[Array]:
-        """Held-out errors of a state, stretch by stretch; those of the judged state itself are kept."""
-        return self._own_errors if state == self.state else self.folds.errors(self._chosen(state))
+    def _in_turn(self, state: State, joints: tuple[int, ...]) -> dict[int, Array]:
+        """Held-out errors of a state at some joints, stretch by stretch; those of the judged state itself are kept."""
+        if state == self.state:
+            return self._own_errors
+        values = self.folds.solutions(self._chosen(state))
+        return {joint: self.folds.errors_at(joint, values) for joint in joints}
 
     @cached_property
-    def _own_errors(self) -> list[Array]:
-        return self.folds.errors(self._chosen(self.state))
+    def _own_errors(self) -> dict[int, Array]:
+        """At all joints."""
+        return dict(enumerate(self.folds.errors(self._chosen(self.state))))
 
     def validation_gain(self, fit: Fit, less: Fit, joint: int) -> Gain:
         """The gain at a joint on validation rows."""
@@ -272,7 +276,7 @@ class Judge:
         values = wider.coefficients[solver.groups[group].columns]
         place = self._place(wider, group)
         block = wider.inverse[np.ix_(place, place)]
-        return float(chi2.sf(values @ np.linalg.pinv(block, hermitian=True) @ values, solver.ranks[group]))
+        return chi_square_tail(float(values @ np.linalg.pinv(block, hermitian=True) @ values), int(solver.ranks[group]))
 
     def _pushed(self, group: int) -> str | None:
         """Against a push: see `reason_no_contact`."""

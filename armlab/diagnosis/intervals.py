@@ -3,9 +3,9 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import student_quantile
 from armlab.diagnosis.blocks import BlockCovariance, block_covariance, whitened_rows
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.refine import prior_precision
@@ -29,7 +29,7 @@ class ShapedFit:
     def factor(self) -> float:
         """From a standard error to half an interval."""
         tuning = self.model.design.settings.tuning.intervals
-        return tuning.factor * float(student.ppf((1 + tuning.confidence) / 2, self.spread.degrees))
+        return tuning.factor * student_quantile((1 + tuning.confidence) / 2, self.spread.degrees)
 
     def covariance(self, group: int) -> Array:
         """Of a group's coefficients and shapes, unscaled, (coefficients + shapes,) squared."""

@@ -10,10 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.stats import norm
-from scipy.stats import t as student
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import normal_quantile, student_quantile
 from armlab.identification.estimators.least_squares import Estimate
 from armlab.identification.regression import Regression
 
@@ -54,8 +53,8 @@ def uncertainty(data: Regression, estimate: Estimate) -> Uncertainty:
     stationary = spare * _stationary_score_variance(data, estimate) + information
     steady = estimate.bread @ stationary @ estimate.bread.T
     degrees = max(1.5 * data.samples / lag, 2.0)  # of Bartlett's kernel, Priestley 1981, table 6.2
-    factor = float(student.ppf((1 + CONFIDENCE) / 2, degrees))
-    raised = _standard_error_ratio(steady, covariance) * float(norm.ppf((1 + CONFIDENCE) / 2)) / factor
+    factor = student_quantile((1 + CONFIDENCE) / 2, degrees)
+    raised = _standard_error_ratio(steady, covariance) * normal_quantile((1 + CONFIDENCE) / 2) / factor
     scale = np.maximum(raised, 1.0)
     return Uncertainty(covariance * np.outer(scale, scale), factor, lag / data.rate_hz)
 

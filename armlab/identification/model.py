@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from armlab.identification.model_file import read_model, write_model
-from armlab.identification.pictures import residual_figure
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.recording import Run
 
@@ -23,4 +22,6 @@ class Model(TorqueModel):
 
     def plot(self, run: Run) -> Any:
         """A figure of recorded and predicted torque and what is left, joint by joint."""
+        from armlab.identification.pictures import residual_figure  # matplotlib is loaded by those who draw
+
         return residual_figure(self, self.signals(run))

@@ -9,11 +9,11 @@ import numpy as np
 import yaml
 from annotated_types import Ge, Gt
 from pydantic import Field
-from scipy.stats import norm
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.files import write_whole
+from armlab.common.probabilities import normal_quantile
 from armlab.common.settings import Settings, read_yaml, validate
 from armlab.effects.contract import Candidate
 from armlab.effects.library import family_named
@@ -26,7 +26,7 @@ from problem.arm import Arm
 from problem.robot_file import LinkEntry, built_in_arms, check_arm, load_arm
 
 SCHEMA = "model/1"
-NORMAL_QUANTILE = float(norm.ppf(0.975))
+NORMAL_QUANTILE = normal_quantile(0.975)
 
 
 class ParameterEntry(Settings):

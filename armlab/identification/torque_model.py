@@ -5,9 +5,9 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import normal_quantile
 from armlab.effects.model import FittedEffect, torque_in_mechanism, torque_of_model
 from armlab.effects.parameters import ParameterValue, parameter_values
 from armlab.effects.scene import Scene, instants, scene_of
@@ -37,7 +37,7 @@ class TorqueModel:
     structure: Structure
     values: Array
     covariance: Array | None = None
-    factor: float = float(norm.ppf(0.975))
+    factor: float = normal_quantile(0.975)
     inertial: Array | None = None
     cutoff_hz: float | None = None
     position_factor: float = 1.0

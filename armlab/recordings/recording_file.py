@@ -7,7 +7,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-import pandas as pd
 import yaml
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import ConfigDict, Field, model_validator
@@ -268,6 +267,8 @@ def write_recording(draft: Draft, folder: Path, beside: Mapping[str, str | bytes
 
 
 def _to_csv(run: DraftRun, wanted: list[str]) -> str:
+    import pandas as pd  # loaded by those who write
+
     table = pd.DataFrame(run.values, columns=list(run.names))
     return str(table[wanted].to_csv(index=False, lineterminator="\n"))
 

@@ -10,9 +10,9 @@ from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import fisher_tail
 from armlab.diagnosis.columns import Block, Place, place_of
 from armlab.diagnosis.compare.mixed import JointRows, MixedModel, WeightedRows, weigh_rows
 from armlab.diagnosis.compare.pooled import Pooled, is_body
@@ -168,7 +168,7 @@ class ChangeTable:
         evidence = _log_bayes_factor(data, precision @ values / inflation, scales)
         rank = max(int(np.sum(np.linalg.eigvalsh(scales[:, None] * data * scales) > 1)), 1)
         wald = float(values @ precision @ values) / inflation
-        p_value = float(fisher.sf(wald / rank, rank, degrees))
+        p_value = fisher_tail(wald / rank, rank, degrees)
         return Tested(number, values, model * inflation, p_value, evidence, inflation, degrees)
 
     def is_sure(self, tested: Tested) -> bool:

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import student_quantile
 from armlab.diagnosis.columns import place_of
 from armlab.diagnosis.compare.between_runs import scatter_between_runs
 from armlab.diagnosis.compare.changes import ChangeTable, Tested
@@ -69,12 +69,12 @@ class Movement:
 
 def half_width_factor(degrees: float) -> float:
     """From a standard error to half an interval."""
-    return float(student.ppf((1 + CONFIDENCE) / 2, degrees))
+    return student_quantile((1 + CONFIDENCE) / 2, degrees)
 
 
 def detectable_factor(table: ChangeTable, tested: Tested) -> float:
     """From a standard error to the smallest change that is named: the level of the test, corrected."""
-    return float(student.isf(table.tuning.level / 2 / len(table.groups), tested.degrees))
+    return -student_quantile(table.tuning.level / 2 / len(table.groups), tested.degrees)
 
 
 def recording_values(table: ChangeTable, tested: Tested) -> Array:

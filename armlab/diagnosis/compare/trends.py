@@ -6,9 +6,9 @@ from datetime import UTC, date, datetime
 from typing import Literal
 
 import numpy as np
-from scipy.stats import chi2
 
 from armlab.common.arrays import Array
+from armlab.common.probabilities import chi_square_tail
 from armlab.diagnosis.compare.numbers import Movement
 from armlab.recordings.recording import Recording
 
@@ -63,7 +63,7 @@ def _shape_of(movement: Movement, clock: Array, *, per_day: bool) -> Trend:
     left = np.array([each[0] for each in fits])
     whole = _fit(movement, np.zeros(count))[0]
     best = int(np.argmin(left))
-    fitted = float(chi2.sf(left[best], max(count - 2 - (best > 0), 1)))
+    fitted = chi_square_tail(left[best], max(count - 2 - (best > 0), 1))
     if fitted < MIN_FIT_P and left[best] > (1 - MIN_EXPLAINED_SHARE) * whole:
         return Trend(movement, "scatter", None, None, per_day)
     if best == 0:
