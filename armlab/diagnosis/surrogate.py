@@ -3,7 +3,7 @@
 Features (`features.py`) fitted by ridge regression. Only what they predict on data that took no part counts.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,44 +68,55 @@ def errors_in_turn(
     return out
 
 
-def best_ridge(
-    grams: tuple[Array, ...], products: tuple[Array, ...], exponents: Sequence[float]
-) -> tuple[float, Array]:
+@dataclass(frozen=True, eq=False)
+class SplitThirds:
+    """Gram matrices of thirds of the rows (features, features), ready for ridges.
+
+    turned: eigenvalues and eigenvectors of what the other thirds sum up to, of each third.
+    """
+
+    grams: tuple[Array, ...]
+    whole: Array
+    turned: tuple[tuple[Array, Array], ...]
+
+
+def split_thirds(grams: tuple[Array, ...]) -> SplitThirds:
+    """The thirds with these Gram matrices."""
+    whole = np.sum(grams, axis=0)
+    turned = ((np.maximum(values, 0), vectors) for values, vectors in (np.linalg.eigh(whole - own) for own in grams))
+    return SplitThirds(grams, whole, tuple(turned))
+
+
+def best_ridge(thirds: SplitThirds, products: tuple[Array, ...], exponents: Sequence[float]) -> tuple[float, Array]:
     """The ridge that predicts each third best from the others, and the weights with it on all.
 
     exponents: of ten, of the ridges that are tried, in units of the mean squared length of a feature.
     """
     count = len(products[0])
-    ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in grams) / max(count, 1)
-    errors = np.zeros(len(ridges))
-    whole, towards = np.sum(grams, axis=0), np.sum(products, axis=0)
-    for own, product in zip(grams, products, strict=True):
-        values, vectors = np.linalg.eigh(whole - own)
-        turned = vectors.T @ (towards - product)
-        for number, ridge in enumerate(ridges):
-            weights = vectors @ (turned / (np.maximum(values, 0) + ridge))
-            errors[number] += weights @ own @ weights - 2 * weights @ product
+    ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in thirds.grams) / max(count, 1)
+    errors, towards = np.zeros(len(ridges)), np.sum(products, axis=0)
+    for own, (values, vectors), product in zip(thirds.grams, thirds.turned, products, strict=True):
+        scaled = (vectors.T @ (towards - product))[:, None] / (values[:, None] + ridges)
+        weights = vectors @ scaled
+        errors += np.sum(weights * (own @ weights), axis=0) - 2 * product @ weights
     best = float(ridges[int(np.argmin(errors))])
-    return best, np.linalg.solve(whole + best * np.eye(count), towards)
+    return best, np.linalg.solve(thirds.whole + best * np.eye(count), towards)
 
 
 @dataclass(frozen=True, eq=False)
 class FoldedFeatures:
-    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none.
-
-    grams: of each third.
-    """
+    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none."""
 
     features: Features
     folds: NDArray[np.intp]
-    grams: tuple[Array, ...]
+    thirds: SplitThirds
 
 
 def fold_features(made: Features, observed: Observed, joint: int, tuning: SurrogateTuning) -> FoldedFeatures:
     """Features of a joint (from 0), with their products third by third."""
     thirds = time_thirds(observed, joint, tuning)
     grams = tuple(made.values[thirds == fold].T @ made.values[thirds == fold] for fold in range(3))
-    return FoldedFeatures(made, thirds, grams)
+    return FoldedFeatures(made, thirds, split_thirds(grams))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +143,12 @@ def predict_structure(
     """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
     values = made.features.values
     products = tuple(values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
-    ridge, weights = best_ridge(made.grams, products, tuning.ridge_exponents)
+    ridge, weights = best_ridge(made.thirds, products, tuning.ridge_exponents)
     predicted = values @ weights
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
     numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), made.folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
-    turned = errors_in_turn(values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
+    turned = errors_in_turn(values[learn], residual[learn], made.folds[learn], ridge, made.thirds.grams, products)
     inside = held_out_gain(residual[learn], turned, numbers[learn])
     gains = (validated, inside)
     sure = any(each.share > tuning.min_noise_gain and each.chance < tuning.noise_level for each in gains)
@@ -152,10 +163,59 @@ class Remainder:
     features: Features
 
 
+@dataclass(frozen=True, eq=False)
+class Surrogate:
+    """A surrogate fitted to what is left at a joint, and the better of the two ways in which it is held out.
+
+    gain, p_value, validation_gain: see `Structure`. left: what it was judged on. sums: its Gram matrix and products
+    there; in_turn: the same third by third where stretches were predicted in turn, None for validation runs. judged:
+    whitened columns and target of the held-out rows. weights: of all that was learnt from.
+    """
+
+    joint: int
+    gain: float
+    p_value: float
+    validation_gain: float
+    left: Remainder
+    ridge: float
+    weights: Array
+    sums: tuple[Array, Array]
+    in_turn: tuple[tuple[Array, ...], tuple[Array, ...]] | None
+    judged: tuple[Array, Array]
+
+    def structure(self, observed: Observed, tuning: SurrogateTuning) -> Structure:
+        """What it predicts, and of which variables: asked of the best surrogate alone."""
+        if self.in_turn is None:
+            prediction = self.left.features.values @ self.weights
+        else:
+            used = np.ones(observed.rows, dtype=bool)
+            prediction = predict_in_turn(self.left.features.values, used, observed, self.ridge, *self.in_turn, tuning)
+        rows = rows_in(observed.of_role("validate", self.joint), observed.rows)
+        residual = self.left.residual
+        power = float(np.mean(residual[rows] ** 2))
+        share = 1 - float(np.mean((residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
+        found: tuple[str, ...] = ()
+        if self.gain > tuning.min_structure_gain:
+            found = _important_variables(self.left.features, *self.sums, self.judged, self.ridge, tuning)
+        return Structure(self.joint, self.gain, self.p_value, self.validation_gain, share, prediction, found)
+
+
+def surest(surrogates: Iterable[Surrogate], tuning: SurrogateTuning) -> Surrogate:
+    """The surrogate that is least by chance among those that explain enough."""
+    return min(surrogates, key=lambda each: (each.gain <= tuning.min_structure_gain, each.p_value))
+
+
 def find_structure(
     learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
 ) -> Structure:
-    """What features predict of what is left at a joint: whitened, or as it is.
+    """What features predict of what is left at a joint: see `fit_surrogate`."""
+    return fit_surrogate(learnt, whole, joint, noise, observed, tuning).structure(observed, tuning)
+
+
+def fit_surrogate(
+    learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
+) -> Surrogate:
+    """The surrogate of what is left at a joint: whitened, or as it is.
 
     learnt: by a fit of the identification rows, beside which validation runs are predicted. whole: by one of all rows,
     beside which stretches are predicted in turn; where a fit of some rows is bad elsewhere, that is no structure.
@@ -163,19 +223,17 @@ def find_structure(
     noise would pass for structure, it counts only if validation runs have it, too.
     """
     plain = replace(noise, taps=tuple(np.ones(1) for _ in noise.taps), scales=tuple(1.0 for _ in noise.taps))
-    whitened = _find_structure(learnt, whole, joint, noise, observed, tuning)
-    raw = _find_structure(learnt, whole, joint, plain, observed, tuning)
-    least = tuning.min_structure_gain
-    ways = [whitened, raw] if raw.validation_gain > least else [whitened]
-    return min(ways, key=lambda each: (each.gain <= least, each.p_value))
+    whitened = _fit_surrogate(learnt, whole, joint, noise, observed, tuning)
+    raw = _fit_surrogate(learnt, whole, joint, plain, observed, tuning)
+    return surest([whitened, raw] if raw.validation_gain > tuning.min_structure_gain else [whitened], tuning)
 
 
-def _find_structure(
+def _fit_surrogate(
     learnt: Remainder, whole: Remainder, joint: int, noise: Noise, observed: Observed, tuning: SurrogateTuning
-) -> Structure:
+) -> Surrogate:
     learn, judge = observed.of_role("identify", joint), observed.of_role("validate", joint)
     both = (*learn, *judge)
-    lost, rows = noise.lost(joint), rows_in(judge, observed.rows)
+    lost = noise.lost(joint)
     numbers = _stretch_numbers(both, lost, block_numbers(observed, tuning.fold_s, tuning.min_blocks))
     blocks = _stretch_numbers(both, lost, block_numbers(observed, tuning.block_s, tuning.min_blocks))
     known = np.arange(len(blocks)) < sum(each.stop - each.start - lost for each in learn)
@@ -186,28 +244,22 @@ def _find_structure(
 
     columns, target = white(learnt)
     grams, products, _ = products_by_third(columns, target, numbers % 3, known)
-    ridge, weights = best_ridge(grams, products, tuning.ridge_exponents)
+    ridge, weights = best_ridge(split_thirds(grams), products, tuning.ridge_exponents)
     validated = held_out_gain(target[~known], target[~known] - columns[~known] @ weights, blocks[~known])
     all_columns, all_target = white(whole)
     everything = np.ones(len(known), dtype=bool)
-    all_grams, all_products, folds = products_by_third(all_columns, all_target, numbers % 3, everything)
-    turned = errors_in_turn(all_columns, all_target, folds, ridge, all_grams, all_products)
+    thirds = products_by_third(all_columns, all_target, numbers % 3, everything)
+    turned = errors_in_turn(all_columns, all_target, thirds[2], ridge, *thirds[:2])
     inside = held_out_gain(all_target, turned, blocks)
     least = tuning.min_structure_gain
     if (inside.share <= least, inside.chance) < (validated.share <= least, validated.chance):
-        best, left, pair, sums = inside, whole, (all_columns, all_target), (all_grams, all_products)
-        used = np.ones(observed.rows, dtype=bool)
-        prediction = predict_in_turn(whole.features.values, used, observed, ridge, all_grams, all_products, tuning)
+        best, left, in_turn, judged = inside, whole, thirds[:2], (all_columns, all_target)
     else:
-        best, left, pair, sums = validated, learnt, (columns[~known], target[~known]), (grams, products)
-        prediction = learnt.features.values @ weights
-    power = float(np.mean(left.residual[rows] ** 2))
-    share = 1 - float(np.mean((left.residual[rows] - prediction[rows]) ** 2)) / max(power, 1e-300)
-    found: tuple[str, ...] = ()
-    if best.share > least:
-        gram, towards = (np.sum(parts, axis=0) for parts in sums)
-        found = _important_variables(left.features, gram, towards, pair, ridge, tuning)
-    return Structure(joint, best.share, best.chance, validated.share, share, prediction, found)
+        best, left, in_turn, judged = validated, learnt, None, (columns[~known], target[~known])
+    gram, towards = (np.asarray(np.sum(parts, axis=0)) for parts in in_turn or (grams, products))
+    return Surrogate(
+        joint, best.share, best.chance, validated.share, left, ridge, weights, (gram, towards), in_turn, judged
+    )
 
 
 def _important_variables(

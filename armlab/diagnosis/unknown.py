@@ -1,6 +1,6 @@
 """Structure that the library leaves: findings without a name, and names that it contradicts."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from armlab.diagnosis.fitted_model import FittedModel, inertial_parameters, init
 from armlab.diagnosis.noise import Noise
 from armlab.diagnosis.result import Claim, Weighed
 from armlab.diagnosis.solver import State
-from armlab.diagnosis.surrogate import Remainder, Structure, find_structure
+from armlab.diagnosis.surrogate import Remainder, Structure, Surrogate, fit_surrogate, surest
 from armlab.diagnosis.tuning import Tuning, UnknownTuning
 from armlab.effects.contract import UNKNOWN
 from armlab.recordings.recording import ROLES
@@ -48,20 +48,26 @@ def _load(model: FittedModel) -> Load:
 
 def _surest_structure(model: FittedModel, joint: int, load: Load, noise: Noise) -> Structure:
     """What the surest surrogate predicts of what a model leaves at a joint, its p-value that of the best of all."""
-    tuning = model.design.settings.tuning.surrogate
-    tried = _structures(model, joint, load, noise)
-    best = min(tried, key=lambda each: (each.gain <= tuning.min_structure_gain, each.p_value))
-    return replace(best, p_value=min(1.0, best.p_value * HELD_OUT_WAYS * len(tried)))
+    observed, tuning = model.design.observed, model.design.settings.tuning.surrogate
+    features = _features_of(model, joint, load)
+    found = surest(_surrogates(model, joint, features, noise), tuning).structure(observed, tuning)
+    return replace(found, p_value=min(1.0, found.p_value * HELD_OUT_WAYS * len(features)))
 
 
-def _structures(model: FittedModel, joint: int, load: Load, noise: Noise) -> list[Structure]:
-    """What each surrogate predicts of what a model leaves at a joint."""
-    design, tuning, whole = model.design, model.design.settings.tuning.surrogate, FitOfAll.of(model, joint)
-    banks = (*design.banks[joint], *load_banks(design.observed, joint, load, tuning))
-    return [
-        find_structure(Remainder(whole.residual, each), whole.remainder(each), joint, noise, design.observed, tuning)
-        for each in (design.features[joint].features, *banks)
-    ]
+def _features_of(model: FittedModel, joint: int, load: Load) -> tuple[Features, ...]:
+    """What a residual may depend on at a joint: many features of everything, and few of one kind each."""
+    design = model.design
+    banks = load_banks(design.observed, joint, load, design.settings.tuning.surrogate)
+    return design.features[joint].features, *design.banks[joint], *banks
+
+
+def _surrogates(model: FittedModel, joint: int, features: Sequence[Features], noise: Noise) -> Iterator[Surrogate]:
+    """The surrogate of each of some features of what a model leaves at a joint; one is in memory at a time."""
+    observed, tuning = model.design.observed, model.design.settings.tuning.surrogate
+    whole = FitOfAll.of(model, joint)
+    for each in features:
+        learnt = Remainder(whole.residual, each)
+        yield fit_surrogate(learnt, whole.remainder(each), joint, noise, observed, tuning)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +115,8 @@ class FitOfAll:
 def flexible_gain(model: FittedModel, state: State, joint: int) -> float:
     """What the best surrogate explains of what a state leaves at a joint (from 0): see `Structure.gain`."""
     beside = replace(model, state=state)
-    return max(each.gain for each in _structures(beside, joint, _load(beside), model.noise))
+    features = _features_of(beside, joint, _load(beside))
+    return max(each.gain for each in _surrogates(beside, joint, features, model.noise))
 
 
 def is_structured(each: Structure, tuning: Tuning) -> bool:
