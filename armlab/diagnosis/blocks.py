@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +22,25 @@ ROUNDING = 1e-14  # of the largest variance: rounding
 
 @dataclass(frozen=True, eq=False)
 class WhitenedRows:
-    """Whitened identification rows of a fit, per joint: the design (rows, parameters) and the errors (rows,)."""
+    """Whitened identification rows of a fit, per joint: the design (rows, parameters) and the errors (rows,).
+
+    blocks: the number of the stretch of time of each row, (rows,).
+    """
 
     designs: tuple[Array, ...]
     errors: tuple[Array, ...]
     blocks: tuple[NDArray[np.intp], ...]
+
+    def gram(self) -> Array:
+        """Products of the columns over all joints, (parameters, parameters)."""
+        return np.asarray(sum(design.T @ design for design in self.designs))
+
+    def sums_over_blocks(self) -> Array:
+        """Sums of design times error over each stretch, (blocks, parameters)."""
+        out = np.zeros((int(max(block.max() for block in self.blocks)) + 1, self.designs[0].shape[1]))
+        for design, error, block in zip(self.designs, self.errors, self.blocks, strict=True):
+            out += csr_array((error, (block, np.arange(len(block)))), shape=(len(out), len(block))) @ design
+        return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +113,16 @@ def block_numbers(observed: Observed, length_s: float, least: int) -> NDArray[np
     return numbers
 
 
-def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> BlockCovariance:
-    """Covariance of the parameters. precision: (parameters, parameters) of their prior."""
-    gram = sum(design.T @ design for design in rows.designs) + precision
+def block_covariance(
+    rows: WhitenedRows, gram: Array, precision: Array, robust: bool, chosen: Sequence[int] | None = None
+) -> BlockCovariance:
+    """Covariance of the parameters, or of the `chosen` ones of a fit that has no others and leaves these errors.
+
+    gram: of the rows. precision: of the prior; both (parameters, parameters), of all parameters.
+    """
+    own = np.arange(len(precision)) if chosen is None else np.asarray(chosen, dtype=np.intp)
+    precision = precision[np.ix_(own, own)]
+    gram = gram[np.ix_(own, own)] + precision
     inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
     count = len(np.unique(np.concatenate(rows.blocks)))
     degrees = float(max(count - 1, 1))
@@ -109,10 +131,7 @@ def block_covariance(rows: WhitenedRows, precision: Array, robust: bool) -> Bloc
     model = np.asarray(held + (inverse - held) * max(variance, 1.0), dtype=np.float64)
     if not robust:
         return BlockCovariance(model, degrees)
-    sums = np.zeros((int(max(block.max() for block in rows.blocks)) + 1, len(gram)))
-    for design, error, block in zip(rows.designs, rows.errors, rows.blocks, strict=True):
-        rows_by_block = csr_array((error, (block, np.arange(len(block)))), shape=(len(sums), len(block)))
-        sums += rows_by_block @ design
+    sums = rows.sums_over_blocks()[:, own]
     # squares are taken last: where the prior alone holds a direction, rounding of earlier ones would hide the others
     shares = sums @ inverse * np.sqrt(count / max(count - 1, 1))
     spread = np.asarray(shares.T @ shares + held, dtype=np.float64)
@@ -141,6 +160,11 @@ class Folds:
     grams: tuple[Array, ...]
     products: tuple[Array, ...]
 
+    @cached_property
+    def whole(self) -> Array:
+        """Products of the columns over all folds, (parameters, parameters)."""
+        return np.asarray(np.sum(self.grams, axis=0))
+
     def errors(self, chosen: Sequence[int]) -> list[Array]:
         """Held-out errors of a fit with the chosen parameters only, (rows,) for each joint."""
         return self.errors_of(self.solutions(chosen))
@@ -149,9 +173,9 @@ class Folds:
         """Parameters fitted without each fold, (parameters, folds); zeros where they are not chosen."""
         count = len(self.grams)
         place, values = np.ix_(chosen, chosen), np.zeros((len(self.precision), count))
-        whole, towards = np.sum(self.grams, axis=0), np.sum(self.products, axis=0)
+        towards = np.sum(self.products, axis=0)
         for fold in range(count):
-            gram = (whole - self.grams[fold] + self.precision)[place]
+            gram = (self.whole - self.grams[fold] + self.precision)[place]
             inverse = np.linalg.pinv(gram, rcond=1e-12, hermitian=True)
             values[chosen, fold] = inverse @ (towards - self.products[fold])[chosen]
         return values

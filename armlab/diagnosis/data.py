@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +15,7 @@ from armlab.diagnosis.tuning import DataTuning
 from armlab.recordings.cutoff import acceleration_spectrum, choose_cutoff, noise_level
 from armlab.recordings.differentiate import Signals, differentiate, resample_at, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
-from armlab.recordings.recording import Role, Run
+from armlab.recordings.recording import ROLES, Role, Run
 from problem.arm import Arm
 from problem.joint_words import joint_in_words
 from problem.motion import Motion
@@ -185,11 +186,18 @@ class Observed:
 
     def of_role(self, role: Role, joint: int | None = None) -> tuple[Segment, ...]:
         """The segments of a role; only the parts in which a joint (from 0) moves, if one is given."""
-        own = tuple(segment for segment in self.segments if segment.role == role)
-        if joint is None:
-            return own
-        moving = self.moving[:, joint]
-        return tuple(part for each in own for part in split_segment(each, moving, self.min_segment_rows))
+        return self._segments_of_roles[role, joint]
+
+    @cached_property
+    def _segments_of_roles(self) -> dict[tuple[Role, int | None], tuple[Segment, ...]]:
+        out: dict[tuple[Role, int | None], tuple[Segment, ...]] = {}
+        for role in ROLES:
+            own = tuple(segment for segment in self.segments if segment.role == role)
+            out[role, None] = own
+            for joint, moving in enumerate(self.moving.T):
+                parts = (part for each in own for part in split_segment(each, moving, self.min_segment_rows))
+                out[role, joint] = tuple(parts)
+        return out
 
     def reason_too_short(self, arm: Arm) -> str | None:
         """Why nothing can be said of a joint: it is never in motion for long enough; None where all are."""
@@ -201,8 +209,16 @@ class Observed:
 
     def at_rest(self, role: Role, joint: int) -> NDArray[np.intp]:
         """Rows of a role near a standstill or a reversal of a joint (from 0)."""
-        whole = rows_in(self.of_role(role), self.rows)
-        return np.flatnonzero(whole & ~rows_in(self.of_role(role, joint), self.rows))
+        return self._rows_at_rest[role, joint]
+
+    @cached_property
+    def _rows_at_rest(self) -> dict[tuple[Role, int], NDArray[np.intp]]:
+        whole = {role: rows_in(self.of_role(role), self.rows) for role in ROLES}
+        return {
+            (role, joint): np.flatnonzero(whole[role] & ~rows_in(self.of_role(role, joint), self.rows))
+            for role in ROLES
+            for joint in range(self.joints)
+        }
 
     def stretches_at_rest(self, joint: int, segment: Segment) -> tuple[Segment, ...]:
         """The stretches of a segment near a standstill or a reversal of a joint (from 0)."""

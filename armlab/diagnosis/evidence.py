@@ -48,26 +48,25 @@ class Comparison:
 
     def covariance_of(self, state: State) -> BlockCovariance:
         """Robust covariance of the parameters of a state within the wide fit."""
-        chosen = self._chosen(state)
-        precision = self.folds.precision[np.ix_(chosen, chosen)]
-        return block_covariance(
-            self._rows_of(state, chosen), precision, self.model.design.settings.guards.robust_variance
-        )
+        robust = self.model.design.settings.guards.robust_variance
+        folds = self.folds
+        return block_covariance(self._rows_of(state), folds.whole, folds.precision, robust, self._chosen(state))
 
-    def _rows_of(self, state: State, chosen: list[int]) -> WhitenedRows:
-        """Whitened rows of a state, with what it leaves."""
-        rows, values = self.folds.rows, fit_values(self.model.solver.fit(state))
-        designs = tuple(design[:, chosen] for design in rows.designs)
-        errors = (target - design @ values for target, design in zip(self.folds.targets, designs, strict=True))
-        return WhitenedRows(designs, tuple(errors), rows.blocks)
+    def _rows_of(self, state: State) -> WhitenedRows:
+        """Whitened rows of the wide fit, with what a state leaves of them."""
+        rows, values = self.folds.rows, np.zeros(len(self.folds.precision))
+        values[self._chosen(state)] = fit_values(self.model.solver.fit(state))
+        errors = (target - design @ values for target, design in zip(self.folds.targets, rows.designs, strict=True))
+        return replace(rows, errors=tuple(errors))
 
     def event_inflation(self, state: State, place: Sequence[int], joint: int) -> float:
         """`variance_inflation` of what happens once at a joint (from 0). place: of its coefficients in the fit.
 
         No other stretch shows how its like would scatter, so the correlation of what all of them leave has to say it.
         """
-        rows = self._rows_of(state, self._chosen(state))
-        event = rows.designs[joint][:, place] @ fit_values(self.model.solver.fit(state))[list(place)]
+        rows, chosen = self._rows_of(state), self._chosen(state)
+        wide = [chosen[each] for each in place]
+        event = rows.designs[joint][:, wide] @ fit_values(self.model.solver.fit(state))[list(place)]
         return variance_inflation(event, rows.errors[joint])
 
     def _chosen(self, state: State) -> list[int]:

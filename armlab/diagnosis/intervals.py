@@ -84,7 +84,9 @@ def extend_with_shapes(model: FittedModel) -> ShapedFit:
             chosen = _numbers_of(model, group, places.get(group))
             units = _units(model, group, shapes, places.get(group))
             precision[np.ix_(chosen, chosen)] += known / np.outer(units, units)
-    return ShapedFit(model, block_covariance(rows, precision, settings.guards.robust_variance), places, shapes)
+    return ShapedFit(
+        model, block_covariance(rows, rows.gram(), precision, settings.guards.robust_variance), places, shapes
+    )
 
 
 def _numbers_of(model: FittedModel, group: int, place: slice | None) -> list[int]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -117,12 +116,7 @@ class Search:
         return state.plus(group)
 
     def _replaced(self, state: State, group: int) -> list[int]:
-        groups, candidate = self.solver.groups, self.solver.groups[group].candidate
-        return [
-            other
-            for other in state.groups
-            if groups[other].candidate.effect in candidate.replaces and groups[other].candidate.joint == candidate.joint
-        ]
+        return [other for other in state.groups if self.solver.replaces[group, other]]
 
     def excluded(self, state: State, group: int) -> bool:
         """Whether a group is not looked for: see `has_no_room`.
@@ -170,17 +164,9 @@ class Search:
 
     def gains(self, state: State) -> Array:
         """Gain of each group, with the price of what it replaces given back."""
-        gains = self.solver.gains(state)
-        for number in self._replacing:
-            replaced = self._replaced(state, number)
-            gains[number] += sum(self.solver.prices[other] for other in replaced)
-            unusual = sum(bool(self.solver.unusual[other]) for other in replaced)
-            gains[number] += self.solver.tuning.crowd_penalty * unusual
-        return gains
-
-    @cached_property
-    def _replacing(self) -> list[int]:
-        return [number for number, group in enumerate(self.solver.groups) if group.candidate.replaces]
+        solver, present = self.solver, list(state.groups)
+        given_back = solver.prices[present] + solver.tuning.crowd_penalty * solver.unusual[present]
+        return np.asarray(solver.gains(state) + solver.replaces[:, present] @ given_back)
 
     def objection(self, state: State, group: int) -> str | None:
         """What physics says against a group as it is fitted in a state."""

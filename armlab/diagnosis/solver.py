@@ -84,7 +84,7 @@ class Solver:
     @cached_property
     def prices(self) -> Array:
         """Price of each group, in units of log likelihood."""
-        return np.array([self._price(group) for group in self.groups])
+        return np.array([self._price(number, group) for number, group in enumerate(self.groups)])
 
     @cached_property
     def ranks(self) -> NDArray[np.intp]:
@@ -93,8 +93,7 @@ class Solver:
         share = self.tuning.min_unabsorbed_share
         return np.array([_numerical_rank(block, share) for block in blocks], dtype=np.intp)
 
-    def _price(self, group: Group) -> float:
-        number = next(index for index, each in enumerate(self.groups) if each is group)
+    def _price(self, number: int, group: Group) -> float:
         rows = sum(self.moments.rows[row] for row in group.candidate.rows)
         parameters = self.ranks[number] + len(group.candidate.shape)
         tried = 1 if group.candidate.facts.usual else self.places * group.candidate.looks
@@ -104,6 +103,15 @@ class Solver:
     def unusual(self) -> NDArray[np.bool_]:
         """Which groups are no friction or offset as every arm has them."""
         return np.array([not each.candidate.facts.usual for each in self.groups], dtype=bool)
+
+    @cached_property
+    def replaces(self) -> NDArray[np.bool_]:
+        """Which groups take the place of which others at their joint, (groups, groups)."""
+        out = np.zeros((len(self.groups), len(self.groups)), dtype=bool)
+        for number, candidate in enumerate(each.candidate for each in self.groups):
+            for other, replaced in enumerate(each.candidate for each in self.groups if candidate.replaces):
+                out[number, other] = replaced.effect in candidate.replaces and replaced.joint == candidate.joint
+        return out
 
     def crowd(self, groups: Sequence[int]) -> int:
         """How many unusual effects there are."""

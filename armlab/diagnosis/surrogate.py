@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import block_numbers, held_out_gain
@@ -47,7 +48,7 @@ def predict_in_turn(
     out = np.empty(len(thirds))
     for fold in range(3):
         gram = np.sum(grams, axis=0) - grams[fold] + ridge * np.eye(values.shape[1])
-        weights = np.linalg.solve(gram, np.sum(products, axis=0) - products[fold])
+        weights = solve_positive(gram, np.sum(products, axis=0) - products[fold])
         out[thirds == fold] = values[rows][thirds == fold] @ weights
     return out
 
@@ -63,60 +64,51 @@ def errors_in_turn(
     """Errors of each third where the others have been learnt from, (rows,)."""
     out, whole, towards = target.copy(), np.sum(grams, axis=0), np.sum(products, axis=0)
     for fold in range(3):
-        weights = np.linalg.solve(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
+        weights = solve_positive(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
         out[thirds == fold] -= white[thirds == fold] @ weights
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class SplitThirds:
-    """Gram matrices of thirds of the rows (features, features), ready for ridges.
-
-    turned: eigenvalues and eigenvectors of what the other thirds sum up to, of each third.
-    """
-
-    grams: tuple[Array, ...]
-    whole: Array
-    turned: tuple[tuple[Array, Array], ...]
-
-
-def split_thirds(grams: tuple[Array, ...]) -> SplitThirds:
-    """The thirds with these Gram matrices."""
-    whole = np.sum(grams, axis=0)
-    turned = ((np.maximum(values, 0), vectors) for values, vectors in (np.linalg.eigh(whole - own) for own in grams))
-    return SplitThirds(grams, whole, tuple(turned))
-
-
-def best_ridge(thirds: SplitThirds, products: tuple[Array, ...], exponents: Sequence[float]) -> tuple[float, Array]:
+def best_ridge(
+    grams: tuple[Array, ...], products: tuple[Array, ...], exponents: Sequence[float]
+) -> tuple[float, Array]:
     """The ridge that predicts each third best from the others, and the weights with it on all.
 
     exponents: of ten, of the ridges that are tried, in units of the mean squared length of a feature.
     """
     count = len(products[0])
-    ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in thirds.grams) / max(count, 1)
-    errors, towards = np.zeros(len(ridges)), np.sum(products, axis=0)
-    for own, (values, vectors), product in zip(thirds.grams, thirds.turned, products, strict=True):
-        scaled = (vectors.T @ (towards - product))[:, None] / (values[:, None] + ridges)
-        weights = vectors @ scaled
-        errors += np.sum(weights * (own @ weights), axis=0) - 2 * product @ weights
+    ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in grams) / max(count, 1)
+    whole, towards, errors = np.sum(grams, axis=0), np.sum(products, axis=0), np.zeros(len(ridges))
+    for own, product in zip(grams, products, strict=True):
+        for number, ridge in enumerate(ridges):
+            weights = solve_positive(whole - own + ridge * np.eye(count), towards - product)
+            errors[number] += weights @ own @ weights - 2 * weights @ product
     best = float(ridges[int(np.argmin(errors))])
-    return best, np.linalg.solve(thirds.whole + best * np.eye(count), towards)
+    return best, solve_positive(whole + best * np.eye(count), towards)
+
+
+def solve_positive(matrix: Array, right: Array) -> Array:
+    """Solution of a symmetric positive definite system, by Cholesky's factors."""
+    return np.asarray(cho_solve(cho_factor(matrix, lower=True, check_finite=False), right, check_finite=False))
 
 
 @dataclass(frozen=True, eq=False)
 class FoldedFeatures:
-    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none."""
+    """Features with the third of the identification rows that each row belongs to, (rows,), -1 for none.
+
+    grams: of each third.
+    """
 
     features: Features
     folds: NDArray[np.intp]
-    thirds: SplitThirds
+    grams: tuple[Array, ...]
 
 
 def fold_features(made: Features, observed: Observed, joint: int, tuning: SurrogateTuning) -> FoldedFeatures:
     """Features of a joint (from 0), with their products third by third."""
     thirds = time_thirds(observed, joint, tuning)
     grams = tuple(made.values[thirds == fold].T @ made.values[thirds == fold] for fold in range(3))
-    return FoldedFeatures(made, thirds, split_thirds(grams))
+    return FoldedFeatures(made, thirds, grams)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,12 +135,12 @@ def predict_structure(
     """What the features predict of a residual (rows,), zeros unless they do so on held-out rows, too."""
     values = made.features.values
     products = tuple(values[made.folds == fold].T @ residual[made.folds == fold] for fold in range(3))
-    ridge, weights = best_ridge(made.thirds, products, tuning.ridge_exponents)
+    ridge, weights = best_ridge(made.grams, products, tuning.ridge_exponents)
     predicted = values @ weights
     rows = rows_in(observed.of_role("validate", joint), observed.rows)
     numbers, learn = block_numbers(observed, tuning.block_s, tuning.min_blocks), made.folds >= 0
     validated = held_out_gain(residual[rows], residual[rows] - predicted[rows], numbers[rows])
-    turned = errors_in_turn(values[learn], residual[learn], made.folds[learn], ridge, made.thirds.grams, products)
+    turned = errors_in_turn(values[learn], residual[learn], made.folds[learn], ridge, made.grams, products)
     inside = held_out_gain(residual[learn], turned, numbers[learn])
     gains = (validated, inside)
     sure = any(each.share > tuning.min_noise_gain and each.chance < tuning.noise_level for each in gains)
@@ -244,7 +236,7 @@ def _fit_surrogate(
 
     columns, target = white(learnt)
     grams, products, _ = products_by_third(columns, target, numbers % 3, known)
-    ridge, weights = best_ridge(split_thirds(grams), products, tuning.ridge_exponents)
+    ridge, weights = best_ridge(grams, products, tuning.ridge_exponents)
     validated = held_out_gain(target[~known], target[~known] - columns[~known] @ weights, blocks[~known])
     all_columns, all_target = white(whole)
     everything = np.ones(len(known), dtype=bool)
@@ -276,7 +268,7 @@ def _important_variables(
 
     def gain(kept: NDArray[np.bool_]) -> float:
         own = gram[np.ix_(kept, kept)] + ridge * np.eye(int(kept.sum()))
-        weights = np.linalg.solve(own, products[kept])
+        weights = solve_positive(own, products[kept])
         return 1 - float(np.sum((target - columns[:, kept] @ weights) ** 2)) / power
 
     whole, lost = gain(np.ones(len(products), dtype=bool)), {}

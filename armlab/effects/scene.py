@@ -91,6 +91,11 @@ class Scene:
         """Whether the links of the present model could exist; a fit of base parameters need not."""
         return bool(np.all(least_eigenvalues(self.inertial) > -NO_INERTIA))
 
+    @cached_property
+    def derived(self) -> "dict[tuple[object, ...], Scene]":
+        """Scenes that a law makes of this one, by what it makes them with; it keeps few."""
+        return {}
+
     @property
     def step(self) -> float:
         """Time from sample to sample, s."""

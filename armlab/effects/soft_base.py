@@ -82,7 +82,20 @@ class StandingScene(Scene):
 
 
 def standing_scene(scene: Scene, axis: Array) -> StandingScene:
-    """The scene with the base as a joint. axis: its direction in the base frame, (3,)."""
+    """The scene with the base as a joint. axis: its direction in the base frame, (3,).
+
+    The axes of a first look, which come first, are kept: each resonance is asked about each of them.
+    """
+    key = ("standing", *axis.tolist())
+    if key not in scene.derived:
+        made = _make_standing_scene(scene, axis)
+        if len(scene.derived) >= len(DIRECTIONS):
+            return made
+        scene.derived[key] = made
+    return scene.derived[key]  # type: ignore[return-value]
+
+
+def _make_standing_scene(scene: Scene, axis: Array) -> StandingScene:
     arm, motion = scene.arm, scene.motion
     turn = turn_z_to(axis)
     still = np.zeros((len(scene.time), 1))
