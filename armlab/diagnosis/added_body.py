@@ -87,7 +87,7 @@ def fit_body(model: FittedModel, without: State, group: int, link: int) -> Place
     columns, gram = solver.groups[group].columns, model.moments.gram
     ten_to_felt = np.column_stack([felt_values(model.design.simulation.arm, link, unit) for unit in np.eye(10)])
     scaled = model.moments.lengths[columns][:, None] * ten_to_felt
-    matrix, products, other_columns = solver.system(without)
+    (matrix, other_columns), products = solver.system(without), solver.products(without)
     solved = np.linalg.solve(matrix, products)
     rest = gram[np.ix_(columns, columns)] - products[:, columns].T @ solved[:, columns]
     towards = gram[columns, -1] - products[:, columns].T @ solved[:, -1]

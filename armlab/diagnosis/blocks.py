@@ -85,16 +85,17 @@ def whitened_rows(
 
 def rows_of_fit(columns: Columns, fit: Fit, lengths: Array, joint: int) -> tuple[Array, Array]:
     """Design (rows, parameters) of a fit at a joint, links and then effects in their order, and what it leaves."""
-    matrix, index, base = columns.matrices[joint], columns.index[joint], len(fit.links)
-    scaled = matrix[:, :-1] / lengths[index[:-1]]
-    loading = index[:-1] < base
-    links = scaled[:, loading] @ fit.links[index[:-1][loading]]
-    effects = np.zeros((len(matrix), len(fit.columns)))
-    at = {int(column): place for place, column in enumerate(index[:-1])}
-    for place, column in enumerate(fit.columns):
-        if int(column) in at:
-            effects[:, place] = scaled[:, at[int(column)]]
-    return np.column_stack([links, effects]), matrix[:, -1] - scaled @ fit.coefficients[index[:-1]]
+    matrix, index = columns.matrices[joint], columns.index[joint][:-1]
+    base, rank = fit.links.shape
+    loading, chosen = np.flatnonzero(index < base), np.flatnonzero(np.isin(index, fit.columns))
+    rigid = matrix[:, loading] / lengths[index[loading]]
+    effects = matrix[:, chosen] / lengths[index[chosen]]
+    left = matrix[:, -1] - rigid @ fit.coefficients[index[loading]] - effects @ fit.coefficients[index[chosen]]
+    at = {int(column): rank + place for place, column in enumerate(fit.columns)}
+    design = np.zeros((len(matrix), rank + len(fit.columns)))
+    design[:, :rank] = rigid @ fit.links[index[loading]]
+    design[:, [at[int(column)] for column in index[chosen]]] = effects
+    return design, left
 
 
 def block_numbers(observed: Observed, length_s: float, least: int) -> NDArray[np.intp]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ class Group:
     variant: int
     columns: NDArray[np.intp]
 
-    @property
+    @cached_property
     def place(self) -> Place:
         """The effect and where it is: one group a place at most is in a model."""
         return place_of(self.candidate)

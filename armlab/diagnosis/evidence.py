@@ -23,7 +23,7 @@ from armlab.diagnosis.fitted_model import FittedModel, fit_values, split_fit
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.pushes import make_stretch, reason_no_contact
 from armlab.diagnosis.refine import profile_without
-from armlab.diagnosis.search import Search, contained_groups, rival_formulas
+from armlab.diagnosis.search import Search, rival_formulas
 from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.tuning import EvidenceTuning
 
@@ -299,8 +299,8 @@ class Judge:
         return reason_no_contact(make_stretch(design.observed, joint, windows, torque, creep), lead, tuning)
 
     def simpler(self, group: int) -> tuple[int, ...]:
-        """See `contained_groups`."""
-        return contained_groups(self.model.solver.groups, group)
+        """See `Solver.contained`."""
+        return self.model.solver.contained(group)
 
     def in_place_of(self, group: int) -> set[int]:
         """Groups that take the place of a law that is withdrawn: usual friction, or the likeliest formula."""

@@ -25,20 +25,6 @@ def rival_formulas(groups: Sequence[Group], number: int) -> tuple[int, ...]:
     )
 
 
-def contained_groups(groups: Sequence[Group], number: int) -> tuple[int, ...]:
-    """Numbers of the simpler effects that a group contains and has to be better than."""
-    own = groups[number].candidate
-    return tuple(
-        other
-        for other, each in enumerate(groups)
-        if each.candidate.joint == own.joint
-        and (
-            each.candidate.effect in own.facts.contains
-            or (each.candidate.effect in own.replaces and each.candidate.facts.usual)
-        )
-    )
-
-
 @dataclass(frozen=True)
 class Step:
     """One move of the search, for the log."""
@@ -196,7 +182,7 @@ class Search:
 
     def _without(self, state: State, group: int) -> list[State]:
         """The state without a group; with the usual friction that it contained; without the joint's friction at all."""
-        bare, usual = state.minus(group), contained_groups(self.solver.groups, group)
+        bare, usual = state.minus(group), self.solver.contained(group)
         back = State(tuple(sorted({*bare.groups, *usual})), state.widths)
         free, friction = bare, self._usual_friction(state, self.solver.groups[group].candidate.joint)
         if friction[:1] == [

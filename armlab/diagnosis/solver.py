@@ -73,6 +73,7 @@ class Solver:
         self.precisions = self._precisions(scales)
         self._links: dict[Widths | None, tuple[Array, Array, float, float]] = {}
         self._fits: dict[State, Fit] = {}
+        self._contained: dict[int, tuple[int, ...]] = {}
 
     def _precisions(self, scales: Sequence[float]) -> Array:
         """Prior precision of each scaled column, (size,)."""
@@ -112,6 +113,21 @@ class Solver:
             for other, replaced in enumerate(each.candidate for each in self.groups if candidate.replaces):
                 out[number, other] = replaced.effect in candidate.replaces and replaced.joint == candidate.joint
         return out
+
+    def contained(self, number: int) -> tuple[int, ...]:
+        """Numbers of the simpler effects that a group contains and has to be better than."""
+        if number not in self._contained:
+            own = self.groups[number].candidate
+            self._contained[number] = tuple(
+                other
+                for other, each in enumerate(self.groups)
+                if each.candidate.joint == own.joint
+                and (
+                    each.candidate.effect in own.facts.contains
+                    or (each.candidate.effect in own.replaces and each.candidate.facts.usual)
+                )
+            )
+        return self._contained[number]
 
     def crowd(self, groups: Sequence[int]) -> int:
         """How many unusual effects there are."""
@@ -159,8 +175,8 @@ class Solver:
         parts = [self.groups[group].columns for group in state.groups]
         return np.concatenate(parts).astype(np.intp) if parts else np.empty(0, dtype=np.intp)
 
-    def system(self, state: State) -> tuple[Array, Array, NDArray[np.intp]]:
-        """Matrix of the normal equations, its products with all columns, and the effects' columns."""
+    def system(self, state: State) -> tuple[Array, NDArray[np.intp]]:
+        """Matrix of the normal equations, and the effects' columns."""
         gram = self.moments.gram
         factor, products, precision, _ = self.links(state.widths)
         columns, rank = self._columns(state), factor.shape[1]
@@ -169,17 +185,22 @@ class Solver:
         matrix[:rank, rank:] = products[:, columns]
         matrix[rank:, :rank] = matrix[:rank, rank:].T
         matrix[rank:, rank:] = gram[np.ix_(columns, columns)] + np.diag(self.precisions[columns])
-        return matrix, np.vstack([products, gram[columns]]), columns
+        return matrix, columns
+
+    def products(self, state: State) -> Array:
+        """Products of what a state has in its normal equations with all columns and the torque."""
+        return np.vstack([self.links(state.widths)[1], self.moments.gram[self._columns(state)]])
 
     def _fitted(self, state: State) -> Fit:
-        matrix, products, columns = self.system(state)
-        factor, _, _, price = self.links(state.widths)
+        matrix, columns = self.system(state)
+        factor, products, _, price = self.links(state.widths)
         coefficients = np.zeros(self.moments.size)
         chi_square, inverse = 0.0, np.empty((0, 0))
         if len(matrix):
             inverse = cho_solve(cho_factor(matrix, lower=True), np.eye(len(matrix)))
-            solution = inverse @ products[:, -1]
-            chi_square = float(solution @ products[:, -1])
+            towards = np.concatenate([products[:, -1], self.moments.gram[columns, -1]])
+            solution = inverse @ towards
+            chi_square = float(solution @ towards)
             rank = factor.shape[1]
             coefficients[: self.base] = factor @ solution[:rank]
             coefficients[columns] = solution[rank:]
@@ -190,13 +211,13 @@ class Solver:
 
     def gains(self, state: State) -> Array:
         """How much each group would raise the score, were it added: (groups,)."""
-        matrix, products, _ = self.system(state)
+        matrix, products = self.system(state)[0], self.products(state)
         whole = np.zeros((0, self.moments.size + 1))
         if len(matrix):
             whole = solve_triangular(np.linalg.cholesky(matrix), products, lower=True)
         out = np.empty(len(self.groups))
-        for width, (numbers, columns) in self._by_width.items():
-            out[numbers] = self._gains(whole, columns, width)
+        for width, (numbers, offered) in self._by_width.items():
+            out[numbers] = self._gains(whole, offered, width)
         return out - self.prices - self.tuning.crowd_penalty * self.crowd(state.groups) * self.unusual
 
     @cached_property

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.blocks import block_numbers, held_out_gain
@@ -48,7 +47,7 @@ def predict_in_turn(
     out = np.empty(len(thirds))
     for fold in range(3):
         gram = np.sum(grams, axis=0) - grams[fold] + ridge * np.eye(values.shape[1])
-        weights = solve_positive(gram, np.sum(products, axis=0) - products[fold])
+        weights = np.linalg.solve(gram, np.sum(products, axis=0) - products[fold])
         out[thirds == fold] = values[rows][thirds == fold] @ weights
     return out
 
@@ -64,7 +63,7 @@ def errors_in_turn(
     """Errors of each third where the others have been learnt from, (rows,)."""
     out, whole, towards = target.copy(), np.sum(grams, axis=0), np.sum(products, axis=0)
     for fold in range(3):
-        weights = solve_positive(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
+        weights = np.linalg.solve(whole - grams[fold] + ridge * np.eye(len(whole)), towards - products[fold])
         out[thirds == fold] -= white[thirds == fold] @ weights
     return out
 
@@ -80,16 +79,12 @@ def best_ridge(
     ridges = 10.0 ** np.array(exponents) * sum(float(np.trace(gram)) for gram in grams) / max(count, 1)
     whole, towards, errors = np.sum(grams, axis=0), np.sum(products, axis=0), np.zeros(len(ridges))
     for own, product in zip(grams, products, strict=True):
-        for number, ridge in enumerate(ridges):
-            weights = solve_positive(whole - own + ridge * np.eye(count), towards - product)
-            errors[number] += weights @ own @ weights - 2 * weights @ product
+        values, vectors = np.linalg.eigh(whole - own)
+        turned = vectors.T @ (towards - product)
+        weights = vectors @ (turned[:, None] / (np.maximum(values, 0)[:, None] + ridges))
+        errors += np.sum(weights * (own @ weights), axis=0) - 2 * product @ weights
     best = float(ridges[int(np.argmin(errors))])
-    return best, solve_positive(whole + best * np.eye(count), towards)
-
-
-def solve_positive(matrix: Array, right: Array) -> Array:
-    """Solution of a symmetric positive definite system, by Cholesky's factors."""
-    return np.asarray(cho_solve(cho_factor(matrix, lower=True, check_finite=False), right, check_finite=False))
+    return best, np.linalg.solve(whole + best * np.eye(count), towards)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +263,7 @@ def _important_variables(
 
     def gain(kept: NDArray[np.bool_]) -> float:
         own = gram[np.ix_(kept, kept)] + ridge * np.eye(int(kept.sum()))
-        weights = solve_positive(own, products[kept])
+        weights = np.linalg.solve(own, products[kept])
         return 1 - float(np.sum((target - columns[:, kept] @ weights) ** 2)) / power
 
     whole, lost = gain(np.ones(len(products), dtype=bool)), {}

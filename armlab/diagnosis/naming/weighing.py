@@ -22,7 +22,7 @@ from armlab.diagnosis.evidence import Evidence
 from armlab.diagnosis.fitted_model import FittedModel
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.result import Weighed, WeighedName
-from armlab.diagnosis.search import Search, contained_groups
+from armlab.diagnosis.search import Search
 from armlab.diagnosis.solver import Fit, State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.unknown import flexible_gain, is_structured, predicted_share
@@ -307,7 +307,7 @@ def _in_place(
 def _other_friction(model: FittedModel, without: State, group: int) -> Iterator[_Trial]:
     """Other friction of a law's joint, beside the usual friction whose place the law took."""
     groups = model.solver.groups
-    replaced = {each for each in contained_groups(groups, group) if groups[each].candidate.facts.usual}
+    replaced = {each for each in model.solver.contained(group) if groups[each].candidate.facts.usual}
     if not replaced <= set(without.groups):
         plain = State(tuple(sorted({*without.groups, *replaced})), without.widths)
         for trial in _in_place(model, plain, group, beside=model.state):
