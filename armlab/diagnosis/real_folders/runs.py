@@ -2,19 +2,17 @@
 
 import hashlib
 import json
-import os
 import shutil
-import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
 
 from joblib import Parallel, delayed
 
 from armlab.common.files import write_whole
+from armlab.common.processes import measure_run
 from armlab.common.settings import read_json
 from armlab.diagnosis.real_folders.folders import RecordingFolder
 from armlab.diagnosis.stored import REPOSITORY
@@ -106,23 +104,14 @@ def _run(run: FolderRun) -> tuple[FolderRun, Outcome]:
     shutil.rmtree(run.work, ignore_errors=True)
     run.work.mkdir(parents=True)
     command = [*COMMAND, *run.folder.arguments(), "--out", str(run.verdict_folder.resolve())]
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    start = time.monotonic()
-    with TemporaryFile() as said:
-        child = subprocess.Popen(
-            command, cwd=REPOSITORY, env=environment, stdout=subprocess.DEVNULL, stderr=said, stdin=subprocess.DEVNULL
-        )
-        _, status, usage = os.wait4(child.pid, 0)
-        child.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        complaint = said.read().decode(errors="replace").strip()
+    measured = measure_run(command, REPOSITORY)
     outcome = Outcome(
-        seconds=round(time.monotonic() - start, 2),
-        processor_seconds=round(usage.ru_utime + usage.ru_stime, 2),
-        memory_mb=round(usage.ru_maxrss / (1 << 20 if sys.platform == "darwin" else 1 << 10), 1),
-        failure=_failure(child.returncode, complaint),
+        seconds=round(measured.seconds, 2),
+        processor_seconds=round(measured.processor_seconds, 2),
+        memory_mb=round(measured.memory_bytes / (1 << 20), 1),
+        failure=_failure(measured.status, measured.complaint),
     )
-    if child.returncode >= 0 and child.returncode != STOPPED:  # who was stopped or killed is asked again
+    if measured.status >= 0 and measured.status != STOPPED:  # who was stopped or killed is asked again
         write_whole(run.work / OUTCOME_FILE, json.dumps(asdict(outcome), indent=1) + "\n")
     return run, outcome
 

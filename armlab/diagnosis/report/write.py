@@ -2,7 +2,6 @@
 
 import resource
 import shlex
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, get_args
@@ -10,6 +9,7 @@ from typing import Any, get_args
 from armlab.common.documents import ResultLines
 from armlab.common.errors import DataError, InputError
 from armlab.common.files import write_texts
+from armlab.common.processes import peak_memory_bytes
 from armlab.common.report.page import render_page
 from armlab.common.report.printed_table import table_files
 from armlab.diagnosis.diagnose import diagnose
@@ -158,11 +158,6 @@ def diagnose_recording(
         yield f"corrected: {out / CORRECTED_FOLDER} holds the recording and the robot as they should be"
     if diagnosis.seconds:
         asked = f", {diagnosis.setup_seconds:.1f} s of it how it is to be read" if diagnosis.setup else ""
-        yield f"diagnosed in {diagnosis.seconds:.1f} s once read{asked}; {_peak_memory_gb():.2f} GB of memory at most"
+        memory_gb = peak_memory_bytes(resource.getrusage(resource.RUSAGE_SELF)) / 1e9
+        yield f"diagnosed in {diagnosis.seconds:.1f} s once read{asked}; {memory_gb:.2f} GB of memory at most"
     return make_verdict(diagnosis).content() | {"files": written}
-
-
-def _peak_memory_gb() -> float:
-    """Of this process, GB."""
-    unit = 1 if sys.platform == "darwin" else 1024  # bytes in what the system counts in
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
