@@ -1,55 +1,153 @@
-"""Time of Table 3 beside that of an earlier commit: `python -m tools.time_against COMMIT [ROUNDS]`.
+"""Processor time and memory of this tree beside those of an earlier commit: `python -m tools.time_against COMMIT`.
 
-Both trees run `armlab table3` in one process, in turns, with the libraries of this environment. Printed are seconds of
-processor time, the start of Python included, and the ratio of the least of each: other work on the machine only adds.
+What is timed is `armlab table3` in one process, or with `--diagnose RECORDING...` `armlab diagnose` of each recording,
+whose two verdicts are compared, too. Both trees take turns, with the libraries of this environment. The ratio is that
+of the least times, the start of Python included, as other work on the machine only adds; its range is that of rounds.
 """
 
-import os
-import resource
+import argparse
+import filecmp
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from armlab.common.errors import InputError
+from armlab.common.processes import MeasuredRun, measure_run
+from armlab.common.settings import read_json
+from tools.structure import ROOTS
+from tools.verdicts import first_difference
+
 ROOT = Path(__file__).resolve().parents[1]
 ROUNDS = 3
+VERDICT = "verdict.json"
 
 
-def main(commit: str, rounds: int) -> None:
-    """Prints the times and their ratio. Raises CalledProcessError where git, the build or a run fails."""
-    with TemporaryDirectory() as folder:
-        earlier = Path(folder) / "tree"
-        _run(ROOT, "git", "worktree", "add", "--quiet", "--detach", str(earlier), commit)
-        try:
-            _run(earlier, sys.executable, "setup.py", "--quiet", "build_ext", "--inplace")
-            times = [(_time_table3(earlier, folder), _time_table3(ROOT, folder)) for _ in range(rounds)]
-        finally:
-            _run(ROOT, "git", "worktree", "remove", "--force", str(earlier))
-    before, now = (min(each) for each in zip(*times, strict=True))
-    for first, second in times:
-        print(f"{commit}: {first:.2f} s, this tree: {second:.2f} s")
-    print(f"ratio of the least: {now / before:.2f}")
+@dataclass(frozen=True)
+class TimedCommand:
+    """A command of armlab. words: what it is given, for the folder that it writes into. result: a file to compare."""
+
+    name: str
+    words: Callable[[Path], list[str]]
+    result: str | None = None
 
 
-def _time_table3(tree: Path, folder: str) -> float:
-    """Processor time of one run without anything stored, seconds."""
-    with TemporaryDirectory(dir=folder) as out:
-        places = ["--store", f"{out}/runs.sqlite", "--results", f"{out}/results"]
-        before = _processor_seconds()
-        _run(tree, sys.executable, "-m", "armlab.cli.main", "table3", "--workers", "1", *places)
-        return _processor_seconds() - before
+def main(words: Sequence[str]) -> None:
+    """Prints times, memory and ratios. Raises InputError where git, the build or a run fails."""
+    options = parse_options(words)
+    commands = [diagnosis_of(each, options.as_read) for each in options.diagnose] or [TABLE_3]
+    with TemporaryDirectory() as folder, _tree_of(options.commit, Path(folder)) as earlier:
+        for tree in (earlier, ROOT):  # so that no round compiles
+            _run(tree, sys.executable, "-m", "compileall", "-q", *(each for each in ROOTS if (tree / each).is_dir()))
+        for command in commands:
+            for line in compare(command, earlier, Path(folder), options.rounds):
+                print(line, flush=True)
 
 
-def _processor_seconds() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def parse_options(words: Sequence[str]) -> argparse.Namespace:
+    """`commit`, `diagnose` (folders), `as_read` and `rounds`."""
+    parser = argparse.ArgumentParser(prog="python -m tools.time_against", description=(__doc__ or "").split("\n\n")[1])
+    parser.add_argument("commit", help="what this tree is compared with")
+    parser.add_argument("--diagnose", metavar="RECORDING", nargs="+", type=Path, default=[])
+    parser.add_argument("--as-read", action="store_true", help="of the diagnosis")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    options = parser.parse_args(words)
+    if options.as_read and not options.diagnose:
+        parser.error("--as-read: only with --diagnose")
+    if options.rounds < 1:
+        parser.error("--rounds: at least 1")
+    return options
 
 
-def _run(tree: Path, *command: str) -> None:
-    subprocess.run(
-        command, cwd=tree, env={**os.environ, "PYTHONPATH": str(tree)}, check=True, stdout=subprocess.DEVNULL
-    )
+def _table3_words(out: Path) -> list[str]:
+    return ["table3", "--workers", "1", "--store", str(out / "runs.sqlite"), "--results", str(out / "results")]
+
+
+TABLE_3 = TimedCommand("Table 3", _table3_words)
+
+
+def diagnosis_of(recording: Path, as_read: bool) -> TimedCommand:
+    """`armlab diagnose` of a recording."""
+
+    def words(out: Path) -> list[str]:
+        return ["diagnose", str(recording.resolve()), "--out", str(out), *["--as-read"] * as_read]
+
+    return TimedCommand(recording.resolve().name, words, VERDICT)
+
+
+def compare(command: TimedCommand, earlier: Path, folder: Path, rounds: int) -> Iterator[str]:
+    """Lines about a command in both trees, in turns: each round, then the ratio, then whether results are equal."""
+    times, memory, difference = [], [], None
+    for number in range(1, rounds + 1):
+        with TemporaryDirectory(dir=folder) as out:
+            outs = [Path(out) / "before", Path(out) / "now"]
+            before, now = (_measure(command, *each) for each in zip((earlier, ROOT), outs, strict=True))
+            if command.result and difference is None:
+                difference = first_difference(*(read_json(each / command.result) for each in outs))
+        times.append((before.processor_seconds, now.processor_seconds))
+        memory.append((before.memory_bytes / 1e6, now.memory_bytes / 1e6))
+        yield f"{command.name}, round {number}: before {_figures(before)}, now {_figures(now)}"
+    yield f"{command.name}: processor time {describe_ratio(times)}; peak memory {describe_ratio(memory)}"
+    if command.result:
+        yield f"{command.name}: verdicts are equal" if difference is None else f"{command.name}: differs: {difference}"
+
+
+def describe_ratio(pairs: Sequence[tuple[float, float]]) -> str:
+    """The ratio of the least now to the least before, and the range over the rounds, each (before, now)."""
+    ratios = [now / before for before, now in pairs]
+    least = min(now for _, now in pairs) / min(before for before, _ in pairs)
+    return f"{least:.2f} of before ({min(ratios):.2f} to {max(ratios):.2f})"
+
+
+def _figures(run: MeasuredRun) -> str:
+    return f"{run.processor_seconds:.2f} s {run.memory_bytes / 1e6:.0f} MB"
+
+
+def _measure(command: TimedCommand, tree: Path, out: Path) -> MeasuredRun:
+    return _run(tree, sys.executable, "-m", "armlab.cli.main", *command.words(out))
+
+
+def _run(tree: Path, *command: str) -> MeasuredRun:
+    run = measure_run(command, tree)
+    if run.status != 0:
+        raise InputError(f"{' '.join(command)}: {run.complaint or f'ended with status {run.status}'}")
+    return run
+
+
+@contextmanager
+def _tree_of(commit: str, folder: Path) -> Iterator[Path]:
+    """A work tree of a commit, with its compiled extensions; it is taken away at the end."""
+    tree = folder / "tree"
+    _run(ROOT, "git", "worktree", "add", "--quiet", "--detach", str(tree), commit)
+    try:
+        if not take_over_extensions(ROOT, tree):
+            _run(tree, sys.executable, "setup.py", "--quiet", "build_ext", "--inplace")
+        yield tree
+    finally:
+        subprocess.run(["git", "worktree", "remove", "--force", str(tree)], cwd=ROOT, check=True)
+
+
+def take_over_extensions(built: Path, tree: Path) -> bool:
+    """Copies the compiled extensions of a built tree into another one; False where some are not of the same sources."""
+    found = []
+    for script in tree.rglob("*_build.py"):
+        name, place = script.name.removesuffix("_build.py"), script.parent.relative_to(tree)
+        extension = next((built / place).glob(f"_{name}.*.so"), None)
+        _, other, missing = filecmp.cmpfiles(built / place, script.parent, [script.name, f"{name}.c"], shallow=False)
+        if extension is None or other or missing:
+            return False
+        found.append((extension, script.parent))
+    for extension, folder in found:
+        shutil.copy2(extension, folder)
+    return True
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else ROUNDS)
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        sys.exit(f"time_against: {error}")
