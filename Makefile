@@ -6,7 +6,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure table3-time diagnosis-time speed regression fuzz hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure table3-time diagnosis-time profile speed regression fuzz hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -116,6 +116,9 @@ table3-time: .venv/dev ## time of Table 3 beside that of an earlier commit: make
 
 diagnosis-time: .venv/dev ## time, memory and verdict of diagnoses beside those of an earlier commit: BEFORE=COMMIT RECORDING=FOLDERS [AS_READ=1]
 	$(BIN)/python -m tools.time_against $(BEFORE) --diagnose $(RECORDING) $(if $(AS_READ),--as-read)
+
+profile: .venv/dev ## where the seconds of a diagnosis go, by stage and by function: RECORDING=FOLDER [AS_READ=1]
+	$(BIN)/python -m tools.profile_diagnosis $(RECORDING) $(if $(AS_READ),--as-read)
 
 structure: .venv/dev ## figures of the source tree: files, lines, modules that a diagnosis loads
 	$(BIN)/python tools/structure.py

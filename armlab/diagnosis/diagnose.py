@@ -174,6 +174,7 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
     named, added = _with_probable(named)
     progress("fitting the model that predicts")
     prediction = with_possible_bodies(fit_prediction(named.model))
+    progress("stating numbers")
     tuning = named.model.design.settings.tuning
     remains = [each for each in named.left if is_structured(each, tuning)]
     model, effects = unclaim_implausible(*claim_expected_parts(named.model, named.effects, prediction), remains)
