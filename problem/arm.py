@@ -6,7 +6,7 @@ is `before @ motion(q) @ after`. Standard D-H (motion first, then a and alpha), 
 first) and URDF (an origin and any axis) are three ways to write this.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -44,6 +44,14 @@ class Joint:
         motion = rotation_z(position) if turn else translation(0, 0, position)
         return self.before @ motion @ self.after
 
+    def counted_from(self, position: float) -> "Joint":
+        """The joint whose link stands at `position`, rad or m, where that of this one stands at zero."""
+        if not position:
+            return self
+        turn = self.kind == "revolute"
+        back = rotation_z(-position) if turn else translation(0, 0, -position)
+        return replace(self, before=self.before @ back)
+
 
 @dataclass(frozen=True)
 class Link:
@@ -59,11 +67,28 @@ class Link:
         return np.array([self.mass, *self.first_moment, *self.inertia])
 
 
+@dataclass(frozen=True)
+class JointLaw:
+    """What a simulator's joint has beside the links and rotors; SI units, for a slide N, m in place of N m, rad.
+
+    The drive has to give damping qd + friction sgn(qd) + stiffness (q - rest). drive_compensates: the drive itself, not
+    the simulator beside it, gives the torque that compensates gravity (see `Arm.compensated`).
+    """
+
+    damping: float = 0.0
+    friction: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    drive_compensates: bool = False
+
+
 @dataclass(frozen=True, eq=False)
 class Arm:
     """A serial arm; `links` is None where its inertial parameters are unknown.
 
-    gravity: (3,), m/s2, in the base frame. rotor_inertia: one a joint, kg m2 (kg) on the joint side.
+    gravity: (3,), m/s2, in the base frame. rotor_inertia: one a joint, kg m2 (kg) on the joint side. joint_laws: what
+    the file of a simulator says of each joint; empty where it says nothing. compensated: of each link the masses whose
+    weight the simulator carries; empty where it carries none.
     """
 
     name: str
@@ -71,6 +96,8 @@ class Arm:
     links: tuple[Link, ...] | None = None
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     rotor_inertia: tuple[float, ...] = ()
+    joint_laws: tuple[JointLaw, ...] = ()
+    compensated: tuple[Link, ...] = ()
 
     def __repr__(self) -> str:
         """Joints, what is known of the links, and how many joints have limits."""
@@ -104,8 +131,14 @@ class Arm:
 
     def first(self, joints: int) -> "Arm":
         """The arm with its first `joints` joints only; the later joints and links are removed, not locked."""
-        links = self.links[:joints] if self.links is not None else None
-        return Arm(self.name, self.joints[:joints], links, self.gravity, self.rotor_inertia[:joints])
+        return replace(
+            self,
+            joints=self.joints[:joints],
+            links=self.links[:joints] if self.links is not None else None,
+            rotor_inertia=self.rotor_inertia[:joints],
+            joint_laws=self.joint_laws[:joints],
+            compensated=self.compensated[:joints],
+        )
 
 
 def link_poses(arm: Arm, positions: Array) -> list[Array]:

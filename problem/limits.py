@@ -6,9 +6,9 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from problem.arm import Arm, Limits, body_points
+from problem.drive_torque import drive_torque
 from problem.kernel import lib, pointer
 from problem.motion import Motion
-from problem.regressor import rigid_body_torque
 from problem.trajectories import Excitation
 
 
@@ -82,12 +82,6 @@ class Constraints:
             points = body_points(self.arm, motion.position, np.array(self.workspace.tool))
             columns.append(self.workspace.excess(points)[:, None])
         return np.asarray(np.maximum(np.concatenate(columns, axis=1), 0.0))
-
-
-def drive_torque(arm: Arm, motion: Motion) -> Array:
-    """Torque (..., samples, joints) that the drives give: the rigid links and the rotors, N m (N)."""
-    torque = rigid_body_torque(arm, motion)
-    return torque + motion.acceleration * np.array(arm.rotor_inertia) if arm.rotor_inertia else torque
 
 
 def peaks(motion: Motion) -> Array:

@@ -9,8 +9,9 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from problem.arm import Arm, Joint, Limits, Link
+from problem.arm import Arm, Joint, JointLaw, Limits, Link
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
+from problem.mjcf_laws import is_disabled, read_joint_laws, read_rotors
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, translation, turn_z_to
 
@@ -66,11 +67,12 @@ def written_mjcf(spec: Any, source: Path) -> str:
 
 
 def read_mjcf(path: Path) -> Arm:
-    """The arm of an MJCF file: a chain of hinges and slides on a fixed base.
+    """The arm of an MJCF file: a chain of hinges and slides on a fixed base, with what the file says of its joints.
 
-    Raises InputError, in one line, for a free or ball joint, two joints on a body, and a file that MuJoCo refuses; for
-    a branch or an equality constraint an UndecidedError with the bodies where an arm may end, if there are any.
-    Actuators, damping and friction are no part of an arm.
+    Joint laws, armature and the weight that MuJoCo compensates count as `mj_inverse` has them; contacts, limits and the
+    forces of actuators are no part of an arm. Raises InputError, in one line, for a free or ball joint, for what has no
+    place in an arm (see `read_joint_laws`), and for a file that MuJoCo refuses; for a branch or an equality
+    constraint an UndecidedError with the bodies where an arm may end, if there are any.
     """
     return arm_of(compile_mjcf(path), path)
 
@@ -79,21 +81,55 @@ def arm_of(model: Any, path: Path) -> Arm:
     """The arm of a mujoco.MjModel; path: of its file, for messages. Raises InputError as `read_mjcf`."""
     if model.njnt == 0:
         raise InputError(f"{path} has no joint")
-    if model.neq:
-        raise mjcf_tree(model, path).refuse(
-            f"{path}: equality constraints (closed chains, mimic joints) are not supported"
-        )
+    _refuse_constraints(model, path)
     joints: list[Joint] = []
     for body, carrier, pose in _walk_bodies(model):
-        if model.body_jntnum[body]:
-            if carrier != len(joints):
-                name = model.joint(int(model.body_jntadr[body])).name
-                raise mjcf_tree(model, path).refuse(f"{path}, joint '{name}': a second branch of moving joints")
-            joints.append(_joint(model, body, pose, path))
-    links = [link_from_pseudo_inertia(np.sum([each.seen for each in own], axis=0)) for own in carried_bodies(model)]
-    gravity = tuple(model.opt.gravity.tolist())
-    rotors = tuple(float(model.dof_armature[joint]) for joint in range(model.njnt))
-    return Arm(path.stem, tuple(joints), tuple(links), gravity, rotors)
+        numbers = joints_of_body(model, body)
+        if numbers and carrier != len(joints):
+            name = model.joint(numbers[0]).name
+            raise mjcf_tree(model, path).refuse(f"{path}, joint '{name}': a second branch of moving joints")
+        for number in numbers:
+            joints.append(_joint(model, number, pose, path))
+            pose = np.eye(4)
+    groups = carried_bodies(model)
+    laws = read_joint_laws(model, path)
+    compensated = tuple(_compensated(model, own) for own in groups)
+    is_compensated = any(link.mass for link in compensated)
+    return Arm(
+        name=path.stem,
+        joints=tuple(joints),
+        links=tuple(link_from_pseudo_inertia(_sum_of(own)) for own in groups),
+        gravity=(0.0, 0.0, 0.0) if is_disabled(model, "GRAVITY") else tuple(model.opt.gravity.tolist()),
+        rotor_inertia=read_rotors(model),
+        joint_laws=laws if is_compensated or any(law != JointLaw() for law in laws) else (),
+        compensated=compensated if is_compensated else (),
+    )
+
+
+def _sum_of(carried: "tuple[CarriedBody, ...]") -> Array:
+    return np.asarray(np.sum([np.zeros((4, 4)), *(each.seen for each in carried)], axis=0))
+
+
+def _compensated(model: Any, carried: "tuple[CarriedBody, ...]") -> Link:
+    """The masses that a joint carries whose weight the simulator holds, as a link without inertia."""
+    parts = [float(model.body_gravcomp[each.number]) * each.seen[3] for each in carried]
+    x, y, z, mass = np.sum([np.zeros(4), *parts], axis=0).tolist()
+    return Link(mass, (x, y, z), (0.0,) * 6)
+
+
+def _refuse_constraints(model: Any, path: Path) -> None:
+    """Raises InputError for active equality constraints: what they tie can be locked, or is no chain."""
+    if is_disabled(model, "EQUALITY", "CONSTRAINT"):
+        return
+    kinds = import_mujoco().mjtEq
+    for number in np.flatnonzero(model.eq_active0).tolist():
+        name, kind = model.equality(number).name, int(model.eq_type[number])
+        what = f"{path}, equality constraint {repr(name) if name else number + 1}"
+        tree = mjcf_tree(model, path)
+        if kind == kinds.mjEQ_JOINT:
+            tied = model.joint(int(model.eq_obj1id[number])).name
+            raise tree.refuse(f"{what}: a joint of the arm, '{tied}', that follows another one is not supported")
+        raise tree.refuse(f"{what}: closed chains are not supported")
 
 
 def mjcf_tree(model: Any, path: Path) -> KinematicTree:
@@ -101,7 +137,7 @@ def mjcf_tree(model: Any, path: Path) -> KinematicTree:
     joints: list[TreeJoint] = []
     for body in range(1, model.nbody):
         name, link = model.body(body).name, model.body(int(model.body_parentid[body])).name
-        own = range(int(model.body_jntadr[body]), int(model.body_jntadr[body]) + int(model.body_jntnum[body]))
+        own = joints_of_body(model, body)
         for joint in own:
             child = name if joint == own[-1] else f"{name}, joint {joint}"
             joints.append(_tree_joint(model, joint, link, child))
@@ -132,8 +168,17 @@ def _follower(model: Any, joint: int) -> Follower | None:
     return None
 
 
+def joints_of_body(model: Any, body: int) -> range:
+    """The numbers of the joints of a body."""
+    first = int(model.body_jntadr[body])
+    return range(first, first + int(model.body_jntnum[body]))
+
+
 def _walk_bodies(model: Any) -> Iterator[tuple[int, int, Array]]:
-    """Each body with the number of the joint before it (0: none), and its pose in the frame of that joint's body."""
+    """Each body with the number of the joint before it (0: none), and its pose in the frame of that joint's body.
+
+    Several joints of a body count each: the body belongs to the last one, and the others carry nothing.
+    """
     carried: dict[int, tuple[int, Array]] = {0: (0, np.eye(4))}
     jointed = 0
     for body in range(1, model.nbody):
@@ -141,7 +186,7 @@ def _walk_bodies(model: Any) -> Iterator[tuple[int, int, Array]]:
         pose = pose @ _pose(model.body_pos[body], model.body_quat[body])
         yield body, carrier, pose
         if model.body_jntnum[body]:
-            jointed += 1
+            jointed += int(model.body_jntnum[body])
             carrier, pose = jointed, np.eye(4)
         carried[body] = carrier, pose
 
@@ -162,7 +207,8 @@ def carried_bodies(model: Any) -> tuple[tuple[CarriedBody, ...], ...]:
     groups: list[list[CarriedBody]] = []
     for body, carrier, pose in _walk_bodies(model):
         if model.body_jntnum[body]:
-            groups.append([CarriedBody(body, body_inertia(model, body))])
+            groups += [[] for _ in joints_of_body(model, body)]
+            groups[-1].append(CarriedBody(body, body_inertia(model, body)))
         elif carrier:
             groups[carrier - 1].append(CarriedBody(body, transform_pseudo_inertia(body_inertia(model, body), pose)))
     return tuple(tuple(own) for own in groups)
@@ -175,17 +221,21 @@ def _pose(position: Array, quaternion: Array) -> Array:
     return pose
 
 
-def _joint(model: Any, body: int, pose: Array, path: Path) -> Joint:
-    """The joint of a body whose pose in the frame of the link before is given."""
-    number = int(model.body_jntadr[body])
+def _joint(model: Any, number: int, pose: Array, path: Path) -> Joint:
+    """A joint. pose: of its body, or of the frame that the joint before it on that body turns, in the link before.
+
+    The body stands as the file has it where the joint is at its reference position, `ref`.
+    """
     name, kind = model.joint(number).name, int(model.jnt_type[number])
     if kind not in MOVING_KINDS:
-        raise InputError(f"{path}, joint '{name}': only hinge and slide joints on a fixed base are supported")
-    if model.body_jntnum[body] > 1:
-        raise InputError(f"{path}, body '{model.body(body).name}': more than one joint on a body is not supported")
+        raise InputError(
+            f"{path}, joint '{name}': only hinge and slide joints on a fixed base are supported: "
+            f"hold it still with --lock {name}=0 of `armlab recording import`"
+        )
     frame = translation(*model.jnt_pos[number]) @ turn_z_to(model.jnt_axis[number])
     bounds = tuple(model.jnt_range[number].tolist()) if model.jnt_limited[number] else (-np.inf, np.inf)
-    return Joint(name, MOVING_KINDS[kind], pose @ frame, inverse(frame), Limits(position=bounds))  # type: ignore[arg-type]
+    own = Joint(name, MOVING_KINDS[kind], pose @ frame, inverse(frame), Limits(position=bounds))  # type: ignore[arg-type]
+    return own.counted_from(float(model.qpos0[model.jnt_qposadr[number]]))
 
 
 def body_inertia(model: Any, body: int) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from problem.arm import Arm, Joint, Link
+from problem.arm import Arm, Joint, JointLaw, Link
 from problem.kinematic_tree import KinematicTree
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, turn_z_to
@@ -113,6 +113,7 @@ def _assemble(
 ) -> UrdfChain:
     """Follows the tree: `pose` of each URDF link in the frame of the moving link that carries it (0: the base)."""
     moving: list[Joint] = []
+    laws: list[JointLaw] = []
     nodes: list[ElementTree.Element] = []
     groups: list[list[CarriedLink]] = []
     base = next(link for link in links if link not in {joint.end("child") for joint in chain})
@@ -123,6 +124,7 @@ def _assemble(
         child = joint.end("child")
         if joint.kind in MOVING_KINDS:
             moving.append(_joint(joint, origin))
+            laws.append(joint.law)
             nodes.append(joint.node)
             groups.append([])
             carrier, origin = len(moving), np.eye(4)
@@ -133,7 +135,8 @@ def _assemble(
     sums = [np.sum([each.seen for each in own], axis=0) for own in groups]
     known = any(np.any(inertia) for inertia in sums)
     bodies = tuple(link_from_pseudo_inertia(inertia) for inertia in sums) if known else None
-    arm = Arm(str(root.get("name") or name), tuple(moving), bodies)
+    stated = tuple(laws) if any(law != JointLaw() for law in laws) else ()
+    arm = Arm(str(root.get("name") or name), tuple(moving), bodies, joint_laws=stated)
     return UrdfChain(root, arm, tuple(nodes), tuple(tuple(own) for own in groups))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.xml_text import parse_xml_text
-from problem.arm import Limits
+from problem.arm import JointLaw, Limits
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
 from problem.transforms import inverse, roll_pitch_yaw, rotation_z, translation, turn_z_to
 
@@ -69,6 +69,15 @@ class UrdfElement:
         if not np.any(axis):
             raise InputError(f"{self.where}: axis xyz should not be zero")
         return axis
+
+    @property
+    def law(self) -> JointLaw:
+        """Damping and friction of a joint; InputError for numbers that are negative."""
+        damping, friction = (float(self.numbers("dynamics", key, "0", 1)[0]) for key in ("damping", "friction"))
+        for key, value in (("damping", damping), ("friction", friction)):
+            if value < 0:
+                raise InputError(f"{self.where}: dynamics {key}={value:g} should not be negative")
+        return JointLaw(damping, friction)
 
     @property
     def limits(self) -> Limits:

@@ -75,6 +75,8 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     own = np.zeros(model.moments.size)
     own[columns] = coefficients
     rivals = tuple(Rival(name, candidate.joint, candidate.joints, True) for name in candidate.identical)
+    present = model.design.simulation.coefficients_of(candidate)
+    simulated = candidate.parameters(present) if present.any() else {}
     return Claim(
         effect=candidate.effect,
         joint=candidate.joint,
@@ -89,6 +91,7 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
         coefficients=coefficients,
         covariance=covariance,
         group=place,
+        simulated={name: value for name, value in simulated.items() if isinstance(value, float)},
     )
 
 

@@ -68,8 +68,9 @@ class DesignMatrix:
         """Moments and solver under a noise model."""
         found, groups = compute_moments(self.columns, noise, self.observed), self.columns.groups
         scales = [group.candidate.prior_scale(self.simulation.inertial) for group in groups]
+        simulated = [self.simulation.coefficients_of(group.candidate) for group in groups]
         tuning = self.settings.tuning.solver
-        return found, Solver(found, groups, len(self.base), self.prior, self.places, scales, tuning)
+        return found, Solver(found, groups, len(self.base), self.prior, self.places, scales, simulated, tuning)
 
     def block(self, candidate: Candidate, variant: int) -> Block:
         """A candidate's filtered columns."""

@@ -199,8 +199,7 @@ class Judge:
         for group in state.groups:
             candidate = solver.groups[group].candidate
             values = solver.values(fit, group)
-            objection = candidate.absurdity(values)
-            objection = objection or candidate.objection(values, self._covariance(fit, spread, group))
+            objection = solver.objection(group, values, self._covariance(fit, spread, group))
             tested = max(self._tested(fit, spread, group), self._in_wider_links(group))
             evidence = self._against(state.minus(group), (tested, self.looks(group)), candidate.rows, -losses[group])
             if self.simpler(group) and not self._in_place_of_usual(group):

@@ -58,11 +58,16 @@ class Entry(BaseModel):
 
 
 class ParameterEntry(Entry):
-    """A parameter in SI units with its 95 % interval: one pair, or one for each component of a vector."""
+    """A parameter in SI units with its 95 % interval: one pair, or one for each component of a vector.
+
+    value: what has to be added to the simulation; of the servo of a recording of motion only, the number itself.
+    simulation: what the simulation has already, where it has a law of this kind there.
+    """
 
     value: Value
     ci95: tuple[Value, ...] | None
     unit: str
+    simulation: float | None = None
 
 
 class WhereEntry(Entry):

@@ -78,6 +78,8 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: b
         candidate = model.solver.groups[group].candidate.first_name(coefficients, model.design.scenes)
         covariance = wide.covariance(group)
         values = parameter_values(candidate, coefficients, covariance, wide.factor)
+        if model.solver.simulated[group].any():
+            values = tuple(map(_as_difference, values))
         known = evidence.score >= tuning.overwhelming_evidence and evidence.gain >= tuning.overwhelming_gain
         reason = reason_implausible(candidate, values, observed, known=known, exact=exact, tuning=tuning)
         if len(coefficients) == 1 and abs(coefficients[0]) <= wide.factor * np.sqrt(covariance[0, 0]):
@@ -85,6 +87,14 @@ def doubtful_names(model: FittedModel, effects: dict[int, Evidence], *, exact: b
         if reason is not None:
             out[group] = reason
     return out
+
+
+def _as_difference(each: ParameterValue) -> ParameterValue:
+    """A scalar that takes off what the simulation has of a law, by its size: the difference has either sign."""
+    ends = _interval(each)
+    if isinstance(each.value, tuple) or each.value >= 0 or ends is None:
+        return each
+    return replace(each, value=-each.value, interval=(-ends[1], -ends[0]))
 
 
 def links_that_data_tell(

@@ -77,7 +77,8 @@ class Claim:
     joints), N m, its torque at the kept rows. depends_on: variables of an unknown. in_links: whether the links of the
     model found hold it already. group: its number in the model that predicts. weighed: names that it could have.
     probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
-    left_out: the part of its torque that the model found does not predict.
+    left_out: the part of its torque that the model found does not predict. simulated: its scalar parameters as the
+    simulation has them, where it has a law of this kind there, to which the finding adds.
     """
 
     effect: str
@@ -99,6 +100,7 @@ class Claim:
     probability: float | None = None
     members: tuple[Member, ...] = ()
     left_out: Array | float = 0.0
+    simulated: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

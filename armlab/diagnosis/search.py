@@ -159,9 +159,7 @@ class Search:
         if not self.settings.guards.physics_signs:
             return None
         fit = self.solver.fit(state)
-        candidate = self.solver.groups[group].candidate
-        values, covariance = self.solver.values(fit, group), self.solver.covariance(fit, group)
-        return candidate.absurdity(values) or candidate.objection(values, covariance)
+        return self.solver.objection(group, self.solver.values(fit, group), self.solver.covariance(fit, group))
 
     def _backward(self, state: State) -> Iterator[tuple[str, State]]:
         if not self.settings.guards.backward_elimination or not state.groups:

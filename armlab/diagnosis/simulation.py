@@ -6,11 +6,14 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.diagnosis.columns import place_of
 from armlab.diagnosis.data import Observed
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.tuning import SoundnessTuning
+from armlab.effects.contract import Candidate
 from armlab.effects.scene import Scene, scene_of
 from armlab.identification.model_file import read_model
+from armlab.identification.nominal import nominal_model
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Recording, Run
@@ -22,7 +25,7 @@ from problem.regressor import rigid_body_torque
 @dataclass(frozen=True, eq=False)
 class Simulation:
     """kind: the baseline. inertial: (10 * joints,) of its links, None where there are none. model: its friction
-    and other terms, None for a plain robot file.
+    and other terms, None for a robot file that states links and rotors alone.
     """
 
     kind: Baseline
@@ -36,6 +39,14 @@ class Simulation:
         parts = () if self.model is None else self.model.structure.components
         known = {each.joints[0] for each in parts if each.is_friction}
         return frozenset(range(1, len(self.arm) + 1)) - known
+
+    def coefficients_of(self, candidate: Candidate) -> Array:
+        """Coefficients of a law as the simulation has it already at its place, zeros where it has none."""
+        out = np.zeros(candidate.size)
+        for each in () if self.model is None else self.model.effects:
+            if place_of(each.candidate) == place_of(candidate) and len(each.coefficients) == len(out):
+                out = out + each.coefficients
+        return out
 
     def torque(self, scene: Scene) -> Array:
         """Simulated torque of the motion of a scene, (samples, joints); zeros where there is no simulation."""
@@ -76,7 +87,9 @@ def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulati
         raise InputError(f"--baseline simulated: not every run of {recording.name} has columns of simulated_torque")
     arm = recording.arm
     if recording.simulation is None:
-        return Simulation(kind, arm, arm.parameters if arm.links is not None else None)
+        return Simulation(
+            kind, arm, arm.parameters if arm.links is not None else None, nominal_model(arm, recording.robot)
+        )
     model = read_model(recording.simulation)
     if len(model.arm) != len(arm):
         joints = f"{len(model.arm)} joints, the recording {len(arm)}"

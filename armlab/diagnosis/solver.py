@@ -56,6 +56,7 @@ class Solver:
     """Solves and scores states. groups: of the columns. prior: None where there is no nominal model.
 
     places: number of places that are looked at, the factor of the correction. scales: of each group's coefficients.
+    simulated: the coefficients that the simulation has of each group's law already, to which what is fitted adds.
     """
 
     def __init__(
@@ -66,10 +67,11 @@ class Solver:
         prior: LinkPrior | None,
         places: int,
         scales: Sequence[float],
+        simulated: Sequence[Array],
         tuning: SolverTuning,
     ) -> None:
         self.moments, self.groups, self.base, self.prior, self.places = moments, groups, base, prior, places
-        self.tuning = tuning
+        self.simulated, self.tuning = simulated, tuning
         self.precisions = self._precisions(scales)
         self._links: dict[Widths | None, tuple[Array, Array, float, float]] = {}
         self._fits: dict[State, Fit] = {}
@@ -81,6 +83,11 @@ class Solver:
         for group, scale in zip(self.groups, scales, strict=True):
             out[group.columns] += 1 / (scale * self.moments.lengths[group.columns]) ** 2
         return out
+
+    def objection(self, group: int, values: Array, covariance: Array) -> str | None:
+        """What physics says against a group with these coefficients beside those of the simulation."""
+        candidate = self.groups[group].candidate
+        return candidate.absurdity(values) or candidate.objection(values + self.simulated[group], covariance)
 
     @cached_property
     def prices(self) -> Array:

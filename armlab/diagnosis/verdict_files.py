@@ -136,7 +136,7 @@ def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
         joint=claim.joint,
         joints=claim.joints,
         form=None if claim.candidate is None else claim.candidate.form or None,
-        parameters={each.name: _finding_parameter(each) for each in claim.parameters},
+        parameters={each.name: _finding_parameter(each, claim) for each in claim.parameters},
         equation=claim.equation,
         heldout_rms_before=claim.evidence.rms_before,
         heldout_rms_after=claim.evidence.rms_after,
@@ -152,9 +152,11 @@ def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
     return entry.model_copy(update={"class_": members}) if members else entry
 
 
-def _finding_parameter(each: ParameterValue) -> ParameterEntry:
+def _finding_parameter(each: ParameterValue, claim: Claim) -> ParameterEntry:
     value = each.value if isinstance(each.value, tuple) else _finite(each.value)
-    return ParameterEntry(value=value, ci95=each.interval, unit=each.unit)
+    entry = ParameterEntry(value=value, ci95=each.interval, unit=each.unit)
+    known = claim.simulated.get(each.name)
+    return entry if known is None else entry.model_copy(update={"simulation": known})
 
 
 def _finite(value: float) -> float:

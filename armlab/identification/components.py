@@ -6,6 +6,7 @@ from armlab.effects.contract import Candidate
 from armlab.effects.coupling import JointCoupling
 from armlab.effects.drive import RotorInertia, TorqueOffset
 from armlab.effects.friction import CoulombFriction, ViscousFriction
+from armlab.effects.springs import LinearSpring
 from armlab.effects.term import Term
 from problem.arm import Arm
 
@@ -22,6 +23,7 @@ def wrist_couplings(arm: Arm) -> tuple[Candidate, ...]:
 
 
 def usual_components(arm: Arm) -> tuple[Candidate, ...]:
-    """What every real arm has: viscous and Coulomb friction, rotor inertia, offset."""
+    """What every real arm has (friction, rotor inertia, offset), and springs where the file of the arm has them."""
     laws = (ViscousFriction, CoulombFriction, RotorInertia, TorqueOffset)
-    return tuple(part for law in laws for part in every_joint(arm, law))
+    springs = tuple(LinearSpring.at(arm, joint) for joint, law in enumerate(arm.joint_laws, 1) if law.stiffness)
+    return (*(part for law in laws for part in every_joint(arm, law)), *springs)

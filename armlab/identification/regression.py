@@ -13,6 +13,7 @@ from armlab.recordings.cutoff import ROWS_PER_CUTOFF, choose_cutoff
 from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Butterworth, LowPass
 from armlab.recordings.recording import Run
+from problem.drive_torque import compensation_torque
 
 MAX_CUTOFF_SHARE = 0.45  # of the sampling rate: cut-offs
 
@@ -101,14 +102,21 @@ def suggested_cutoff(run: Run) -> float:
     return choose_cutoff(even.position, even.rate_hz, Butterworth).cutoff_hz
 
 
+def _target(structure: Structure, signals: Signals) -> Array:
+    return np.asarray(signals.torque + signals.filter(compensation_torque(structure.arm, signals.motion)))
+
+
 def regression(structure: Structure, signals: Sequence[Signals]) -> Regression:
-    """The regression of one or more runs; ValueError for runs of another arm or without any rows."""
+    """The regression of one or more runs; ValueError for runs of another arm or without any rows.
+
+    The weight that the simulator of the arm holds itself, which no column has, is added to the torque of the drives.
+    """
     joints = len(structure.arm)
     wrong = [each.run.name for each in signals if each.motion.joints != joints]
     if wrong or not signals:
         raise DataError(f"{wrong[0]} does not have the {joints} joints of {structure.arm.name}" if wrong else "no run")
     matrix = np.vstack([structure.filtered(each) for each in signals])
-    torque = np.concatenate([each.torque.ravel() for each in signals])
+    torque = np.concatenate([_target(structure, each).ravel() for each in signals])
     first = signals[0]
     rate = 1 / float(np.median(np.diff(first.time)))
     cutoff = first.filter.cutoff_hz if isinstance(first.filter, LowPass) else rate / 2

@@ -17,6 +17,7 @@ from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Run
 from problem.arm import Arm
+from problem.drive_torque import compensation_torque
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -98,7 +99,7 @@ class TorqueModel:
 
     def _rigid_scene(self, scene: Scene) -> Scene:
         rigid = rigid_body_torque(self.arm, scene.motion, self.links)
-        return replace(scene, inertial=self.links, torque=rigid)
+        return replace(scene, inertial=self.links, torque=rigid - compensation_torque(self.arm, scene.motion))
 
     def filtered_torque(self, signals: Signals) -> Array:
         """Torque that passed the filter of the recorded one, (kept, joints)."""

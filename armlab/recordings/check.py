@@ -32,6 +32,7 @@ from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, R
 from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm
 from problem.joint_words import joint_in_words
+from problem.simulator_check import check_with_mujoco
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
 
@@ -192,13 +193,17 @@ def check_recording(folder: Path) -> CheckResult:
         motions, refused = _read_runs(lambda entry: load_motion_runs(moved, file, entry), file)
         recording = with_motion_runs(moved, motions)
         answers = check_answers(motions, recording.arm) if motions else ()
-        findings = _collect_findings(recording, recording.recorded_arm, (*recording.findings, *answers))
+        beside = _compare_with_simulator(recording, with_actuators=recording.controller is None)
+        findings = _collect_findings(recording, recording.recorded_arm, (*recording.findings, *beside, *answers))
         return CheckResult(recording, tuple(findings), refused)
     empty, file = open_recording(folder)
     runs, refused = _read_runs(lambda entry: load_runs(empty, file, entry), file)
     whole = with_runs(empty, runs)
     geometry = _check_geometry(whole) if runs else ()
-    return CheckResult(whole, tuple(_collect_findings(whole, whole.arm, (*whole.findings, *geometry))), refused)
+    beside = _compare_with_simulator(whole, with_actuators=False)
+    return CheckResult(
+        whole, tuple(_collect_findings(whole, whole.arm, (*whole.findings, *beside, *geometry))), refused
+    )
 
 
 def _read_runs(
@@ -225,6 +230,22 @@ def _collect_findings(
         reported.update((run.file, finding) for finding in run.findings)
         yield from ((run.name, finding) for finding in check_channels(run, arm))
     yield from (("all runs", finding) for finding in whole)
+
+
+def _compare_with_simulator(recording: Recording | MotionRecording, with_actuators: bool) -> tuple[Finding, ...]:
+    """Whether the torque of an MJCF is MuJoCo's own, and what of the file is left out; nothing of other robots.
+
+    with_actuators: whether those of the file are the drives.
+    """
+    path = recording.folder / recording.robot
+    if path.suffix != ".xml":
+        return ()
+    found = check_with_mujoco(path, with_actuators)
+    text = f"the torque of {recording.robot} is that of MuJoCo to {found.difference:.1g} of the largest"
+    if not found.agrees:
+        text = f"the torque of {recording.robot} differs from MuJoCo's by {found.difference:.2g} of the largest"
+    text += f"; left out: {'; '.join(found.left_out)}" if found.left_out else ""
+    return (Finding("simulator", "note" if found.agrees else "warning", text),)
 
 
 def _check_geometry(recording: Recording) -> tuple[Finding, ...]:

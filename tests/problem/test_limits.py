@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from problem.arm import Arm, Joint, Limits, Link
-from problem.limits import Constraints, Workspace, drive_torque, peaks
+from problem.drive_torque import drive_torque
+from problem.limits import Constraints, Workspace, peaks
 from problem.motion import Motion
 from problem.trajectories import Excitation
 from problem.transforms import translation

@@ -168,11 +168,13 @@ def laws_of(
             yield Law(candidate, known=True), own, np.outer(coefficients, coefficients)
     elif group.whole_law:
         size = group.candidate.size
-        level = common_values(table, found)[group.common[:size]] + _simulated(pooled, group.candidate)
+        level = common_values(table, found)[group.common[:size]] + pooled.design.simulation.coefficients_of(
+            group.candidate
+        )
         yield Law(group.candidate, known=True), np.concatenate([level, group.candidate.shape]) + offsets, None
     elif _level_is_known(pooled, group.candidate):
         at_mean = common_values(table, found)
-        mean = at_mean[group.common] + _simulated(pooled, group.candidate)
+        mean = at_mean[group.common] + pooled.design.simulation.coefficients_of(group.candidate)
         yield Law(group.candidate, known=True), mean + offsets, None
     else:
         yield Law(group.candidate, known=False), offsets, None
@@ -214,16 +216,6 @@ def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
     alike = (place_of(candidate), candidate.size)
     known = ((place_of(each.candidate), each.candidate.size) for each in pooled.design.blocks)
     return not is_body(candidate) and alike in known
-
-
-def _simulated(pooled: Pooled, candidate: Candidate) -> Array:
-    """Coefficients of the same law in the simulation, whose torque is taken off before anything is fitted."""
-    model = pooled.design.simulation.model
-    out = np.zeros(candidate.size)
-    for each in () if model is None else model.effects:
-        if place_of(each.candidate) == place_of(candidate) and len(each.coefficients) == len(out):
-            out = out + each.coefficients
-    return out
 
 
 def _parameters(

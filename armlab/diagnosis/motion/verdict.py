@@ -1,5 +1,6 @@
 """The files of a motion-only verdict: verdict.json, model.yaml and the simulation with the found numbers."""
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -126,6 +127,8 @@ def _finding(each: ServoFinding, share: float, last: int) -> FindingEntry:
     parameter = ParameterEntry(
         value=each.value, ci95=(float(each.interval[0]), float(each.interval[1])), unit=each.parameter.unit
     )
+    if math.isfinite(each.nominal) and each.nominal < INFINITE_LIMIT:
+        parameter = parameter.model_copy(update={"simulation": float(each.nominal)})
     naming = servo_naming(each, last)
     members = [
         ClassMember(effect=member.effect, joint=member.joint, probability=member.probability)

@@ -11,6 +11,7 @@ from armlab.common.report.wording import count_of, format_number, join_words
 from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.diagnosis.report.words import (
+    PARAMETER_DIGITS,
     chance_at_start,
     compared_in_words,
     effect_in_words,
@@ -194,11 +195,22 @@ def _finding_at_start(arm: Arm, claim: Claim) -> str:
 
 
 def parameter_table(claim: Claim) -> Table:
-    """Named parameters of a finding with their intervals."""
+    """Named parameters of a finding with their intervals, beside those of the simulation where it has such a law."""
     rows = [
-        [each.name, each.value, each.interval, each.unit] for one in claim.parameters for each in parameter_rows(one)
+        [each.name, each.value, each.interval, *_simulated_cell(claim, each.name), each.unit]
+        for one in claim.parameters
+        for each in parameter_rows(one)
     ]
-    return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3))
+    if not claim.simulated:
+        return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3))
+    return Table(["parameter", "to be added", "95 % interval", "in the simulation", "unit"], rows, (0, 4))
+
+
+def _simulated_cell(claim: Claim, name: str) -> list[str]:
+    """The cell of a parameter as the simulation has it; none where it has no such law."""
+    if not claim.simulated:
+        return []
+    return [format_number(claim.simulated[name], PARAMETER_DIGITS) if name in claim.simulated else "–"]
 
 
 def _rival_texts(arm: Arm, claim: Claim) -> list[str]:

@@ -18,6 +18,7 @@ from armlab.diagnosis.report.words import (
     format_fixed,
     format_measured,
     is_doubtful,
+    is_excess,
     is_negative_load,
     may_be_zero,
 )
@@ -44,7 +45,7 @@ def findings_in_sentences(claims: Sequence[Claim], simulation: Simulation, most:
         if claim.effect != UNKNOWN.id and _facts(claim).sentence:
             differing.setdefault((claim.effect, rivals_in_words(claim), is_doubtful(claim)), []).append(claim)
     groups = list(differing.values())
-    sentences = [_lacking_sentence(lacking, simulation)] if lacking else []
+    sentences = list(_sentences_of_lists(lacking, simulation))
     sentences += [_differing_sentence(own, simulation) for own in groups[:most]]
     sentences += _count_sentence(sum(len(own) for own in groups[most:]))
     if unknown:
@@ -111,8 +112,20 @@ def _facts(claim: Claim) -> Effect:
     return effect_named(claim.effect)
 
 
-def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
-    """What the model lacks, with one place for all effects that have it, and their rivals, in common."""
+def _sentences_of_lists(claims: Sequence[Claim], simulation: Simulation) -> Iterator[str]:
+    """What the model lacks, and what it has too much of."""
+    subject = f"{model_in_words(simulation)} of {simulation.arm.name}"
+    for verb, own in (
+        ("lacks", [each for each in claims if not is_excess(each)]),
+        ("has too much", [each for each in claims if is_excess(each)]),
+    ):
+        if own:
+            yield _capitalise(f"{subject} {verb} {_list_in_words(own, simulation)}")
+            subject = "it"
+
+
+def _list_in_words(claims: Sequence[Claim], simulation: Simulation) -> str:
+    """Effects, with one place for all that have it, and their rivals, in common."""
     groups: dict[tuple[bool, str, str], list[Claim]] = {}
     for claim in sorted(claims, key=lambda each: each.joint or 0):
         groups.setdefault((is_doubtful(claim), claim.effect, rivals_in_words(claim)), []).append(claim)
@@ -121,17 +134,34 @@ def _lacking_sentence(claims: Sequence[Claim], simulation: Simulation) -> str:
         place = f"{_places(simulation.arm, own)}{f' (or {rivals})' if rivals else ''}"
         name = f"{'perhaps ' if doubtful else ''}{effect_in_words(effect)}{_size(own)}"
         names_by_place.setdefault(place, []).append(name)
-    lacking = [f"{join_words(names)} at {place}" for place, names in names_by_place.items()]
-    return _capitalise(f"{model_in_words(simulation)} of {simulation.arm.name} lacks {join_words(lacking)}")
+    return join_words([f"{join_words(names)} at {place}" for place, names in names_by_place.items()])
 
 
 def _size(claims: Sequence[Claim]) -> str:
-    """` of 3.03 N m s/rad` of a single finding."""
+    """` of 3.03 N m s/rad (it has 1.50 N m s/rad)` of a single finding, the second where the model has some already."""
     if len(claims) > 1:
-        return ""
-    bare = [replace(each, interval=None) for each in claims[0].parameters]
-    figures = _figures(_facts(claims[0]), bare, "")
-    return f" of {figures}" if figures else ""
+        return " beyond what it has" if any(each.simulated and not is_excess(each) for each in claims) else ""
+    claim = claims[0]
+    figures = _figures(_facts(claim), [_without_interval(each, is_excess(claim)) for each in claim.parameters], "")
+    present = simulated_figures(claim)
+    return (f" of {figures}" if figures else "") + (f" (it has {present})" if present else "")
+
+
+def _without_interval(parameter: ParameterValue, turned: bool) -> ParameterValue:
+    """A parameter without its interval. turned: with the other sign, of a scalar."""
+    turned = turned and np.ndim(parameter.value) == 0
+    value = -float(np.asarray(parameter.value)) if turned else parameter.value
+    return replace(parameter, value=value, interval=None)
+
+
+def simulated_figures(claim: Claim) -> str:
+    """What the simulation has already of the law of a finding: `2.00 N m`; empty where it has none."""
+    present = [
+        replace(each, value=claim.simulated[each.name], interval=None)
+        for each in claim.parameters
+        if each.name in claim.simulated
+    ]
+    return _figures(_facts(claim), present, "")
 
 
 def _places(arm: Arm, claims: Sequence[Claim]) -> str:

@@ -14,7 +14,7 @@ from armlab.diagnosis.report.residuals import (
     is_white,
     select_residuals,
 )
-from armlab.diagnosis.report.sentences import claim_figures, findings_in_sentences, model_in_words
+from armlab.diagnosis.report.sentences import claim_figures, findings_in_sentences, model_in_words, simulated_figures
 from armlab.diagnosis.report.words import (
     chance_in_words,
     compared_in_words,
@@ -234,6 +234,8 @@ def _setup_lines(number: int, finding: SetupFinding, arm: Arm) -> Iterator[str]:
 def _claim_lines(number: int, claim: Claim, share: float, simulation: Simulation) -> Iterator[str]:
     evidence, arm = claim.evidence, simulation.arm
     law = claim_figures(claim, simulation) if claim.effect == PAYLOAD_FACTS.id else claim.equation
+    present = simulated_figures(claim)
+    law = f"{law}; the simulation has {present}" if present else law
     lines = wrap(f"{finding_in_words(arm, claim)}: {law}", LINE_WIDTH - 5)
     yield f"{number:>3}. {lines[0]}"
     yield from (f"     {line}" for line in lines[1:])

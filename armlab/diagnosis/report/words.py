@@ -95,13 +95,21 @@ def claim_name(claim: Claim) -> str:
     """The name of a finding: of its effect, but a load that weighs less than nothing is called what it is."""
     if claim.effect == UNKNOWN.id:
         return SOMETHING_UNKNOWN
-    return LESS_MASS if is_negative_load(claim) else effect_in_words(claim.effect)
+    if is_negative_load(claim):
+        return LESS_MASS
+    return f"{'too much ' if is_excess(claim) else ''}{effect_in_words(claim.effect)}"
 
 
 def is_negative_load(claim: Claim) -> bool:
     """Whether a load has a negative mass: then the arm has less mass there than the model."""
     mass = next((each.value for each in claim.parameters if each.name == "mass"), 0.0)
     return claim.effect == PAYLOAD_FACTS.id and isinstance(mass, float) and mass < 0
+
+
+def is_excess(claim: Claim) -> bool:
+    """Whether the simulation has more of a law than the arm: the first number of the finding takes some off."""
+    first = next((each.value for each in claim.parameters if each.name in claim.simulated), 0.0)
+    return isinstance(first, float) and first < 0
 
 
 def is_doubtful(claim: Claim) -> bool:

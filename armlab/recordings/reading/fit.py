@@ -1,7 +1,8 @@
 """Rigid links with usual friction, fitted to a reading: errors on blocks of time that are held out.
 
-    tau_j = Y_j(q, qd, qdd) phi + v_j qd_j + c_j sign(qd_j) + I_j qdd_j + o_j + s_j q_j,    v, c, I >= 0
+    tau_j = Y_j(q, qd, qdd) phi + v_j qd_j + c_j sign(qd_j) + I_j qdd_j + o_j + s_j q_j + p_j(q),    v, c, I >= 0
 
+p_j are the springs and the weight without load that the robot file states, as it states them.
 A joint has a spring s_j only where the reading says so. The links phi are drawn to those of the simulation by a normal
 prior in the metric of pseudo-inertias (Lee and Park 2018): `near` where they may be as far off as simulations usually
 are, `free` where the data decide. Links that are physically consistent are fitted with the entropic divergence to the
@@ -20,6 +21,7 @@ from armlab.recordings.reading.reading import Reading
 from armlab.recordings.reading.signals import Channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from problem.arm import Arm, Link
+from problem.drive_torque import position_torque
 from problem.motion import Motion
 from problem.pseudo_inertia import (
     entropic_information,
@@ -41,13 +43,15 @@ NON_NEGATIVE = 3  # of them the first ones, which are not negative
 class Columns:
     """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 5), and their products on each fold.
 
-    grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones.
+    grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones. stated: (rows, joints),
+    torque of the springs and the compensated weight that the robot file states, N m (N).
     """
 
     motion: Motion
     rigid: Array
     own: Array
     grams: Array
+    stated: Array
 
 
 def make_columns(arm: Arm, motion: Motion, fold: NDArray[np.intp], sign_width: float) -> Columns:
@@ -64,7 +68,7 @@ def make_columns(arm: Arm, motion: Motion, fold: NDArray[np.intp], sign_width: f
             used = np.arange(10 * joint, 10 * joints + JOINT_COLUMNS)  # links before a joint do not load it
             part = np.concatenate([rigid[rows, joint, 10 * joint :], own[rows, joint]], axis=1)
             grams[number, joint][np.ix_(used, used)] = part.T @ part
-    return Columns(motion, rigid, own, grams)
+    return Columns(motion, rigid, own, grams, position_torque(arm, motion))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +166,8 @@ class Fitter:
 
         The last link may carry a load: it is free in any case.
         """
-        columns, torque = self.columns(reading), self.channels.read_torque(reading)
+        columns = self.columns(reading)
+        torque = self.channels.read_torque(reading) - columns.stated
         scatter = np.std(torque, axis=0)
         weight = np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
         prior = self.prior(reading, torque)
@@ -245,7 +250,8 @@ class Fitter:
 
     def torque_gains(self, reading: Reading) -> list[tuple[float, float]]:
         """Factor between the torque of each joint and that of the links as given, and the share that it explains."""
-        columns, torque = self.columns(reading), self.channels.read_torque(reading)
+        columns = self.columns(reading)
+        torque = self.channels.read_torque(reading) - columns.stated
         given = rigid_body_torque(reading.arm, columns.motion, reading.inertial)
         out = []
         for joint in range(reading.joints):

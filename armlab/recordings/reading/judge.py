@@ -114,8 +114,9 @@ class Judge:
 
     def _size_mismatch(self, reading: Reading) -> float:
         """Sum over joints of the logarithms between the scatter of the torque and that of the links as given."""
-        motion = self.fitter.columns(reading).motion
-        given = np.std(rigid_body_torque(reading.arm, motion, reading.inertial), axis=0)
+        columns = self.fitter.columns(reading)
+        rigid = rigid_body_torque(reading.arm, columns.motion, reading.inertial)
+        given = np.std(rigid + columns.stated, axis=0)
         sizes = np.std(self.fitter.channels.read_torque(reading), axis=0)
         loaded = (given > 0) & (sizes > 0)
         return float(np.sum(np.abs(np.log(sizes[loaded] / given[loaded]))))

@@ -8,6 +8,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Finding, Recording, Run
 from problem.arm import Arm
+from problem.drive_torque import position_torque
 from problem.joint_words import joint_in_words
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
@@ -40,7 +41,8 @@ def compare_standstill(recording: Recording, inertial: Array | None, tuning: Rea
         return ()
     position, torque = (np.array(parts) for parts in zip(*poses, strict=True))
     still = np.zeros_like(position)
-    gravity = rigid_body_torque(recording.arm, Motion(position, still, still), inertial)
+    at_rest = Motion(position, still, still)
+    gravity = rigid_body_torque(recording.arm, at_rest, inertial) + position_torque(recording.arm, at_rest)
     scatter = np.max([np.std(run.torque, axis=0) for run in recording.runs], axis=0)
     out = []
     for joint in range(len(recording.arm)):

@@ -1,0 +1,47 @@
+"""The torque that the drives of an arm give, with all that the file of a simulator says of its joints and bodies.
+
+    tau = W(q, qd, qdd) phi + I qdd + d qd + f sgn(qd) + k (q - q_rest) - g(q)
+
+I are the rotors, d, f, k and q_rest the laws of the joints, and g is what the simulator holds of the links' weight.
+"""
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from problem.arm import Arm
+from problem.motion import Motion
+from problem.regressor import rigid_body_torque
+
+
+def drive_torque(arm: Arm, motion: Motion) -> Array:
+    """Torque (..., samples, joints) that the drives give, N m (N). ValueError for an arm without links."""
+    torque = rigid_body_torque(arm, motion)
+    if arm.rotor_inertia:
+        torque = torque + motion.acceleration * np.array(arm.rotor_inertia)
+    if arm.joint_laws:
+        torque = torque + motion.velocity * np.array([law.damping for law in arm.joint_laws])
+        torque = torque + np.sign(motion.velocity) * np.array([law.friction for law in arm.joint_laws])
+    return torque + position_torque(arm, motion)
+
+
+def springs_torque(arm: Arm, motion: Motion) -> Array:
+    """Torque (..., samples, joints) that the drives need against the springs of the joints, N m (N)."""
+    if not arm.joint_laws:
+        return np.zeros(motion.position.shape)
+    stiffness, rest = np.array([(law.stiffness, law.rest) for law in arm.joint_laws]).T
+    return np.asarray(stiffness * (motion.position - rest))
+
+
+def compensation_torque(arm: Arm, motion: Motion) -> Array:
+    """Torque (..., samples, joints) by which the simulator itself holds the weight of links, N m (N)."""
+    still = np.zeros(motion.position.shape)
+    if not arm.compensated:
+        return still
+    carried = np.concatenate([link.parameters for link in arm.compensated])
+    weight = rigid_body_torque(arm, Motion(motion.position, still, still), carried)
+    return np.where([law.drive_compensates for law in arm.joint_laws], 0.0, weight)
+
+
+def position_torque(arm: Arm, motion: Motion) -> Array:
+    """What springs and compensation add to the torque of the drives, (..., samples, joints), N m (N)."""
+    return springs_torque(arm, motion) - compensation_torque(arm, motion)
