@@ -12,6 +12,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from problem.arm import Arm, Link
 
+ROUNDING = 1e-12  # of the largest eigenvalue: less below zero is none
 MIN_EIGENVALUE_SHARE = 1e-3  # of a body's mean eigenvalue: point masses and rods get that much of it in each direction
 
 
@@ -71,8 +72,13 @@ def pseudo_inertias(parameters: Array) -> Array:
 
 
 def are_bodies(inertial: Array) -> bool:
-    """Whether each link with parameters (10 * joints,) is something: base parameters alone leave links out."""
-    return bool(np.all(np.linalg.eigvalsh(pseudo_inertias(inertial))[:, -1] > 0))
+    """Whether links with parameters (10 * joints,) are bodies, frames without mass among them included.
+
+    Base parameters alone leave links out, and make of others what no body is.
+    """
+    values = np.linalg.eigvalsh(pseudo_inertias(inertial))
+    is_something = values[:, -1] > 0
+    return bool(np.all(is_something) or (np.any(is_something) and np.all(values[:, 0] >= -ROUNDING * values.max())))
 
 
 def least_eigenvalues(parameters: Array) -> Array:
@@ -83,9 +89,11 @@ def least_eigenvalues(parameters: Array) -> Array:
 def regular_nominal(arm: Arm) -> Array:
     """The arm's parameters with bodies that are points or rods thickened a little, (joints, 4, 4).
 
+    A frame without mass becomes a body that is nothing beside the others.
     Distances to a singular pseudo-inertia are infinite. Raises ValueError for an arm without `links`.
     """
     pseudos = pseudo_inertias(arm.parameters)
+    largest = float(np.trace(pseudos, axis1=1, axis2=2).max())
     out = []
     for pseudo in pseudos:
         moments = pseudo[:3, :3] + MIN_EIGENVALUE_SHARE * (
@@ -93,13 +101,15 @@ def regular_nominal(arm: Arm) -> Array:
         ) * np.eye(3)
         raised = pseudo.copy()
         raised[:3, :3] = moments
-        out.append(_make_definite(raised))
+        out.append(_make_definite(raised, largest))
     return np.stack(out)
 
 
-def _make_definite(pseudo: Array) -> Array:
+def _make_definite(pseudo: Array, largest: float) -> Array:
+    """largest: of the sizes of all bodies, of which one that is nothing gets a share."""
     values, vectors = np.linalg.eigh(pseudo)
-    raised = np.maximum(values, MIN_EIGENVALUE_SHARE**2 * values.max())
+    size = values.max() if values.max() > 0 else MIN_EIGENVALUE_SHARE**2 * largest
+    raised = np.maximum(values, MIN_EIGENVALUE_SHARE**2 * size)
     return np.asarray((vectors * raised) @ vectors.T)
 
 

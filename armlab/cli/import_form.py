@@ -55,8 +55,9 @@ def command_of(files: Sequence[Path], options: Mapping[str, Any]) -> str:
     words = ["armlab", "recording", "import", *map(str, files)]
     for name, value in options.items():
         for each in value if isinstance(value, tuple) else (value,):
-            if each not in (None, ""):
-                words += [FLAGS.get(name, f"--{name.replace('_', '-')}"), str(each)]
+            if each not in (None, "", False):
+                flag = FLAGS.get(name, f"--{name.replace('_', '-')}")
+                words += [flag] if each is True else [flag, str(each)]
     return shlex.join(words)
 
 

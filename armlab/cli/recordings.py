@@ -110,6 +110,7 @@ def _column_options(command: Callable[..., None]) -> Callable[..., None]:
 @click.option("--robot", help="Built-in robot, or path of a robot file.")
 @tip_option
 @lock_option
+@click.option("--repair", is_flag=True, help="Write the nearest bodies for links of the robot that no body can be.")
 @click.option("--out", type=OutputPath(), help="New folder for the recording.")
 @_column_options
 @click.option("--unit", "units", multiple=True, metavar="SIGNAL=UNIT", help="Unit of a signal, such as position=deg.")

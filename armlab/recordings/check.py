@@ -31,6 +31,7 @@ from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, Run
 from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm
+from problem.impossible_bodies import find_impossible_bodies
 from problem.joint_words import joint_in_words
 from problem.simulator_check import check_with_mujoco
 
@@ -194,13 +195,14 @@ def check_recording(folder: Path) -> CheckResult:
         recording = with_motion_runs(moved, motions)
         answers = check_answers(motions, recording.arm) if motions else ()
         beside = _compare_with_simulator(recording, with_actuators=recording.controller is None)
+        beside = (*_find_impossible_links(recording), *beside)
         findings = _collect_findings(recording, recording.recorded_arm, (*recording.findings, *beside, *answers))
         return CheckResult(recording, tuple(findings), refused)
     empty, file = open_recording(folder)
     runs, refused = _read_runs(lambda entry: load_runs(empty, file, entry), file)
     whole = with_runs(empty, runs)
     geometry = _check_geometry(whole) if runs else ()
-    beside = _compare_with_simulator(whole, with_actuators=False)
+    beside = (*_find_impossible_links(whole), *_compare_with_simulator(whole, with_actuators=False))
     return CheckResult(
         whole, tuple(_collect_findings(whole, whole.arm, (*whole.findings, *beside, *geometry))), refused
     )
@@ -230,6 +232,16 @@ def _collect_findings(
         reported.update((run.file, finding) for finding in run.findings)
         yield from ((run.name, finding) for finding in check_channels(run, arm))
     yield from (("all runs", finding) for finding in whole)
+
+
+def _find_impossible_links(recording: Recording | MotionRecording) -> tuple[Finding, ...]:
+    """Warnings of links of the robot that no body can be."""
+    path = recording.folder / recording.robot
+    if not path.is_file() or path.suffix == ".xml":
+        return ()
+    found = find_impossible_bodies(path.read_text(encoding="utf-8"), path)
+    hint = "which `armlab recording import --repair` writes"
+    return tuple(Finding("impossible_link", "warning", f"{each.words}, {hint}") for each in found)
 
 
 def _compare_with_simulator(recording: Recording | MotionRecording, with_actuators: bool) -> tuple[Finding, ...]:

@@ -17,6 +17,7 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.motion import MotionRecording
 from armlab.recordings.recording_file import FILE_NAME, ControllerEntry
 from problem.arm import Arm, Link
+from problem.bodies import with_extent
 from problem.mjcf import arm_of, compile_mjcf, import_mujoco
 
 UNSUPPORTED = {
@@ -121,6 +122,9 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
     else:
         nominal = np.tile(NEUTRAL, (len(recording.joints), 1))
         nominal[:, place("armature")] = _rotors(recording)
+        for row, joint in enumerate(recording.joints if recording.arm.joint_laws else ()):
+            law = recording.arm.joint_laws[joint]
+            nominal[row, place("damping")], nominal[row, place("friction")] = law.damping, law.friction
     if controller is not None:
         nominal = _with_controller(nominal, controller)
         _check_limits(nominal, where)
@@ -237,10 +241,13 @@ def _read_delays(controller: ControllerEntry | None, joints: int) -> Array:
 
 
 def _mjcf_of_arm(recording: MotionRecording) -> str:
-    """The arm of a robot file or URDF as MJCF, with a position actuator of gain 1 at each joint."""
+    """The arm of a robot file or URDF as MJCF, with a position actuator of gain 1 at each joint.
+
+    Points, rods and frames without mass get as little extent as MuJoCo takes, and what no body is, the nearest one.
+    """
     arm = recording.arm
-    structure = Structure(arm)
-    rigid = TorqueModel(recording.robot, structure, structure.base.values(arm.parameters), inertial=arm.parameters)
+    structure, inertial = Structure(arm), with_extent(arm.parameters)
+    rigid = TorqueModel(recording.robot, structure, structure.base.values(inertial), inertial=inertial)
     root = ElementTree.fromstring(mjcf_document(SimulatorModel(rigid, {}, ())))
     actuators = ElementTree.SubElement(root, "actuator")
     for joint in arm.joints:

@@ -97,7 +97,7 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
         unit_reasons={signal: known.reason for signal, known in chosen_units.items()},
         gains=gains,
         gear=gear,
-        doubts=doubts,
+        doubts=(*doubts, *(robot.impossible if robot else ())),
         joints=log.joints if arm and (log.joints != whole or chosen) else (),
         questions=(*robots, *unmatched, *unnamed, *unmeasured, *unscaled, *impossible, *_ask_out(files, options)),
     )
