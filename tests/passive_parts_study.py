@@ -1,8 +1,8 @@
 """How often laws that stand in a robot file are reported as missing, and whether they hide what is missing.
 
-Random MJCF arms with damping, friction loss, springs, armature, `ref` and compensated weight are simulated by MuJoCo;
-the torque of their drives is recorded with noise. Nothing is missing, or one joint has more friction than its file:
-three times what could just be told. The same arms without passive parts are the comparison.
+Random MJCF arms with damping, friction loss, springs, armature, `ref` and compensated weight move; their torque is that
+of MuJoCo's inverse dynamics with the friction loss of each joint, and noise. Nothing is missing, or one joint has more
+friction than its file: three times what could just be told. The same arms without passive parts are the comparison.
 
     python tests/passive_parts_study.py --nothing-missing 300 --hidden 100 --out results.csv
 """
@@ -14,7 +14,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pandas as pd
 import yaml
@@ -24,17 +23,15 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.diagnose import diagnose
 from armlab.recordings.load import load_recording
 from problem.mjcf import compile_mjcf
+from problem.motion import Motion
 from problem.robot_file import load_arm
+from problem.simulator_check import mujoco_torque
 
 RATE_HZ, SECONDS = 250.0, 12.0
-STEPS_PER_SAMPLE = 8  # of the simulation
-SERVO_SPEED = 30.0  # rad/s, of the drives
+PARTS_OF_SAMPLE = 20  # in which friction is averaged
 NOISE_SHARE = 0.003  # of the largest torque of a joint
 LIMITS_OF_DETECTION = 3.0  # times which the hidden friction is
 TOLD_RATIO = 5.0  # standard errors of a friction level that can just be told
-STICKING = (
-    'solimpfriction="0.9999 0.9999 0.001 0.5 2" solreffriction="0.002 1"'  # MuJoCo's own friction loss slips at rest
-)
 HARMONICS = 4
 MAX_FALSE_SHARE = 0.01  # of recordings in which nothing is missing
 LEVEL = 0.05  # of the test that passive parts hide nothing
@@ -78,7 +75,7 @@ def write_arm(path: Path, rng: np.random.Generator, passive: bool) -> None:
         gravcomp = f' gravcomp="{held:.6g}"' if passive else ""
         opened.append(
             f'<body name="b{number}" pos="{length if number > 1 else 0:.6g} 0 0.02"{gravcomp}>'
-            f'<joint name="j{number}" axis="{_numbers(axis)}" {STICKING} {stated}/>'
+            f'<joint name="j{number}" axis="{_numbers(axis)}" {stated}/>'
             f'<inertial mass="{mass:.6g}" pos="{_numbers(centre)}" diaginertia="{_numbers(size)}"/>'
         )
         closed.append("</body>")
@@ -108,40 +105,25 @@ class Sines:
         size, phase = rng.uniform(0.2, 0.9, speed.shape) / orders, rng.uniform(0, 2 * np.pi, speed.shape)
         return cls(rng.uniform(-0.5, 0.5, joints), size, speed, phase)
 
-    def at(self, time: float) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration, (joints,) each."""
+    def motion(self, shift: float = 0.0) -> Motion:
+        """Positions, velocities and accelerations, (samples, joints) each, so many intervals after the stamps."""
+        time = (np.arange(0, SECONDS, 1 / RATE_HZ) + shift / RATE_HZ)[:, None, None]
         angle = self.speed * time + self.phase
-        return (
-            self.rest + np.sum(self.size * np.sin(angle), axis=1),
-            np.sum(self.size * self.speed * np.cos(angle), axis=1),
-            -np.sum(self.size * self.speed**2 * np.sin(angle), axis=1),
+        return Motion(
+            self.rest + np.sum(self.size * np.sin(angle), axis=2),
+            np.sum(self.size * self.speed * np.cos(angle), axis=2),
+            -np.sum(self.size * self.speed**2 * np.sin(angle), axis=2),
         )
 
 
-def simulate(model: Any, wanted: Sines) -> tuple[Array, Array]:
-    """Positions and torques (samples, joints) of MuJoCo's own simulation.
+def simulate(model: Any, wanted: Sines) -> Array:
+    """Torque (samples, joints) of MuJoCo's inverse dynamics with the friction loss against the motion.
 
-    The drives follow the motion by computed torque, friction included, so that joints do not stick. A torque is the
-    mean over one interval of the samples about the stamp, as a drive logs it.
+    At a reversal the friction is its mean over the interval about the stamp, as drives average what they log.
     """
-    model.opt.timestep = 1 / (RATE_HZ * STEPS_PER_SAMPLE)
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-    data, plan = mujoco.MjData(model), mujoco.MjData(model)
-    data.qpos[:], data.qvel[:], _ = wanted.at(0.0)
-    steps = int(SECONDS * RATE_HZ * STEPS_PER_SAMPLE)
-    position, torque = np.empty((steps, model.nv)), np.empty((steps, model.nv))
-    for step in range(steps):
-        goal, speed, push = wanted.at(step * model.opt.timestep)
-        plan.qpos[:], plan.qvel[:] = data.qpos, data.qvel
-        plan.qacc[:] = push + SERVO_SPEED**2 * (goal - data.qpos) + 2 * SERVO_SPEED * (speed - data.qvel)
-        mujoco.mj_inverse(model, plan)
-        data.qfrc_applied[:] = plan.qfrc_inverse + model.dof_frictionloss * np.sign(speed)
-        position[step], torque[step] = data.qpos, data.qfrc_applied
-        mujoco.mj_step(model, data)
-    half = STEPS_PER_SAMPLE // 2
-    stamps = np.arange(STEPS_PER_SAMPLE, steps - STEPS_PER_SAMPLE, STEPS_PER_SAMPLE)
-    return position[stamps], np.array([torque[stamp - half : stamp + half].mean(axis=0) for stamp in stamps])
+    shifts = (np.arange(PARTS_OF_SAMPLE) + 0.5) / PARTS_OF_SAMPLE - 0.5
+    side = np.mean([np.sign(wanted.motion(shift).velocity) for shift in shifts], axis=0)
+    return mujoco_torque(model, wanted.motion()) + model.dof_frictionloss * side
 
 
 def run_case(number: int, passive: bool, with_hidden: bool) -> Case:
@@ -153,13 +135,14 @@ def run_case(number: int, passive: bool, with_hidden: bool) -> Case:
         motions = [Sines.draw(len(arm), rng) for _ in range(2)]
         hidden = int(rng.integers(1, len(arm) + 1)) if with_hidden else None
         model, size = compile_mjcf(folder / "arm.xml"), 0.0
-        noise = NOISE_SHARE * np.abs(simulate(model, motions[0])[1]).max(axis=0)
+        noise = NOISE_SHARE * np.abs(simulate(model, motions[0])).max(axis=0)
         if hidden is not None:
             # the standard error of a level that all samples of a run tell, times what is just told
             size = LIMITS_OF_DETECTION * TOLD_RATIO * float(noise[hidden - 1]) / np.sqrt(SECONDS * RATE_HZ)
             model.dof_frictionloss[hidden - 1] += size
         for run, motion in enumerate(motions, 1):
-            position, torque = simulate(model, motion)
+            torque = simulate(model, motion)
+            position = motion.motion().position
             _write_run(folder / f"run-{run}.csv", position, torque + noise * rng.standard_normal(torque.shape))
         _write_recording(folder, len(arm))
         found = diagnose(load_recording(folder))

@@ -19,6 +19,8 @@ from armlab.recordings.recording_file import (
 from armlab.recordings.repair import drop_bad_rows
 from armlab.recordings.table import read_table
 from problem.arm import Arm
+from problem.mjcf import compile_mjcf
+from problem.mjcf_servos import refuse_other_drives
 from problem.robot_file import load_arm
 
 PER_JOINT_KEYS = (
@@ -102,6 +104,8 @@ def open_motion_recording(folder: Path) -> tuple[MotionRecording, RecordingFile]
     joints = _recorded_joints(file, arm, folder)
     _check_controller(file, len(joints), folder)
     transmission = make_transmission(file, Arm(arm.name, tuple(arm.joints[joint] for joint in joints)), folder)
+    if file.controller is None and file.robot.endswith(".xml"):
+        refuse_other_drives(compile_mjcf(folder / file.robot), joints, folder / file.robot)
     empty = MotionRecording(folder, file.robot, arm, joints, (), transmission, file.controller)
     return replace(empty, recorded=file.recorded), file
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.diagnosis.motion.mjcf_drives import servo_spec
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, NEUTRAL, UNSTATED, Servos, place
 from armlab.diagnosis.motion.servo_plugin import find_actuator
 from armlab.identification.export import SimulatorModel, mjcf_document
@@ -19,6 +20,7 @@ from armlab.recordings.recording_file import FILE_NAME, ControllerEntry
 from problem.arm import Arm, Link
 from problem.bodies import with_extent
 from problem.mjcf import arm_of, compile_mjcf, import_mujoco
+from problem.mjcf_servos import actuators_of, reason_no_servo, refuse_other_drives
 
 UNSUPPORTED = {
     "velocity_filter_hz": "a filtered velocity",
@@ -36,7 +38,7 @@ class ServoSimulation:
     read_delay: of the position of each recorded joint after its stamp, (joints,), s. rate_hz: how often the command is
     taken over. supply: nominal supply voltage, V, of drives that command a voltage;
     None for others. payload: mass that is added at the tool, kg. delay: what is added to that of each command, s; it is
-    in `nominal`.
+    in `nominal`. replaced: joints whose actuator in the file is no servo, and whose drive the recording states.
     """
 
     arm: Arm
@@ -50,6 +52,7 @@ class ServoSimulation:
     supply: float | None = None
     payload: float = 0.0
     delay: float = 0.0
+    replaced: frozenset[str] = frozenset()
 
     def number_of(self, row: int) -> int:
         """The robot's number, from 1, of the joint that a column of the recording, from 0, belongs to."""
@@ -66,7 +69,7 @@ class ServoSimulation:
         if self.document is not None:
             spec = mujoco.MjSpec.from_string(self.document)
         else:
-            spec = mujoco.MjSpec.from_file(str(self.path))
+            spec = servo_spec(self.path, self.replaced)
         driven = {actuator.target for actuator in spec.actuators}
         for joint in self.arm.joints:
             if joint.name not in driven:
@@ -116,9 +119,10 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
     if recording.arm.links is None:
         raise InputError(f"robot of {where} has no links: without inertias a motion says nothing of its drives")
     path = recording.folder / recording.robot
-    from_mjcf = path.suffix == ".xml"
+    from_mjcf, replaced = path.suffix == ".xml", frozenset[str]()
     if from_mjcf:
-        nominal = _servos_of_mjcf(recording, path)
+        replaced = _stated_drives(recording)
+        nominal = _servos_of_mjcf(recording, path, replaced)
     else:
         nominal = np.tile(NEUTRAL, (len(recording.joints), 1))
         nominal[:, place("armature")] = _rotors(recording)
@@ -140,6 +144,7 @@ def read_servo_simulation(recording: MotionRecording) -> ServoSimulation:
         read_delay=_read_delays(controller, len(recording.joints)),
         rate_hz=controller.rate_hz if controller is not None else None,
         supply=controller.supply if controller is not None else None,
+        replaced=replaced,
     )
 
 
@@ -187,24 +192,30 @@ def _rotors(recording: MotionRecording) -> Array:
     return np.array([rotors[joint] for joint in recording.joints])
 
 
-def _servos_of_mjcf(recording: MotionRecording, path: Path) -> Array:
-    """Parameters (joints, parameters) of the recorded joints and their position actuators."""
-    model = compile_mjcf(path)
+def _stated_drives(recording: MotionRecording) -> frozenset[str]:
+    """Names of the joints whose drive the recording states: whatever actuators the file has there, they are not."""
+    stated = recording.joints if recording.controller is not None else ()
+    return frozenset(recording.arm.joints[joint].name for joint in stated)
+
+
+def _servos_of_mjcf(recording: MotionRecording, path: Path, replaced: frozenset[str]) -> Array:
+    """Parameters (joints, parameters) of the recorded joints and their position actuators.
+
+    replaced: joints whose drive the recording states.
+    """
+    given = compile_mjcf(path)
+    if not replaced:
+        refuse_other_drives(given, recording.joints, path)
+    model = servo_spec(path, replaced).compile()
     values = np.tile(NEUTRAL, (len(recording.joints), 1))
     for row, joint in enumerate(recording.joints):
         values[row, place("damping")] = model.dof_damping[joint]
         values[row, place("armature")] = model.dof_armature[joint]
         values[row, place("friction")] = model.dof_frictionloss[joint]
-        actuator = find_actuator(model, joint)
-        if actuator is None:
+        actuator, own = find_actuator(model, joint), actuators_of(given, joint)
+        if actuator is None or reason_no_servo(given, own[0]) is not None:
             continue
         gain, bias = model.actuator_gainprm[actuator], model.actuator_biasprm[actuator]
-        if bias[1] != -gain[0] or gain[0] <= 0 or model.actuator_gear[actuator, 0] != 1:
-            name = recording.arm.joints[joint].name
-            raise InputError(f"{path}: the actuator of joint '{name}' is no position servo with gear 1")
-        if model.actuator_dyntype[actuator] != 0:
-            name = recording.arm.joints[joint].name
-            raise InputError(f"{path}: the actuator of joint '{name}' filters its command, which the replay cannot")
         values[row, place("kp")], values[row, place("kd")] = gain[0], -bias[2]
         values[row, place("delay")] = model.actuator_delay[actuator]
         if model.actuator_forcelimited[actuator]:
