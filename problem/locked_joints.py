@@ -13,8 +13,18 @@ from armlab.common.errors import InputError
 from armlab.common.xml_text import parse_xml_text, read_xml_text
 from problem.arm import Arm
 from problem.kinematic_tree import KinematicTree
-from problem.mjcf import MOVING_KINDS, arm_of, compile_mjcf, import_mujoco, mjcf_tree, written_mjcf
-from problem.mjcf_document import UneditableError, moved_mjcf, read_mjcf_document
+from problem.mjcf import (
+    MOVING_KINDS,
+    arm_of,
+    compile_mjcf,
+    compile_mjcf_text,
+    import_mujoco,
+    mjcf_spec,
+    mjcf_tree,
+    written_mjcf,
+)
+from problem.mjcf_document import UneditableError, moved_mjcf
+from problem.mjcf_meshes import text_with_inertia
 from problem.robot_file import check_arm
 from problem.urdf import chain_of
 from problem.urdf_document import lock_urdf, moved_urdf, read_urdf_root, urdf_text, urdf_tree
@@ -102,14 +112,15 @@ def lock_joints(path: Path, tip: str | None, given: Mapping[str, float], folder:
 def robot_text(path: Path, folder: Path) -> str:
     """The text of a URDF or MJCF file as it is to stand in another folder, with what it includes.
 
-    The paths of meshes lead from there. An MJCF that is no well-formed XML is written by MuJoCo.
+    The paths of meshes lead from there, and the inertia that MuJoCo computes of meshes is stated, so that the text can
+    be read without them. An MJCF that is no well-formed XML is written by MuJoCo.
     """
     if path.suffix == ".urdf":
         return moved_urdf(read_xml_text(path).text(), path, folder)
     try:
-        return moved_mjcf(read_mjcf_document(path)[0].text(), path, folder)
+        return moved_mjcf(text_with_inertia(path, compile_mjcf(path), compile_mjcf_text), path, folder)
     except UneditableError:
-        return written_mjcf(import_mujoco().MjSpec.from_file(str(path)), path)
+        return written_mjcf(mjcf_spec(path), path)
 
 
 def parse_locks(given: tuple[str, ...]) -> dict[str, float]:
@@ -146,7 +157,7 @@ def _lock_mjcf(
     positions = mjcf_tree(model, path).locked_positions(tip, given)
     if not positions:
         return check_arm(arm_of(model, path), str(path)), robot_text(path, folder), positions
-    spec = import_mujoco().MjSpec.from_file(str(path))
+    spec = mjcf_spec(path)
     locked = lock_spec(spec, path, positions)
     text = written_mjcf(spec, path)
     return check_arm(arm_of(locked, path), str(path)), text, positions

@@ -11,7 +11,9 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from problem.arm import Arm, Joint, JointLaw, Limits, Link
 from problem.kinematic_tree import Follower, KinematicTree, TreeJoint
+from problem.mjcf_document import UneditableError
 from problem.mjcf_laws import is_disabled, read_joint_laws, read_rotors
+from problem.mjcf_meshes import text_without_meshes
 from problem.pseudo_inertia import link_from_pseudo_inertia, pseudo_inertia_of, transform_pseudo_inertia
 from problem.transforms import inverse, translation, turn_z_to
 
@@ -30,11 +32,43 @@ def import_mujoco() -> Any:
 
 
 def compile_mjcf(path: Path) -> Any:
-    """The mujoco.MjModel of a file; InputError, in one line, where it is missing or MuJoCo refuses it."""
+    """The mujoco.MjModel of a file; InputError, in one line, where it is missing or MuJoCo refuses it.
+
+    Meshes that are not at hand are left out, where the file states the inertia of their bodies.
+    """
     mujoco = import_mujoco()
     if not path.is_file():
         raise InputError(f"cannot read {path}: no such file")
-    return _compiled(mujoco.MjModel.from_xml_path, str(path), path)
+    try:
+        return _compiled(mujoco.MjModel.from_xml_path, str(path), path)
+    except InputError as error:
+        if not _lacks_files(path):
+            raise
+        reason = error
+    try:
+        return compile_mjcf_text(text_without_meshes(path), path)
+    except UneditableError:
+        raise reason from None
+
+
+def mjcf_spec(path: Path) -> Any:
+    """The mujoco.MjSpec of a file that `compile_mjcf` takes, without meshes where some are not at hand."""
+    mujoco = import_mujoco()
+    if _lacks_files(path):
+        return mujoco.MjSpec.from_string(text_without_meshes(path))
+    return mujoco.MjSpec.from_file(str(path))
+
+
+def _lacks_files(path: Path) -> bool:
+    """Whether a file that an MJCF names for its shapes and colours is not at hand."""
+    try:
+        spec = import_mujoco().MjSpec.from_file(str(path))
+    except ValueError:
+        return False
+    folder = path.parent
+    shapes = [folder / spec.meshdir / each.file for each in (*spec.meshes, *spec.hfields, *spec.skins) if each.file]
+    colours = [folder / spec.texturedir / each.file for each in spec.textures if each.file]
+    return not all(each.is_file() for each in (*shapes, *colours))
 
 
 def compile_mjcf_text(text: str, path: Path) -> Any:

@@ -25,7 +25,7 @@ def read_joint_laws(model: Any, path: Path) -> tuple[JointLaw, ...]:
     for joint in range(model.njnt):
         _refuse_nonlinear(model, joint, path)
     _refuse_tendons(model, path)
-    damping = model.dof_damping + _sum_at_joints(model, "actuator_damping")
+    damping = model.dof_damping + sum_at_joints(model, "actuator_damping")
     damping = np.zeros(model.nv) if is_disabled(model, "DAMPER", "PASSIVE") else damping
     friction = np.zeros(model.nv) if is_disabled(model, "FRICTIONLOSS", "CONSTRAINT") else model.dof_frictionloss
     stiffness = np.zeros(model.njnt) if is_disabled(model, "SPRING", "PASSIVE") else model.jnt_stiffness
@@ -43,10 +43,10 @@ def read_joint_laws(model: Any, path: Path) -> tuple[JointLaw, ...]:
 
 def read_rotors(model: Any) -> tuple[float, ...]:
     """Inertia of the rotors of all joints on the joint side, those of actuators included, kg m2 (kg)."""
-    return tuple((model.dof_armature + _sum_at_joints(model, "actuator_armature")).tolist())
+    return tuple((model.dof_armature + sum_at_joints(model, "actuator_armature")).tolist())
 
 
-def _sum_at_joints(model: Any, name: str) -> Array:
+def sum_at_joints(model: Any, name: str) -> Array:
     """A field of the actuators, which newer versions of MuJoCo have, times the square of the gear, (joints,)."""
     out, values = np.zeros(model.nv), getattr(model, name, None)
     if values is None:

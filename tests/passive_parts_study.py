@@ -148,7 +148,7 @@ def run_case(number: int, passive: bool, with_hidden: bool) -> Case:
         found = diagnose(load_recording(folder))
     setup = [] if found.setup is None else [f"setup:{each.mistake.label}" for each in found.setup.findings]
     names = [*setup, *(f"{each.effect}@{each.joint}" for each in found.claims)]
-    return Case(number, passive, hidden, size, " ".join(names), found.status)
+    return Case(number, passive, hidden, float(size), " ".join(names), found.status)
 
 
 def _write_run(path: Path, position: Array, torque: Array) -> None:

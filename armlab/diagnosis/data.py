@@ -33,16 +33,12 @@ class Segment:
 
 
 def moving_rows(
-    signals: Sequence[Signals], segments: Sequence[Segment], cutoff_hz: float, sticking: Array, tuning: DataTuning
+    signals: Sequence[Signals], segments: Sequence[Segment], cutoff_hz: float, tuning: DataTuning
 ) -> NDArray[np.bool_]:
-    """Rows (rows, joints) in which a joint moves. cutoff_hz: of the positions.
-
-    sticking: (joints,), friction loss that the robot file states, N m (N). At a reversal it takes any value up to its
-    level, however short the standstill is, and the torque of the simulation is not known there.
-    """
+    """Rows (rows, joints) in which a joint moves. cutoff_hz: of the positions."""
     velocity = np.concatenate([each.motion.velocity for each in signals])
     creep = tuning.creep_ratio * np.quantile(np.abs(velocity), tuning.high_speed_quantile, axis=0)
-    whole = np.concatenate([_moving_rows_of_run(each, cutoff_hz, creep, sticking, tuning) for each in signals])
+    whole = np.concatenate([_moving_rows_of_run(each, cutoff_hz, creep, tuning) for each in signals])
     for joint in range(whole.shape[1]):
         for role in ("identify", "validate"):
             own = [each for each in segments if each.role == role]
@@ -54,9 +50,7 @@ def moving_rows(
     return whole
 
 
-def _moving_rows_of_run(
-    signals: Signals, cutoff_hz: float, creep: Array, sticking: Array, tuning: DataTuning
-) -> NDArray[np.bool_]:
+def _moving_rows_of_run(signals: Signals, cutoff_hz: float, creep: Array, tuning: DataTuning) -> NDArray[np.bool_]:
     """Rows (kept, joints) in which a joint is faster than its noise and than creeping (joints,)."""
     run = signals.run
     frequency, spectrum, shape = acceleration_spectrum(run.position, run.rate_hz)
@@ -64,8 +58,6 @@ def _moving_rows_of_run(
     noise = 2 * np.pi * np.sqrt(density * cutoff_hz**3 / 3)  # of white noise, differentiated, up to the cut-off
     slow = np.abs(signals.motion.velocity) < np.maximum(tuning.standstill_sigmas * noise, creep)
     still = binary_opening(slow, structure=np.ones((max(round(tuning.min_standstill_s * run.rate_hz), 1), 1)))
-    side = np.sign(signals.motion.velocity)
-    still[1:] |= (side[1:] != side[:-1]) & (sticking > 0)
     low_pass = signals.filter
     reach = tuning.standstill_margin / (low_pass.cutoff_hz if isinstance(low_pass, LowPass) else cutoff_hz)
     near = binary_dilation(still, structure=np.ones((2 * round(reach * run.rate_hz) + 1, 1)))
@@ -250,8 +242,7 @@ def observe(runs: Sequence[Run], arm: Arm, inertial: Array | None, settings: Set
     calm = tuple(_smooth_motion(run, motion) for run in even)
     blocks = not any(run.role == "validate" for run in runs)
     segments = _split_runs(signals, blocks, tuning)
-    sticking = np.array([law.friction for law in arm.joint_laws] or np.zeros(len(arm)))
-    moving = moving_rows(signals, segments, motion, sticking, tuning)
+    moving = moving_rows(signals, segments, motion, tuning)
     return Observed(signals, calm, segments, rate / step, blocks, moving, tuning.min_segment_rows)
 
 

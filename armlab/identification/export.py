@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.effects.contract import Candidate
+from armlab.effects.model import FittedEffect
 from armlab.effects.words import component_in_words
 from armlab.identification.friction_lines import FrictionLine, friction_lines
 from armlab.identification.structure import Structure
@@ -80,8 +81,8 @@ def build_simulator_model(known: TorqueModel) -> SimulatorModel:
     arm, inertial = known.arm, known.inertial
     missing, unclaimed = list[str](), list[str]()
     for number, effect in enumerate(known.effects):
-        candidate, values = effect.candidate, effect.coefficients
-        body, gravity = candidate.added_body(values), candidate.changed_gravity(values)
+        candidate, values = effect.candidate, _whole_law(known, effect)
+        body, gravity = (f(effect.coefficients) for f in (candidate.added_body, candidate.changed_gravity))
         if body is not None and inertial is not None:
             inertial = inertial.copy()
             inertial[10 * candidate.joints[0] - 10 : 10 * candidate.joints[0]] += body
@@ -110,12 +111,20 @@ def build_simulator_model(known: TorqueModel) -> SimulatorModel:
     )
 
 
+def _whole_law(model: TorqueModel, effect: FittedEffect) -> Array:
+    """Coefficients of a law at its place in a model: of the simulation's own and of what was found beside it."""
+    own = effect.candidate
+    alike = [each for each in model.effects if each.candidate == own]
+    return np.asarray(np.sum([each.coefficients for each in alike], axis=0))
+
+
 def _joint_fields(model: TorqueModel, friction: tuple[FrictionLine, ...]) -> dict[str, Array]:
     """What a simulator's joints hold of a model, (joints,) a field; no damping, friction or rotor is negative."""
     out: dict[str, Array] = {}
-    for effect in (each for each in model.effects if not each.candidate.is_friction):
-        for name, value in effect.candidate.joint_fields(effect.coefficients).items():
-            out.setdefault(name, np.zeros(len(model.arm)))[effect.candidate.rows[0]] += value
+    laws = {each.candidate: _whole_law(model, each) for each in model.effects if not each.candidate.is_friction}
+    for candidate, coefficients in laws.items():
+        for name, value in candidate.joint_fields(coefficients).items():
+            out.setdefault(name, np.zeros(len(model.arm)))[candidate.rows[0]] += value
     return out | {
         "armature": np.maximum(model.rotor_inertia, 0.0),
         "damping": np.array([line.slope for line in friction]),

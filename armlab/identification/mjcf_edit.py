@@ -17,7 +17,7 @@ from armlab.common.arrays import Array
 from armlab.common.errors import InputError
 from armlab.common.xml_text import XmlNode, XmlText, parse_xml_text
 from armlab.identification.export import body_numbers, format_numbers, inertia_entries
-from problem.mjcf import MOVING_KINDS, body_inertia, compile_mjcf_text, import_mujoco, written_mjcf
+from problem.mjcf import MOVING_KINDS, body_inertia, compile_mjcf_text, import_mujoco, mjcf_spec, written_mjcf
 from problem.mjcf_document import (
     UneditableError,
     body_nodes,
@@ -27,6 +27,7 @@ from problem.mjcf_document import (
     own_node,
     read_mjcf_document,
 )
+from problem.mjcf_laws import sum_at_joints
 
 MAX_CHANGE = 1e-9  # of a body's size: less is rounding, and the number stays as it is written
 MAX_ERROR = 1e-6  # of a body's size: how far the file that is written may be from what is meant
@@ -87,19 +88,22 @@ def edit_mjcf_file(path: Path, before: Any, meant: Meant) -> tuple[str, tuple[st
         text = edit_mjcf(document.text(), path, before, meant)
         return text, (f"the file holds what {path.name} includes: {', '.join(included)}",) if included else ()
     except UneditableError as error:
-        written = written_mjcf(import_mujoco().MjSpec.from_file(str(path)), path)
+        written = written_mjcf(mjcf_spec(path), path)
         note = f"written by MuJoCo, without comments, with six digits where nothing changes: {error}"
         return edit_mjcf(written, path, before, meant), (note,)
 
 
 def stated_fields(model: Any, joints: Sequence[int]) -> dict[str, Array]:
-    """The fields of joints as MuJoCo has them, (joints,) each, by their names in MJCF; rad, also of `springref`."""
+    """The fields of joints as MuJoCo has them, (joints,) each, by their names in MJCF; rad, also of `springref`.
+
+    Damping and armature of the actuators of a joint count.
+    """
     places = list(joints)
     dofs, positions = model.jnt_dofadr[places], model.jnt_qposadr[places]
     return {
-        "damping": np.array(model.dof_damping[dofs]),
+        "damping": np.array(model.dof_damping[dofs]) + sum_at_joints(model, "actuator_damping")[dofs],
         "frictionloss": np.array(model.dof_frictionloss[dofs]),
-        "armature": np.array(model.dof_armature[dofs]),
+        "armature": np.array(model.dof_armature[dofs]) + sum_at_joints(model, "actuator_armature")[dofs],
         "stiffness": np.array(model.jnt_stiffness[places]),
         "springref": np.array(model.qpos_spring[positions]),
     }
@@ -146,6 +150,8 @@ def _set_joints(document: XmlText, nodes: Mapping[int, XmlNode], before: Any, me
     for place, joint in enumerate(meant.joints):
         values = {name: float(meant.fields[name][place]) for name in stated}
         changed = {name: value for name, value in values.items() if value != stated[name][place]}
+        for name in changed.keys() & {"damping", "armature"}:
+            changed[name] -= float(sum_at_joints(before, f"actuator_{name}")[before.jnt_dofadr[joint]])
         if not values["stiffness"]:
             changed.pop("springref", None)
         if not changed:

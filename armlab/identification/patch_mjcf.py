@@ -23,7 +23,7 @@ from armlab.identification.mjcf_edit import (
 )
 from armlab.identification.patch import Carried, Patched, Target, check_same_arm, share_inertia
 from problem.locked_joints import lock_spec
-from problem.mjcf import arm_of, body_inertia, carried_bodies, compile_mjcf, import_mujoco, written_mjcf
+from problem.mjcf import arm_of, body_inertia, carried_bodies, compile_mjcf, import_mujoco, mjcf_spec, written_mjcf
 from problem.mjcf_document import body_nodes, moved_mjcf
 from problem.urdf_document import read_urdf_root
 
@@ -48,7 +48,7 @@ def patched_mjcf(
     if target.path.suffix == ".urdf":
         return _patched_from_urdf(simulated, target, drives)
     before = compile_mjcf(target.path)
-    meant = _meant(simulated, before, import_mujoco().MjSpec.from_file(str(target.path)), target, drives)
+    meant = _meant(simulated, before, mjcf_spec(target.path), target, drives)
     text, notes = edit_mjcf_file(target.path, before, meant)
     return Patched(moved_mjcf(text, target.path, folder), (*notes, *meant.notes), bool(drives))
 

@@ -20,7 +20,6 @@ REFUSED = {
     "four_bar.xml": "closed chains are not supported",
     "tendon_spring.xml": "stiffness of tendons is not supported",
     "coupled_in_the_chain.xml": "'middle', that follows another one is not supported",
-    "mesh_not_at_hand.xml": "remove visual meshes that are not at hand",
 }
 CHAIN = """<mujoco><compiler angle="radian"/><worldbody><body name="a"><joint name="j" axis="0 1 0" {joint}/>
 <inertial mass="1" pos=".2 0 0" diaginertia=".01 .01 .01"/></body></worldbody></mujoco>"""

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from problem.mjcf import compile_mjcf, import_mujoco
+from problem.mjcf import compile_mjcf, import_mujoco, mjcf_spec
 from problem.mjcf_servos import actuators_of, reason_no_servo
 
 
@@ -17,7 +17,7 @@ def servo_spec(path: Path, replaced: frozenset[str]) -> Any:
     joint with g^2 times its gains and |g| times its force.
     """
     mujoco = import_mujoco()
-    spec, model, gone = mujoco.MjSpec.from_file(str(path)), compile_mjcf(path), list[Any]()
+    spec, model, gone = mjcf_spec(path), compile_mjcf(path), list[Any]()
     for joint in range(model.njnt):
         name = model.joint(joint).name
         for place, number in enumerate(actuators_of(model, joint)):
