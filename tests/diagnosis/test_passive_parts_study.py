@@ -21,7 +21,8 @@ def test_more_false_findings_than_chance_at_one_percent_are_too_many() -> None:
 
 
 def test_hidden_friction_counts_as_named_at_its_joint_alone_and_beside_the_same_arms_without_parts() -> None:
-    with_parts = [case(number, "coulomb_friction@2", hidden=1 + number % 2) for number in range(40)]
+    numbers = range(40)
+    with_parts = [case(number, "coulomb_friction@2", hidden=1 + number % 2) for number in numbers]
     without = [
         case(number, f"coulomb_friction@{1 + number % 2}", hidden=1 + number % 2, passive=False) for number in range(40)
     ]

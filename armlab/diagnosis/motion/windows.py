@@ -22,6 +22,7 @@ from armlab.diagnosis.motion.simulation import ServoSimulation
 from armlab.diagnosis.motion.tuning import DEFAULT, MotionTuning
 from armlab.recordings.recording import MotionRun
 from problem.arm import Arm
+from problem.drive_torque import position_torque
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -148,14 +149,14 @@ def own_terms(arm: Arm, joints: Sequence[int], position: Array) -> tuple[Array, 
     still = np.zeros_like(position)
     whole = _whole_arm(arm, joints, Motion(position, still, still))
     rest = np.zeros_like(whole.position)
-    weight = rigid_body_torque(arm, whole)
+    weight = _held_torque(arm, whole)
     mass, slope = np.empty((*position.shape, position.shape[1])), np.empty(position.shape)
     for column, joint in enumerate(joints):
         unit = rest.copy()
         unit[:, joint] = 1.0
-        mass[:, :, column] = (rigid_body_torque(arm, Motion(whole.position, rest, unit)) - weight)[:, list(joints)]
+        mass[:, :, column] = (_held_torque(arm, Motion(whole.position, rest, unit)) - weight)[:, list(joints)]
         ahead, behind = (
-            rigid_body_torque(arm, Motion(whole.position + side * SLOPE_STEP * unit, rest, rest)) for side in (1, -1)
+            _held_torque(arm, Motion(whole.position + side * SLOPE_STEP * unit, rest, rest)) for side in (1, -1)
         )
         slope[:, column] = (ahead - behind)[:, joint] / (2 * SLOPE_STEP)
     return mass, slope
@@ -163,7 +164,12 @@ def own_terms(arm: Arm, joints: Sequence[int], position: Array) -> tuple[Array, 
 
 def joint_torque(arm: Arm, joints: Sequence[int], motion: Motion) -> Array:
     """Torque of links and gravity at the recorded joints, (samples, joints), N m; the other joints are at zero."""
-    return np.asarray(rigid_body_torque(arm, _whole_arm(arm, joints, motion))[:, list(joints)])
+    return np.asarray(_held_torque(arm, _whole_arm(arm, joints, motion))[:, list(joints)])
+
+
+def _held_torque(arm: Arm, motion: Motion) -> Array:
+    """Torque of the links and of the springs and the compensated weight that the robot file states, N m (N)."""
+    return rigid_body_torque(arm, motion) + position_torque(arm, motion)
 
 
 def _loads_and_units(simulation: ServoSimulation, loaded: Arm, motion: Motion) -> tuple[Array, ...]:
