@@ -55,7 +55,8 @@ def build_model(
 ) -> TorqueModel:
     """The model of a fit. claims: by group; what has none is present without a claim. notes: for the provenance."""
     inertial = inertial_parameters(fitted)
-    terms = [*_simulated_terms(simulation), *_fitted_terms(fitted, claims)]
+    simulated = _simulated_terms(simulation)
+    terms = [*simulated, *_fitted_terms(fitted, claims)]
     structure = Structure(simulation.arm, tuple(term[0] for term in terms), load=inertial)
     base = structure.base.values(inertial)
     covariance = fitted.base_parameters()[1]
@@ -69,6 +70,7 @@ def build_model(
         provenance=_provenance(recording, notes),
         stated=tuple(term[2] for term in terms),
         unclaimed=frozenset(number for number, term in enumerate(terms) if not term[3]),
+        simulated=frozenset(range(len(simulated))),
         motion=_recorded_motion(fitted, inertial),
     )
 

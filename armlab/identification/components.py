@@ -26,4 +26,7 @@ def usual_components(arm: Arm) -> tuple[Candidate, ...]:
     """What every real arm has (friction, rotor inertia, offset), and springs where the file of the arm has them."""
     laws = (ViscousFriction, CoulombFriction, RotorInertia, TorqueOffset)
     springs = tuple(LinearSpring.at(arm, joint) for joint, law in enumerate(arm.joint_laws, 1) if law.stiffness)
-    return (*(part for law in laws for part in every_joint(arm, law)), *springs)
+    return (
+        *springs,
+        *(part for law in laws for part in every_joint(arm, law)),
+    )  # a spring takes the offset of its joint

@@ -41,7 +41,8 @@ class ComponentEntry(Settings):
     """One component.
 
     form: which of an effect's laws, where its parameters do not decide it. claimed: false for what is in the model
-    because every arm has it, without enough evidence for a finding.
+    because every arm has it, without enough evidence for a finding. source: `simulation` for what the simulation has
+    already, which is no finding.
     """
 
     effect: str
@@ -49,6 +50,7 @@ class ComponentEntry(Settings):
     joints: tuple[int, ...] = ()
     form: str = ""
     claimed: bool = True
+    source: Literal["simulation"] | None = None
     parameters: dict[str, ParameterEntry]
 
 
@@ -145,6 +147,7 @@ def _component_entries(model: TorqueModel) -> list[dict[str, Any]]:
             "parameters": {each.name: _parameter_entry(each) for each in model.component_parameters(index)},
             **({"form": part.form} if part.form else {}),
             **({"claimed": False} if index in model.unclaimed else {}),
+            **({"source": "simulation"} if index in model.simulated else {}),
         }
         for index, part in enumerate(model.structure.components)
     ]
@@ -205,6 +208,7 @@ def model_of(file: ModelFile, path: Path) -> TorqueModel:
         provenance={key: value for key, value in file.provenance.items() if key not in NUMBER_KEYS},
         stated=tuple(_stated_parameters(entry) for entry in file.components),
         unclaimed=frozenset(index for index, entry in enumerate(file.components) if not entry.claimed),
+        simulated=frozenset(index for index, entry in enumerate(file.components) if entry.source == "simulation"),
         motion=None if file.motion is None else _read_motion(file.motion, arm, path),
     )
 

@@ -24,7 +24,8 @@ def nominal_model(arm: Arm, robot: str) -> TorqueModel | None:
     parts = list(stated_components(arm))
     structure = Structure(arm, tuple(candidate for candidate, _ in parts), load=arm.parameters)
     values = np.concatenate([structure.base.values(arm.parameters), *(coefficients for _, coefficients in parts)])
-    return TorqueModel(robot, structure, values, inertial=arm.parameters)
+    simulated = frozenset(range(len(parts)))
+    return TorqueModel(robot, structure, values, inertial=arm.parameters, simulated=simulated)
 
 
 def stated_components(arm: Arm) -> Iterator[tuple[Candidate, Array]]:

@@ -30,8 +30,8 @@ class TorqueModel:
     known. factor: from a standard error to half an interval. inertial: (10 * joints,) of physically consistent links,
     or None. cutoff_hz, position_factor: of the filters that it was identified with, see `signals_of`.
     stated: the parameters of each component as a file states them; empty for a model that was fitted. unclaimed:
-    components that the model has because many arms have them, without enough evidence for a finding. motion: of the
-    runs that it was fitted on; None where that is not known.
+    components that the model has because many arms have them, without enough evidence for a finding. simulated:
+    components that the simulation has already. motion: of the runs that it was fitted on; None where that is not known.
     """
 
     robot: str
@@ -45,6 +45,7 @@ class TorqueModel:
     provenance: dict[str, Any] = field(default_factory=dict)
     stated: tuple[tuple[ParameterValue, ...], ...] = ()
     unclaimed: frozenset[int] = frozenset()
+    simulated: frozenset[int] = frozenset()
     motion: RecordedMotion | None = None
 
     @property

@@ -13,6 +13,7 @@ from armlab.diagnosis.report.content import parameter_table
 from armlab.diagnosis.report.verdict import verdict_lines
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.verdict_files import make_verdict
+from armlab.identification.model_file import model_content
 from armlab.recordings.load import load_recording
 from problem.drive_torque import drive_torque
 from problem.motion import Motion
@@ -83,3 +84,10 @@ def test_the_model_found_holds_the_laws_of_the_file_and_the_differences(found: D
     assert found.model is not None
     levels = [each.coefficients[0] for each in found.model.effects if each.candidate.effect == "coulomb_friction"]
     assert sum(levels) == pytest.approx(3.0 + sum(MORE_FRICTION), abs=0.1)
+    written = model_content(found.model, Path())["components"]
+    sources = [(each["effect"], each["joint"]) for each in written if each.get("source") == "simulation"]
+    assert sorted(sources) == [
+        ("cable_stiffness", 2),
+        *(("coulomb_friction", joint) for joint in (1, 2)),
+        *(("viscous_friction", joint) for joint in (1, 2)),
+    ]
