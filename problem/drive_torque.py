@@ -13,9 +13,12 @@ from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
 
-def drive_torque(arm: Arm, motion: Motion) -> Array:
-    """Torque (..., samples, joints) that the drives give, N m (N). ValueError for an arm without links."""
-    torque = rigid_body_torque(arm, motion)
+def drive_torque(arm: Arm, motion: Motion, parameters: Array | None = None) -> Array:
+    """Torque (..., samples, joints) that the drives give, N m (N).
+
+    parameters: (10 * joints,) of the links, the arm's own if left out. ValueError for an arm without links then.
+    """
+    torque = rigid_body_torque(arm, motion, parameters)
     if arm.rotor_inertia:
         torque = torque + motion.acceleration * np.array(arm.rotor_inertia)
     if arm.joint_laws:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from armlab.common.errors import InputError
+from armlab.common.report.wording import join_words
 from armlab.common.xml_text import XmlText, parse_xml_text
 from armlab.identification.export import SimulatorModel, format_numbers, link_inertias
 from armlab.identification.mjcf_edit import (
@@ -70,6 +71,10 @@ def _meant(simulated: SimulatorModel, before: Any, spec: Any, target: Target, dr
     check_same_arm(simulated, arm_of(locked, target.path), target.path)
     inertias = {number: body_inertia(before, number) for number in range(1, before.nbody)}
     groups, notes = carried_bodies(locked), list[str]()
+    if not all(groups):
+        raise InputError(
+            f"{target.path}: more than one joint on a body is not supported: export with --into another file"
+        )
     for group, total in zip(groups, link_inertias(simulated), strict=True):
         first = group[0].number
         own = [Carried(before.body(e.number).name, e.seen, _moves_against(before, e.number, first)) for e in group]
@@ -78,6 +83,13 @@ def _meant(simulated: SimulatorModel, before: Any, spec: Any, target: Target, dr
             inertias[first] = shares.first
         inertias |= {group[place].number: np.zeros((4, 4)) for place in shares.emptied}
         notes += shares.note(own)
+    held = [
+        before.body(number).name
+        for number, pseudo in inertias.items()
+        if before.body_gravcomp[number] and not same_inertia(body_inertia(before, number), pseudo, MAX_CHANGE)
+    ]
+    if held:
+        notes.append(f"gravcomp of {join_words(held)} holds the changed weight, too; the recorded drives did not")
     joints = tuple(int(before.body_jntadr[group[0].number]) for group in groups)
     return Meant(
         inertias=inertias,

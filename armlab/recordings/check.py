@@ -32,7 +32,7 @@ from armlab.recordings.recording import AnyRun, Finding, MotionRun, Recording, R
 from armlab.recordings.recording_file import RecordingFile, RunEntry
 from problem.arm import Arm
 from problem.impossible_bodies import find_impossible_bodies
-from problem.joint_words import joint_in_words
+from problem.joint_words import joint_in_words, joints_in_words
 from problem.simulator_check import check_with_mujoco
 
 MIN_FROZEN_TIME_S = 0.25  # a torque that repeats to the last digit for so long while its joint moves
@@ -195,14 +195,15 @@ def check_recording(folder: Path) -> CheckResult:
         recording = with_motion_runs(moved, motions)
         answers = check_answers(motions, recording.arm) if motions else ()
         beside = _compare_with_simulator(recording, with_actuators=recording.controller is None)
-        beside = (*_find_impossible_links(recording), *beside)
+        beside = (*_find_impossible_links(recording), *_stated_laws(recording.arm), *beside)
         findings = _collect_findings(recording, recording.recorded_arm, (*recording.findings, *beside, *answers))
         return CheckResult(recording, tuple(findings), refused)
     empty, file = open_recording(folder)
     runs, refused = _read_runs(lambda entry: load_runs(empty, file, entry), file)
     whole = with_runs(empty, runs)
     geometry = _check_geometry(whole) if runs else ()
-    beside = (*_find_impossible_links(whole), *_compare_with_simulator(whole, with_actuators=False))
+    beside = _compare_with_simulator(whole, with_actuators=False)
+    beside = (*_find_impossible_links(whole), *_stated_laws(whole.arm), *beside)
     return CheckResult(
         whole, tuple(_collect_findings(whole, whole.arm, (*whole.findings, *beside, *geometry))), refused
     )
@@ -242,6 +243,19 @@ def _find_impossible_links(recording: Recording | MotionRecording) -> tuple[Find
     found = find_impossible_bodies(path.read_text(encoding="utf-8"), path)
     hint = "which `armlab recording import --repair` writes"
     return tuple(Finding("impossible_link", "warning", f"{each.words}, {hint}") for each in found)
+
+
+def _stated_laws(arm: Arm) -> tuple[Finding, ...]:
+    """A note of what the robot file says of its joints and of weight; none where it has links alone."""
+    own = {
+        "viscous friction": [law.damping for law in arm.joint_laws],
+        "Coulomb friction": [law.friction for law in arm.joint_laws],
+        "a spring": [law.stiffness for law in arm.joint_laws],
+        "weight that it holds itself": [link.mass for link in arm.compensated],
+    }
+    places = {name: [joint for joint, value in enumerate(values, 1) if value] for name, values in own.items()}
+    parts = [f"{name} at {joints_in_words(arm, joints)}" for name, joints in places.items() if joints]
+    return (Finding("simulation", "note", f"in the simulation, by its file: {'; '.join(parts)}"),) if parts else ()
 
 
 def _compare_with_simulator(recording: Recording | MotionRecording, with_actuators: bool) -> tuple[Finding, ...]:

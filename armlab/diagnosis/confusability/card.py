@@ -27,10 +27,10 @@ from armlab.recordings.repair import MAX_PLAUSIBLE_VALUE
 from armlab.recordings.table import read_table
 from problem.arm import Arm
 from problem.base_parameters import base_parameters
+from problem.drive_torque import drive_torque
 from problem.excitation import ExcitationProblem
 from problem.motion import Motion
 from problem.registry import parse_problem
-from problem.regressor import rigid_body_torque
 from problem.trajectories import sample_instants
 
 MOTION_RATE_HZ = 250.0  # a sparser motion is filled in by splines
@@ -208,9 +208,7 @@ def _is_visible(rows: Array) -> bool:
 
 def _planned_scene(arm: Arm, planned: PlannedMotion) -> Scene:
     inertial = arm.parameters if arm.links is not None else np.zeros(10 * len(arm))
-    torque = rigid_body_torque(arm, planned.motion, inertial)
-    if arm.rotor_inertia:
-        torque = torque + np.asarray(arm.rotor_inertia) * planned.motion.acceleration
+    torque = drive_torque(arm, planned.motion, inertial)
     return Scene(planned.name, planned.time, planned.motion, arm, inertial, torque)
 
 
