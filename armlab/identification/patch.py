@@ -132,7 +132,7 @@ def patched_urdf(simulated: SimulatorModel, target: Target, folder: Path) -> Pat
             _remove_inertial(links[own[place].name])
         notes += shares.note(own)
     for number, joint in enumerate(simulated.model.arm.joints):
-        _set_dynamics(joints[joint.name], simulated, number, source)
+        _set_dynamics(joints[joint.name], simulated, number)
     text = document.text()
     _check_urdf(simulated, text, target)
     gravity = np.asarray(simulated.model.arm.gravity)
@@ -177,23 +177,14 @@ def _remove_inertial(link: XmlNode) -> None:
         link.remove(inertial)
 
 
-def _set_dynamics(joint: XmlNode, simulated: SimulatorModel, number: int, source: Path) -> None:
+def _set_dynamics(joint: XmlNode, simulated: SimulatorModel, number: int) -> None:
     dynamics = joint.find("dynamics")
     for key, name in (("damping", "damping"), ("friction", "frictionloss")):
         wanted = float(simulated.field(name)[number])
         stated = "" if dynamics is None else dynamics.attributes.get(key, "")
-        if _number_of(stated, joint, key, source) != wanted:
+        if float(stated or 0) != wanted:
             dynamics = dynamics or joint.add("dynamics", {})
             dynamics.set({key: repr(wanted)})
-
-
-def _number_of(text: str, joint: XmlNode, key: str, source: Path) -> float:
-    """The number of an attribute of <dynamics>, zero where it is missing; InputError for what is none."""
-    try:
-        return float(text or 0)
-    except ValueError:
-        name = joint.attributes.get("name")
-        raise InputError(f"{source}, joint '{name}': dynamics {key}='{text}' should be a number") from None
 
 
 def _check_urdf(simulated: SimulatorModel, text: str, target: Target) -> None:

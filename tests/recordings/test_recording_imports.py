@@ -240,7 +240,7 @@ def test_a_recording_of_a_robot_with_a_gripper_holds_a_robot_file_of_its_arm(tmp
     ("given", "message"),
     [
         ({"robot": "irb120-arm", "tip": "hand"}, "irb120-arm is built in, as one chain of joints"),
-        ({"robot": None, "lock": ("finger1=0",)}, "--tip and --lock belong to a robot file"),
+        ({"robot": None, "lock": ("finger1=0",)}, "--tip, --lock and --repair belong to a robot file"),
         ({"robot": "arm.yaml", "tip": "hand"}, "only joints of a URDF or MJCF (.xml) file can be locked"),
     ],
 )
