@@ -77,6 +77,12 @@ class XmlNode:
         kept = {**self.attributes, **attributes}
         self.attributes = {key: value for key, value in kept.items() if value is not None}
 
+    def rename(self, tag: str) -> None:
+        """Gives the element another tag; its attributes stay."""
+        self.head = f"<{tag}{self.head[len(self.tag) + 1 :]}"
+        self.tail = f"</{tag}>" if self.tail else ""
+        self.tag = tag
+
     def set_numbers(self, attributes: Mapping[str, str | None]) -> None:
         """Changes attributes of numbers as `set`; those that differ by rounding alone stay as written."""
         self.set({key: value for key, value in attributes.items() if not _is_rounding(self.attributes.get(key), value)})

@@ -37,6 +37,7 @@ KEPT_ARRAYS = (
     *("body_pos", "body_quat", "jnt_type", "jnt_pos", "jnt_axis", "jnt_range", "qpos0", "geom_type", "geom_size"),
     *("geom_pos", "site_pos", "eq_type", "eq_data", "tendon_range", "mesh_vertnum", "sensor_type"),
 )
+KEPT_OF_SERVO = ("name", "class", "joint", "jointinparent", "group", "user", "armature", "damping")
 KEPT_OF_ACTUATORS = ("trntype", "trnid", "gear", "ctrlrange", "forcerange", "gainprm")
 
 
@@ -213,7 +214,9 @@ def _drive_numbers(node: XmlNode, drive: Drive, before: Any, number: int | None,
         law = {"gaintype": "fixed", "biastype": "affine"} | ({"dyntype": "none"} if has_filter else {})
         gains = {**law, "gainprm": repr(drive.kp), "biasprm": format_numbers((0.0, -drive.kp, -drive.kv))}
     else:
-        raise InputError(f"{path.name}, line {node.line}: <{node.tag}> is no position servo, which the model has there")
+        gains = _make_servo(node) | {"kp": repr(drive.kp), "kv": repr(drive.kv)}
+    if number is not None and before.actuator_gear[number, 0] != 1:
+        gains |= _without_gear(before, number)
     if present is None or (present.kp, present.kv) != (drive.kp, drive.kv):
         numbers |= gains
     if present is None or present.limit != drive.limit:
@@ -224,6 +227,21 @@ def _drive_numbers(node: XmlNode, drive: Drive, before: Any, number: int | None,
         steps = math.ceil(drive.delay / before.opt.timestep) + 1 if drive.delay else 0
         numbers |= {"delay": repr(drive.delay), "nsample": str(steps)}
     return numbers
+
+
+def _make_servo(node: XmlNode) -> dict[str, str | None]:
+    """Turns an actuator of another kind into a servo of its joint; what it had beside its name and place goes."""
+    node.rename("position")
+    node.set({key: None for key in node.attributes if key not in KEPT_OF_SERVO})
+    return {"ctrllimited": "false", "timeconst": "0"}
+
+
+def _without_gear(model: Any, number: int) -> dict[str, str | None]:
+    """Attributes of an actuator at its joint, whose rotor and damping weigh there as they did behind the gear."""
+    gear = float(model.actuator_gear[number, 0])
+    own = {name: getattr(model, f"actuator_{name}", None) for name in ("armature", "damping")}
+    weights = {name: float(values[number]) for name, values in own.items() if values is not None and values[number]}
+    return {"gear": "1", **{name: repr(gear**2 * value) for name, value in weights.items()}}
 
 
 def _read_drive(model: Any, number: int) -> Drive:

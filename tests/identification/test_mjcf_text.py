@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import yaml
 from numpy.testing import assert_allclose
-from refusals import refusal
 
 from armlab.common.arrays import Array
 from armlab.diagnosis.motion import servo_plugin
@@ -215,19 +214,26 @@ def test_the_drives_of_a_model_of_motion_go_into_the_actuators(tmp_path: Path, d
 
 
 @pytest.mark.parametrize(
-    ("drive", "message"),
+    "drive",
     [
-        ('<motor joint="elbow"/>', "two.xml, line 19: <motor> is no position servo, which the model has there"),
-        ('<general joint="elbow" gainprm="30"/>', "two.xml, line 19: <general> is no position servo"),
-        ('<position joint="elbow" kp="30" gear="2"/>', "the actuator of joint 'elbow' does not take the drive"),
+        '<motor name="servo" joint="elbow" gear="7" ctrlrange="-1 1"/>',
+        '<general name="servo" joint="elbow" gainprm="30"/>',
+        '<velocity name="servo" joint="elbow" kv="3"></velocity>',
+        '<position name="servo" joint="elbow" kp="30" gear="2"/>',
     ],
 )
-def test_an_actuator_that_is_no_position_servo_is_not_made_one(tmp_path: Path, drive: str, message: str) -> None:
+def test_an_actuator_of_another_kind_becomes_the_servo_that_the_model_has_there(tmp_path: Path, drive: str) -> None:
     source = tmp_path / "two.xml"
     source.write_text(PLAIN.replace('<position name="servo" joint="elbow" kp="30"/>', drive))
     model = model_of(source)
     model.write_text(yaml.safe_dump(yaml.safe_load(model.read_text()) | {"controller": CONTROLLER}))
-    assert message in refusal(lambda: list(export_model(model, tmp_path / "out.xml")))
+    list(export_model(model, tmp_path / "out.xml"))
+    read = mujoco.MjModel.from_xml_path(str(tmp_path / "out.xml"))
+    assert read.actuator(0).name == "servo"
+    assert read.actuator_gear[0, 0] == 1
+    assert not read.actuator_ctrllimited[0]
+    assert_allclose(read.actuator_gainprm[0, 0], 1 / 3, rtol=1e-15)
+    assert_allclose(read.actuator_biasprm[0, :3], [0, -1 / 3, 0], rtol=1e-15)
 
 
 def test_a_drive_of_a_model_has_no_filter_of_its_command(tmp_path: Path) -> None:
