@@ -12,7 +12,7 @@ from armlab.diagnosis.intervals import ShapedFit, extend_with_shapes
 from armlab.diagnosis.links import Widths
 from armlab.diagnosis.prediction import Prediction
 from armlab.diagnosis.result import Claim, Rival, Weighed
-from armlab.effects.contract import Effect
+from armlab.effects.contract import Candidate, Effect
 from armlab.effects.links import LinkLaw, felt_values, link_law
 from armlab.effects.parameters import parameter_values
 
@@ -75,8 +75,7 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
     own = np.zeros(model.moments.size)
     own[columns] = coefficients
     rivals = tuple(Rival(name, candidate.joint, candidate.joints, True) for name in candidate.identical)
-    present = model.design.simulation.coefficients_of(candidate)
-    simulated = candidate.parameters(present) if present.any() else {}
+    simulated = _parameters_of_simulation(candidate, model.design.simulation.coefficients_of(candidate))
     return Claim(
         effect=candidate.effect,
         joint=candidate.joint,
@@ -91,8 +90,16 @@ def _effect_claim(model: FittedModel, wide: ShapedFit, group: int, place: int, e
         coefficients=coefficients,
         covariance=covariance,
         group=place,
-        simulated={name: value for name, value in simulated.items() if isinstance(value, float)},
+        simulated=simulated,
     )
+
+
+def _parameters_of_simulation(candidate: Candidate, present: Array) -> dict[str, float]:
+    """Scalar parameters of a law as the simulation has it, those of its shape left out; none without such a law."""
+    if not present.any():
+        return {}
+    shapes, values = candidate.parameters(np.zeros_like(present)), candidate.parameters(present)
+    return {name: value for name, value in values.items() if isinstance(value, float) and value != shapes[name]}
 
 
 def _link_claims(

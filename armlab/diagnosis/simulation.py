@@ -11,7 +11,8 @@ from armlab.diagnosis.data import Observed
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.tuning import SoundnessTuning
 from armlab.effects.contract import Candidate
-from armlab.effects.scene import Scene, scene_of
+from armlab.effects.model import FittedEffect
+from armlab.effects.scene import Scene, instants, scene_of
 from armlab.identification.model_file import read_model
 from armlab.identification.nominal import nominal_model
 from armlab.identification.torque_model import TorqueModel
@@ -19,7 +20,11 @@ from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
 from problem.joint_words import joints_in_words
+from problem.motion import Motion
 from problem.regressor import rigid_body_torque
+
+SPEEDS = np.geomspace(1e-3, 5.0, 40)  # rad/s (m/s) at which two laws of friction are compared
+MAX_LAW_ERROR = 1e-6  # of the largest torque: more is another law
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +46,16 @@ class Simulation:
         return frozenset(range(1, len(self.arm) + 1)) - known
 
     def coefficients_of(self, candidate: Candidate) -> Array:
-        """Coefficients of a law as the simulation has it already at its place, zeros where it has none."""
+        """Coefficients of a law as the simulation has it already at its place, zeros where it has none.
+
+        Friction that is a special case of the law counts, as Coulomb friction is of Stribeck friction.
+        """
         out = np.zeros(candidate.size)
         for each in () if self.model is None else self.model.effects:
             if place_of(each.candidate) == place_of(candidate) and len(each.coefficients) == len(out):
                 out = out + each.coefficients
+            elif _is_of_speed(candidate) and _is_of_speed(each.candidate) and each.candidate.joint == candidate.joint:
+                out = out + _as_law(candidate, each, self.arm)
         return out
 
     def torque(self, scene: Scene) -> Array:
@@ -76,6 +86,24 @@ class Simulation:
         if self.kind == "simulated" and run.simulated_torque is not None:
             return run.simulated_torque
         return self.torque(scene)
+
+
+def _is_of_speed(candidate: Candidate) -> bool:
+    """Whether it is friction of one joint by that joint's velocity alone, now."""
+    of_other = candidate.of_time or candidate.follows_model or candidate.of_channel
+    return candidate.is_friction and candidate.facts.axis == "velocity" and not of_other
+
+
+def _as_law(candidate: Candidate, effect: FittedEffect, arm: Arm) -> Array:
+    """Coefficients with which a friction law is another friction of its joint exactly; zeros where none are."""
+    velocity = np.zeros((2 * len(SPEEDS), len(arm)))
+    velocity[:, candidate.rows[0]] = np.concatenate([SPEEDS, -SPEEDS])
+    still = np.zeros_like(velocity)
+    scene = instants(arm, Motion(still, velocity, still))
+    columns, torque = candidate.columns(scene)[:, 0], effect.torque(scene)[:, candidate.rows[0]]
+    found = np.linalg.lstsq(columns, torque, rcond=None)[0]
+    is_same = np.abs(columns @ found - torque).max() <= MAX_LAW_ERROR * np.abs(torque).max()
+    return np.asarray(found) if is_same else np.zeros(candidate.size)
 
 
 def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulation:

@@ -12,8 +12,12 @@ from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.report.content import parameter_table
 from armlab.diagnosis.report.verdict import verdict_lines
 from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.verdict_files import make_verdict
+from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, PowerFriction, StribeckFriction, ViscousFriction
+from armlab.effects.term import Term
 from armlab.identification.model_file import model_content
+from armlab.identification.nominal import nominal_model
 from armlab.recordings.load import load_recording
 from problem.drive_torque import drive_torque
 from problem.motion import Motion
@@ -91,3 +95,24 @@ def test_the_model_found_holds_the_laws_of_the_file_and_the_differences(found: D
         *(("coulomb_friction", joint) for joint in (1, 2)),
         *(("viscous_friction", joint) for joint in (1, 2)),
     ]
+
+
+@pytest.mark.parametrize(
+    ("law", "expected"),
+    [
+        (CoulombFriction, [2.0]),
+        (ViscousFriction, [1.2]),
+        (StribeckFriction, [2.0, 0.0]),
+        (LevelsAndSlopes, [2.0, 2.0, 1.2, 1.2]),
+        (PowerFriction, [0.0]),
+    ],
+)
+def test_friction_of_the_file_counts_in_each_law_of_which_it_is_a_special_case(
+    tmp_path: Path, law: type[Term], expected: list[float]
+) -> None:
+    (tmp_path / "arm.xml").write_text(ARM)
+    arm = load_arm(str(tmp_path / "arm.xml"))
+    simulation = Simulation("nominal", arm, arm.parameters, nominal_model(arm, "arm.xml"))
+    shape = {StribeckFriction: (0.05, 2.0), PowerFriction: (2.0,)}.get(law, ())
+    candidate = law.at(arm, 1, shape=shape, bounds=((0.0, 9.0),) * len(shape))
+    np.testing.assert_allclose(simulation.coefficients_of(candidate), expected, atol=1e-9)
