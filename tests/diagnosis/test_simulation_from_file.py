@@ -28,7 +28,7 @@ ARM = """<mujoco><compiler angle="radian"/><worldbody>
 <inertial mass="3" pos=".2 0 .02" diaginertia=".01 .05 .05"/>
 <body name="b" pos=".4 0 0"><joint name="bend" axis="0 1 0" damping=".5" frictionloss="1" stiffness="6" springref=".4"/>
 <inertial mass="1" pos=".15 0 0" diaginertia=".004 .02 .02"/></body></body></worldbody></mujoco>"""
-MORE_FRICTION = (-0.8, 0.5)  # N m, of the arm beyond its file
+MORE_FRICTION = (-2.0, 0.5)  # N m, of the arm beyond its file: the first joint has none at all
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,7 @@ def test_the_summary_says_too_much_where_the_file_has_more_than_the_arm(found: D
     summary = " ".join("\n".join(verdict_lines(found)).split())
     assert "lacks Coulomb friction of 0." in summary
     assert "(it has 1.00 N m) at bend" in summary
-    assert "It has too much Coulomb friction of 0." in summary
+    assert "It has too much Coulomb friction of " in summary
     assert "(it has 2.00 N m) at lift" in summary
 
 
