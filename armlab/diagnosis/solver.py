@@ -21,6 +21,9 @@ from armlab.diagnosis.tuning import SolverTuning
 MAX_OVERSHOOT = 0.1  # of a law of the simulation, by which a finding may take off more than all of it (chosen by eye)
 
 
+MAX_KEPT_FITS = 2000  # of a solver: of seven joints each takes 50 kB, and a search asks for 20,000
+
+
 @dataclass(frozen=True)
 class State:
     """The groups of a model by number, ascending; widths: of the links' errors, None where base parameters are free."""
@@ -76,7 +79,8 @@ class Solver:
         self.simulated, self.tuning = simulated, tuning
         self.precisions = self._precisions(scales)
         self._links: dict[Widths | None, tuple[Array, Array, float, float]] = {}
-        self._fits: dict[State, Fit] = {}
+        self._fits: dict[State, Fit] = {}  # those that were asked for last
+        self._held: dict[State, Fit] = {}
         self._contained: dict[int, tuple[int, ...]] = {}
 
     def _precisions(self, scales: Sequence[float]) -> Array:
@@ -169,9 +173,13 @@ class Solver:
 
     def fit(self, state: State) -> Fit:
         """The fit of a state, kept for the next question."""
-        if state not in self._fits:
-            self._fits[state] = self._fitted(state)
-        return self._fits[state]
+        if state in self._held:
+            return self._held[state]
+        fit = self._fits.pop(state, None) or self._fitted(state)
+        self._fits[state] = fit  # as the last one
+        if len(self._fits) > MAX_KEPT_FITS:
+            del self._fits[next(iter(self._fits))]
+        return fit
 
     def hold(self, state: State, coefficients: Array) -> None:
         """Keeps coefficients (size,) as the fit of a state: what a constraint that columns do not know has made them.
@@ -181,7 +189,7 @@ class Solver:
         free, gram = self.fit(state), self.moments.gram
         chi_square = float(2 * coefficients @ gram[:-1, -1] - coefficients @ gram[:-1, :-1] @ coefficients)
         score = free.score - max(free.chi_square - chi_square, 0.0) / 2
-        self._fits[state] = replace(free, coefficients=coefficients, chi_square=chi_square, score=score)
+        self._held[state] = replace(free, coefficients=coefficients, chi_square=chi_square, score=score)
 
     def _columns(self, state: State) -> NDArray[np.intp]:
         parts = [self.groups[group].columns for group in state.groups]
@@ -210,7 +218,7 @@ class Solver:
         chi_square, inverse = 0.0, np.empty((0, 0))
         if len(matrix):
             inverse = cho_solve(cho_factor(matrix, lower=True), np.eye(len(matrix)))
-            towards = np.concatenate([products[:, -1], self.moments.gram[columns, -1]])
+            towards = self.products(state)[:, -1]
             solution = inverse @ towards
             chi_square = float(solution @ towards)
             rank = factor.shape[1]
