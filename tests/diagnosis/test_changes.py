@@ -38,6 +38,8 @@ from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
 from problem.regressor import rigid_body_torque
 
+pytestmark = pytest.mark.usefixtures("each_diagnosed_once")
+
 LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
 
 
