@@ -100,9 +100,9 @@ def _ray(start: Callable[..., Any], site: Path) -> str:
     port = _free_port()
     head = ("start", "--head", "--block", "--port", port, "--node-ip-address", "127.0.0.1", "--num-cpus", "2")
     ray = [sys.executable, "-c", "from ray.scripts.scripts import main; main()"]
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    start(*ray, *head, "--include-dashboard=false", "--disable-usage-stats", **quiet, cwd=site)
-    _wait(lambda: _listens(port))
+    with (site / "ray.txt").open("w") as said:
+        start(*ray, *head, "--include-dashboard=false", "--disable-usage-stats", stdout=said, stderr=said, cwd=site)
+    _wait(lambda: "Ray runtime started" in (site / "ray.txt").read_text())  # it listens long before it has a node
     return f"127.0.0.1:{port}"
 
 
@@ -119,7 +119,7 @@ def _listens(port: int) -> bool:
         return found.connect_ex(("127.0.0.1", port)) == 0
 
 
-def _wait(for_what: Callable[[], bool], seconds: float = 60) -> None:
+def _wait(for_what: Callable[[], bool], seconds: float = 300) -> None:
     end = time.monotonic() + seconds
     while not for_what():
         assert time.monotonic() < end
@@ -180,5 +180,5 @@ def test_a_killed_driver_loses_nothing_finished_and_a_restart_computes_exactly_w
 def _is_quiet(site: Path) -> bool:
     """Whether the workers have let go of what a dead driver had asked for."""
     before = _started(site)
-    time.sleep(1.0)
+    time.sleep(3.0)
     return _started(site) == before
