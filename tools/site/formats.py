@@ -20,6 +20,7 @@ TITLES = {
     "model": "The file model.yaml",
     "verdict": "The file verdict.json",
     "comparison": "The file comparison.json",
+    "facts": "A file of facts",
 }
 FIRST_LINES = {
     "recording": "A recording is a folder with this file and its runs: [recordings](../recordings.md) has an example.",
@@ -27,6 +28,7 @@ FIRST_LINES = {
     "model": "Written by `identify` and `diagnose`; `predict`, `diagnose` and `export-model` read it.",
     "verdict": "Written by `diagnose`. [Diagnosis](../diagnosis.md) says how it is found.",
     "comparison": "Written by `diagnose --compare`. [Changes](../changes.md) says how it is found.",
+    "facts": "What is known of recordings, for `armlab real --facts`: [recordings](../recordings.md) has an example.",
 }
 OTHER_PAGES = ("commands/index", "configuration", "parameters", "python")
 
