@@ -213,7 +213,7 @@ class Solver:
 
     def _fitted(self, state: State) -> Fit:
         matrix, columns = self.system(state)
-        factor, products, _, price = self.links(state.widths)
+        factor, _, _, price = self.links(state.widths)
         coefficients = np.zeros(self.moments.size)
         chi_square, inverse = 0.0, np.empty((0, 0))
         if len(matrix):
