@@ -91,6 +91,7 @@ def next_experiment(
     multiple=True,
     help="Write the table of joints for a paper, too: joints.tex, .pdf, .svg; repeatable.",
 )
+@click.option("--verbose", is_flag=True, help="Print every finding with its evidence, what is left, and all errors.")
 @prints_result
 def diagnose(
     recordings: tuple[Path, ...],
@@ -105,6 +106,7 @@ def diagnose(
     only_setup: bool,
     mcap: bool,
     tables: tuple[str, ...],
+    verbose: bool,
 ) -> ResultLines:
     """Find the physics that the simulation of RECORDING lacks.
 
@@ -122,6 +124,8 @@ def diagnose(
         raise InputError("--mcap: a comparison has no predicted signals, leave out --mcap or --compare")
     if old is not None and tables:
         raise InputError("--table: a comparison has no table of joints, leave out --table or --compare")
+    if old is not None and verbose:
+        raise InputError("--verbose: a comparison prints all that it found, leave out --verbose or --compare")
     if old is None and len(recordings) > 1:
         raise InputError("one recording is diagnosed at a time: give --compare to compare several")
     motion_only = is_motion_only(recordings[0])
@@ -134,7 +138,7 @@ def diagnose(
     if motion_only and old is None:
         from armlab.diagnosis.motion.write import diagnose_motion_recording
 
-        return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap, tables)
+        return diagnose_motion_recording(recordings[0], out, tell_progress, changes, mcap, tables, verbose)
     if motion_only and old is not None:
         from armlab.diagnosis.motion.compare_write import compare_motion_recordings
 
@@ -146,7 +150,7 @@ def diagnose(
     from armlab.diagnosis.report.write import diagnose_recording
 
     return diagnose_recording(
-        recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap, tables
+        recordings[0], out, baseline, seed, without, changes, as_read, only_setup, tell_progress, mcap, tables, verbose
     )
 
 

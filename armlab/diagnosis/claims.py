@@ -13,7 +13,7 @@ from armlab.diagnosis.links import Widths
 from armlab.diagnosis.prediction import Prediction
 from armlab.diagnosis.result import Claim, Rival, Weighed
 from armlab.effects.contract import Candidate, Effect
-from armlab.effects.links import LinkLaw, felt_values, link_law
+from armlab.effects.links import INERTIAL_ERROR_FACTS, LinkLaw, felt_values, link_law
 from armlab.effects.parameters import parameter_values
 
 
@@ -147,6 +147,26 @@ def _link_claim(
         coefficients=coefficients,
         covariance=covariance,
         in_links=True,
+    )
+
+
+def links_claim(model: FittedModel, evidence: Evidence) -> Claim:
+    """That links are off, where these data do not tell which: no numbers, and the probability that any is.
+
+    evidence: for all of them together; its score is the log of a Bayes factor. model: on whose rows it is predicted.
+    """
+    torque, own = model.coefficients(model.fit), np.zeros(model.moments.size)
+    own[: model.columns.base] = torque[: model.columns.base]
+    return Claim(
+        effect=INERTIAL_ERROR_FACTS.id,
+        joint=None,
+        joints=(),
+        parameters=(),
+        equation="tau += Y(q, qd, qdd) delta_phi",
+        evidence=evidence,
+        prediction=model.columns.torque_of(own),
+        in_links=True,
+        probability=float(1 / (1 + np.exp(-np.clip(evidence.score, -700, 700)))),
     )
 
 

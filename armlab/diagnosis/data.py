@@ -199,6 +199,10 @@ class Observed:
                 out[role, joint] = tuple(parts)
         return out
 
+    def rows_held_out(self, joint: int) -> NDArray[np.bool_]:
+        """The rows (rows,) that took no part in a fit, and in which a joint (from 0) moves."""
+        return rows_in(self.of_role("validate", joint), self.rows)
+
     def reason_too_short(self, arm: Arm) -> str | None:
         """Why nothing can be said of a joint: it is never in motion for long enough; None where all are."""
         short = [joint + 1 for joint in range(self.joints) if not self.used(joint)]

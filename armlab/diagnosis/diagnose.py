@@ -6,16 +6,16 @@
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
 from armlab.diagnosis.added_body import possible_links, with_possible_bodies
-from armlab.diagnosis.claims import Names, make_claims
+from armlab.diagnosis.claims import Names, links_claim, make_claims
 from armlab.diagnosis.data import in_fixed_order, observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
-from armlab.diagnosis.evidence import Evidence, count_looks
+from armlab.diagnosis.evidence import Evidence, Judge, count_looks
 from armlab.diagnosis.expected_parts import claim_expected_parts
 from armlab.diagnosis.fits import joint_fits
 from armlab.diagnosis.fitted_model import (
@@ -29,11 +29,13 @@ from armlab.diagnosis.fitted_model import (
 from armlab.diagnosis.formats import Status
 from armlab.diagnosis.found_model import build_model
 from armlab.diagnosis.friction_curves import find_friction_curves, name_friction_curves
+from armlab.diagnosis.joint_friction import joint_friction
 from armlab.diagnosis.links import link_prior
 from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.naming.additions import Additions, add_probable, with_likeliest_names
 from armlab.diagnosis.naming.decide import named_claims
 from armlab.diagnosis.naming.weighing import weigh_effect, weigh_link, weigh_structure
+from armlab.diagnosis.parts import as_found, claim_facts, explain_error, weigh_claims
 from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
 from armlab.diagnosis.prediction import (
     Prediction,
@@ -41,15 +43,16 @@ from armlab.diagnosis.prediction import (
     filtered_residual,
     fit_prediction,
     with_smoothing_of,
+    with_usual,
 )
 from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, scan_what_is_left, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
 from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
 from armlab.diagnosis.solver import State
-from armlab.diagnosis.story import with_story
-from armlab.diagnosis.summary import describe_unnamed, summarise, unnamed_gain
 from armlab.diagnosis.surrogate import Structure
+from armlab.diagnosis.told.selection import stated_findings, with_minor_ones, without_lesser_unknowns
+from armlab.diagnosis.told.summary import describe_unnamed, summary_of, unnamed_gain
 from armlab.diagnosis.tuning import changed_numbers
 from armlab.diagnosis.unknown import (
     is_form_error,
@@ -191,7 +194,23 @@ def state_numbers(recording: Recording, named: "NamedEffects", progress: Progres
     claims += tuple(_without_prediction_of(each, unknowns) for each in added.unnamed)
     weighed = (*(claim.weighed for claim in claims), *added.nothing)
     claims = named_claims(claims, named.model.design.settings, named.model.design.simulation.joints_without_friction)
-    return replace(with_story(_assemble(recording, model, prediction, claims, unknowns, remains)), weighed=weighed)
+    claims = (*claims, *links_in_doubt(model, prediction.model, claims))
+    claims = stated_findings(weigh_claims(prediction.model, claims), model.columns.joints)
+    return replace(_assemble(recording, model, prediction, claims, unknowns, remains), weighed=weighed)
+
+
+def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Claim]) -> Iterator[Claim]:
+    """That links are off, where no claim says so and the model that predicts holds links that are.
+
+    names: the model of the claims, model: the one that predicts. Links that were given to be fitted are no finding.
+    """
+    widths = model.state.widths
+    about_links = any(claim_facts(each).where == "link" for each in claims)
+    if model.design.simulation.kind == "nominal" and widths is not None and any(widths) and not about_links:
+        claim = links_claim(names, Judge(model, model.state).together())
+        (weighed,) = weigh_claims(model, (claim,))
+        if weighed.removal is not None and not weighed.removal.is_minor:
+            yield weighed
 
 
 def _without_prediction_of(claim: Claim, unknowns: Sequence[Structure]) -> Claim:
@@ -282,14 +301,21 @@ def _assemble(
         noise[:, each.joint] -= each.prediction
     floor = noise_floor(noise, design.features, observed, tuning.surrogate)
     fits = joint_fits(refit, found, alone, floor, observed, tuning)
+    parts = explain_error(prediction.model, observed, claims, (start, final), floor)
+    claims = without_lesser_unknowns(claims, parts)
+    parts = explain_error(prediction.model, observed, claims, (start, final), floor)
+    errors = [each.after for each in fits]
+    parts = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in parts)
+    claims = tuple(replace(each, removal=as_found(each.removal, errors, observed)) for each in claims)
+    claims = with_minor_ones(claims, parts)
     hidden = unnamed_gain(fits, tuning.claims) if not claims else None
     status: Status = "mismatch" if claims else "none" if hidden is None else "inconclusive"
     base, covariance = prediction.model.base_parameters()
-    return Diagnosis(
+    diagnosis = Diagnosis(
         recording=recording,
         simulation=simulation,
         status=status,
-        summary=summarise(status, claims, fits, simulation) if hidden is None else describe_unnamed(hidden, found),
+        summary="" if hidden is None else describe_unnamed(hidden, found),
         observed=observed,
         nominal=design.target,
         refit=refit,
@@ -300,6 +326,8 @@ def _assemble(
         base_values=base,
         base_covariance=covariance,
         claims=claims,
+        parts=parts,
+        friction=joint_friction(replace(model, state=with_usual(model, model.state.groups))),
         located=locate_excess(start, floor, observed, tuning.location) if claims else (),
         unexplained=tuple(
             Unexplained(each.joint + 1, float(np.clip(each.share, 0, 1)), each.depends_on) for each in remains
@@ -309,6 +337,7 @@ def _assemble(
         looks=count_looks(model),
         settings=settings,
     )
+    return diagnosis if hidden is not None else replace(diagnosis, summary=summary_of(diagnosis))
 
 
 def _settings_used(settings: Settings) -> dict[str, float | str | bool]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 from armlab.diagnosis.evidence import Evidence, Judge
 from armlab.diagnosis.fitted_model import FittedModel
+from armlab.diagnosis.parts import removal_of
 from armlab.diagnosis.prediction import Prediction
 from armlab.diagnosis.pruning import reason_to_reject
 from armlab.diagnosis.search import Search, Step
@@ -22,7 +23,7 @@ def claim_expected_parts(
     """The same with usual friction and offsets of joints that have none, where leaving them out costs much held out.
 
     model, effects: with the names of the search. All friction of a joint is tested at once, without a correction for
-    what else was looked at; its gain is large instead.
+    what else was looked at; it is missed by more than a minor change instead.
     """
     found = dict(_that_matter(model, prediction))
     if not found:
@@ -52,7 +53,7 @@ def _that_matter(model: FittedModel, prediction: Prediction) -> Iterator[tuple[i
                 continue
             alike = [each for each in predicting.state.groups if _is_alike(predicting, each, joint, dissipates)]
             evidence = replace(judge.jointly(alike), usual=True)
-            if evidence.gain > settings.tuning.pruning.large_gain and reason_to_reject(evidence, settings) is None:
+            if not removal_of(predicting, alike).is_minor and reason_to_reject(evidence, settings) is None:
                 yield usual[_likeliest(predicting, alike, tuple(usual))], evidence
 
 

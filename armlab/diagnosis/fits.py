@@ -1,14 +1,20 @@
-"""Held-out errors of what is compared: the refitted rigid arm, a plain identification, named effects, the model."""
+"""Held-out errors of what is compared: the refitted rigid arm, plain least squares, a plain identification, named
+effects, the model.
+"""
 
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.prediction import filtered_residual, identification_runs, recorded_residual, with_smoothing_of
 from armlab.diagnosis.result import HeldOutErrors, JointFit
 from armlab.diagnosis.tuning import Tuning
 from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.cutoff_trial import choose_cutoff_hz
+from armlab.recordings.plain_least_squares import fit_plain_model
+from problem.arm import Arm
 
 
 def joint_fits(
@@ -19,7 +25,7 @@ def joint_fits(
     rigid, identified = (
         with_smoothing_of(found, Identifier(found.arm, parts).fit(runs).model_) for parts in ((), None)
     )
-    models = (found, alone, identified)
+    models, plain = (found, alone, identified), plain_residual(found.arm, observed)
     filtered = [refit, *(filtered_residual(each, observed) for each in models)]
     recorded = [recorded_residual(each, observed) for each in (rigid, *models)]
     out = []
@@ -31,5 +37,19 @@ def joint_fits(
         )
         gap = smooth.before - noise
         closed = (smooth.before - smooth.after) / gap if gap > tuning.claims.min_gap * noise else None
-        out.append(JointFit(joint + 1, smooth, raw, noise, closed))
+        yardstick = None if plain is None else float(np.sqrt(np.mean(plain[rows, joint] ** 2)))
+        out.append(JointFit(joint + 1, smooth, raw, noise, closed, yardstick))
     return tuple(out)
+
+
+def plain_residual(arm: Arm, observed: Observed) -> Array | None:
+    """What plain least squares leaves behind the filter of the torque, (rows, joints); None where it has no rows.
+
+    It is fitted to the stretches that identify, at the cut-off that predicts best inside them.
+    """
+    runs = identification_runs(observed)
+    try:
+        model = fit_plain_model(arm, runs, choose_cutoff_hz(arm, runs))
+    except DataError:
+        return None
+    return np.concatenate([each.torque - each.filter(model.predict(each.run)) for each in observed.signals])

@@ -108,8 +108,9 @@ class FindingEntry(Entry):
     kind: `physics` (an effect of the library), `setup` (the recording or the robot file is read wrongly), `link`
     (payload, inertial parameters) or `unknown`; the first verdicts do not have this key.
     joint: from 1, the link for kind `link`, null for the whole robot. joints: of a coupling, where the torque appears
-    and where the motion is. heldout_rms: N m (N), without and with the finding. p_value: corrected for all comparisons.
-    form: the law or the quantity. share_of_gap: of the held-out error above the noise. probability: of the name.
+    and where the motion is. heldout_rms: N m (N), of the model found without the finding, the rest fitted anew, and
+    with it. p_value: corrected for all comparisons. form: the law or the quantity. share_of_gap: of the held-out error
+    above the noise. minor: in the model and in this list, and of no practical size. probability: of the name.
     class: effects and joints with their probabilities.
     """
 
@@ -124,6 +125,7 @@ class FindingEntry(Entry):
     heldout_rms_after: float
     p_value: float | None = None
     share_of_gap: float | None = None
+    minor: bool | None = None
     probability: Share | None = None
     class_: tuple[ClassMember, ...] | None = Field(default=None, alias="class")
     rivals: tuple[RivalEntry, ...]
@@ -136,6 +138,32 @@ class UnexplainedEntry(Entry):
     joint: JointNumber | None
     share: float
     depends_on: tuple[str, ...]
+
+
+class FrictionEntry(Entry):
+    """All friction that was found at a joint, whatever its laws: its torque, N m (N), at two speeds, rad/s (m/s).
+
+    speeds: the 10 and 90 % quantiles of the joint's own. ci95: 95 % intervals.
+    """
+
+    joint: JointNumber
+    speeds: tuple[float, float]
+    torque: tuple[float, float]
+    ci95: tuple[tuple[float, float], tuple[float, float]]
+
+
+class LeftEntry(Entry):
+    """What is left at a joint on held-out data. rms, noise: N m (N). share_of_torque: of the rms of its torque.
+
+    depends_on: variables that predict part of it. usual: whether real arms leave as much.
+    """
+
+    joint: JointNumber
+    share_of_torque: float
+    rms: float
+    noise: float
+    depends_on: tuple[str, ...]
+    usual: bool
 
 
 class RecordedEntry(Entry):
@@ -165,9 +193,10 @@ class FitEntry(Entry):
 
     before: of the refitted rigid body. after: with the model found, surrogates of unknowns left out. named: with the
     named effects alone. identify: of a plain identification of the same recording (friction, offset and rotor inertia
-    of each joint). noise_floor: of the noise alone. gap_closed: 1 where the model reaches the noise; null where there
-    was no gap. replay: error of the position, rad (m), when the commands are sent through the simulation. current: that
-    of a recording of motion only.
+    of each joint). plain: of plain least squares (rigid links, Coulomb, viscous, offset and rotor inertia), a program
+    of its own. noise_floor: of the noise alone. gap_closed: 1 where the model reaches the noise; null where there was
+    no gap. replay: error of the position, rad (m), when the commands are sent through the simulation. current: that of
+    a recording of motion only.
     """
 
     joint: JointNumber
@@ -175,6 +204,7 @@ class FitEntry(Entry):
     heldout_rms_after: float
     heldout_rms_named: float | None = None
     heldout_rms_identify: float | None = None
+    heldout_rms_plain: float | None = None
     noise_floor: float
     gap_closed: float | None
     recorded: RecordedEntry | None = None
@@ -206,6 +236,8 @@ class VerdictFile(Entry):
     located: tuple[LocatedEntry, ...]
     findings: tuple[FindingEntry, ...]
     unexplained: tuple[UnexplainedEntry, ...]
+    friction: tuple[FrictionEntry, ...] | None = None
+    left: tuple[LeftEntry, ...] | None = None
     fit: tuple[FitEntry, ...]
 
 

@@ -225,7 +225,7 @@ class _Trial:
         if noise is None:
             plain = fit_noise(design.target, observed, 0.0, tuning.noise, colour=False)
             first = _fitted(design, plain, state.widths)
-            left = first.residual(first.solver.fit(_with_usual(first, names)))
+            left = first.residual(first.solver.fit(with_usual(first, names)))
             noise = fit_noise(left, observed, 0.0, tuning.noise, colour=False)
         model = _fitted(design, noise, state.widths)
         everything = model.solver.fit(State(tuple(range(len(model.solver.groups))), state.widths))
@@ -237,7 +237,7 @@ class _Trial:
         return cls(
             model,
             names,
-            _with_usual(model, names),
+            with_usual(model, names),
             _targets(rows, values),
             _targets(raw, values),
             tuple(noise.numbers(own, joint, observed, "identify") for joint in joints),
@@ -375,7 +375,7 @@ def _fitted(design: DesignMatrix, noise: Noise, widths: tuple[float, ...] | None
     return FittedModel(design, noise, moments, solver, State((), widths))
 
 
-def _with_usual(model: FittedModel, names: tuple[int, ...]) -> State:
+def with_usual(model: FittedModel, names: tuple[int, ...]) -> State:
     """Named effects, and the usual ones that none of them replaces and that physics allows."""
     search = Search(model.solver, model.design.settings, True, 0)
     state = State(names, model.state.widths)

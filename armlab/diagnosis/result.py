@@ -69,16 +69,71 @@ class Member:
         return Rival(self.effect, self.joint, self.joints)
 
 
+MAX_MINOR_GROWTH, MAX_MINOR_SHARE = 0.05, 0.01  # of the held-out error, and of the torque: less is of no practical size
+
+
+@dataclass(frozen=True)
+class Removal:
+    """What the held-out error of a joint, from 0, becomes where something is taken away and the rest is fitted anew.
+
+    growth: of the error, as a share. rms, torque: N m (N), the error with it, and the torque. joints: all those, from
+    0, whose error grows by more than a minor change; better: those whose error falls by more.
+    """
+
+    joint: int
+    growth: float
+    rms: float
+    torque: float
+    joints: tuple[int, ...] = ()
+    better: tuple[int, ...] = ()
+
+    @property
+    def is_minor(self) -> bool:
+        """Whether the error changes by so little that nobody would miss it."""
+        return self.growth < MAX_MINOR_GROWTH or self.growth * self.rms < MAX_MINOR_SHARE * self.torque
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a model holds of one cause at one place, claimed or not. claims: places of those about it, from 0.
+
+    cause: see `parts.cause_of`. joint: or link, from 1, None for the whole robot or all links; joints: both of a
+    coupling. effects: ids. removal: of all of it together. share: of the squared error that there was to explain;
+    shares: of its claims, which sum to it where there are any.
+    """
+
+    cause: str
+    joint: int | None
+    joints: tuple[int, ...]
+    effects: tuple[str, ...]
+    claims: tuple[int, ...]
+    removal: Removal | None
+    share: float = 0.0
+    shares: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class JointFriction:
+    """All friction of a model at a joint, from 1: its size, N m (N), at two speeds, rad/s (m/s), and 95 % intervals."""
+
+    joint: int
+    speeds: tuple[float, float]
+    torque: tuple[float, float]
+    interval: tuple[tuple[float, float], tuple[float, float]]
+
+
 @dataclass(frozen=True, eq=False)
 class Claim:
     """One finding. joint: from 1, the link for parameters of a link, None for the whole robot.
 
     candidate, coefficients, covariance: the terms that add to the model, None for `unknown`. prediction: (rows,
     joints), N m, its torque at the kept rows. depends_on: variables of an unknown. in_links: whether the links of the
-    model found hold it already. group: its number in the model that predicts. weighed: names that it could have.
+    model found hold it already. group: its number in the model that predicts; unnamed: those of laws that stand there
+    for a finding without a name. weighed: names that it could have.
     probability: of its name; members: of its class, the likeliest first, where the name alone is not probable enough.
     left_out: the part of its torque that the model found does not predict. simulated: its scalar parameters as the
-    simulation has them, where it has a law of this kind there, to which the finding adds.
+    simulation has them, where it has a law of this kind there, to which the finding adds. removal: of it alone from the
+    model found. minor: of no practical size, or not among the findings that are told (`armlab.diagnosis.told`).
     """
 
     effect: str
@@ -96,11 +151,14 @@ class Claim:
     depends_on: tuple[str, ...] = ()
     in_links: bool = False
     group: int | None = None
+    unnamed: tuple[int, ...] = ()
     weighed: Weighed = ()
     probability: float | None = None
     members: tuple[Member, ...] = ()
     left_out: Array | float = 0.0
     simulated: Mapping[str, float] = field(default_factory=dict)
+    removal: Removal | None = None
+    minor: bool = False
 
 
 @dataclass(frozen=True)
@@ -141,6 +199,7 @@ class JointFit:
     """Held-out errors of a joint against the filtered torque and the torque as recorded.
 
     noise_floor: N m (N), of the filtered torque's noise. gap_closed: from the refitted rigid arm to the noise.
+    plain: of plain least squares against the filtered torque, None where it could not be fitted.
     """
 
     joint: int
@@ -148,6 +207,7 @@ class JointFit:
     recorded: HeldOutErrors
     noise_floor: float
     gap_closed: float | None
+    plain: float | None = None
 
     @property
     def before(self) -> float:
@@ -187,6 +247,8 @@ class Diagnosis:
     base_values: Array | None = None
     base_covariance: Array | None = None
     claims: tuple[Claim, ...] = ()
+    parts: tuple[Part, ...] = ()
+    friction: tuple[JointFriction, ...] = ()
     located: tuple[Located, ...] = ()
     unexplained: tuple[Unexplained, ...] = ()
     fit: tuple[JointFit, ...] = ()

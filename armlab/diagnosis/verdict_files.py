@@ -3,7 +3,7 @@
 import math
 import os
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,8 @@ from armlab.diagnosis.formats import (
     ClassMember,
     FindingEntry,
     FitEntry,
+    FrictionEntry,
+    LeftEntry,
     LocatedEntry,
     ParameterEntry,
     RecordedEntry,
@@ -29,7 +31,8 @@ from armlab.diagnosis.formats import (
 )
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.result import Claim, Diagnosis, JointFit, Located, Unexplained
-from armlab.diagnosis.story import Chapter, finding_shares, tell_story
+from armlab.diagnosis.told.causes import ToldCause, finding_shares
+from armlab.diagnosis.told.told import finding_errors, tell
 from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.model_file import model_text
@@ -81,16 +84,21 @@ def check_can_be_written(folder: Path) -> None:
 
 def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
     """The content of `verdict.json`."""
-    story, shares = tell_story(diagnosis), finding_shares(diagnosis)
+    told, shares = tell(diagnosis), finding_shares(diagnosis.parts, len(diagnosis.claims))
     setup = tuple(_setup_entry(each) for each in (diagnosis.setup.findings if diagnosis.setup else ()))
     return VerdictFile(
         schema=VERDICT_SCHEMA,
         status=diagnosis.status,
         summary=diagnosis.summary,
-        story=tuple(_story_entry(each, len(setup)) for each in story),
+        story=tuple(_story_entry(each, len(setup)) for each in told.causes),
         located=tuple(_located_entry(each) for each in diagnosis.located),
         findings=(*setup, *(_finding_entry(*each) for each in zip(diagnosis.claims, shares, strict=True))),
         unexplained=tuple(_unexplained_entry(each) for each in diagnosis.unexplained),
+        friction=tuple(
+            FrictionEntry(joint=each.joint, speeds=each.speeds, torque=each.torque, ci95=each.interval)
+            for each in told.friction
+        ),
+        left=tuple(LeftEntry(**asdict(each)) for each in told.left),
         fit=tuple(_fit_entry(each) for each in diagnosis.fit),
     )
 
@@ -100,7 +108,7 @@ def _located_entry(each: Located) -> LocatedEntry:
     return LocatedEntry(joint=each.joint, share=each.share, where=where)
 
 
-def _story_entry(each: Chapter, setup: int) -> StoryEntry:
+def _story_entry(each: ToldCause, setup: int) -> StoryEntry:
     places = tuple(setup + place for place in each.findings)
     return StoryEntry(cause=each.cause, joints=each.joints, share_of_gap=each.share, findings=places)
 
@@ -128,8 +136,9 @@ def _setup_entry(each: SetupFinding) -> FindingEntry:
     return entry.model_copy(update={"class_": tuple(members)}) if each.rivals else entry
 
 
-def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
+def _finding_entry(claim: Claim, share: float) -> FindingEntry:
     effect = effect_named(claim.effect) if claim.candidate is None else claim.candidate.facts
+    before, after = finding_errors(claim)
     entry = FindingEntry(
         effect=claim.effect,
         kind=kind_of_effect(effect),
@@ -138,10 +147,11 @@ def _finding_entry(claim: Claim, share: float | None) -> FindingEntry:
         form=None if claim.candidate is None else claim.candidate.form or None,
         parameters={each.name: _finding_parameter(each, claim) for each in claim.parameters},
         equation=claim.equation,
-        heldout_rms_before=claim.evidence.rms_before,
-        heldout_rms_after=claim.evidence.rms_after,
+        heldout_rms_before=before,
+        heldout_rms_after=after,
         p_value=claim.evidence.corrected,
         share_of_gap=share,
+        minor=claim.minor,
         probability=claim.probability,
         rivals=tuple(RivalEntry(effect=each.effect, joint=each.joint) for each in claim.rivals),
         next_experiment=claim.next_experiment,
@@ -174,6 +184,7 @@ def _fit_entry(each: JointFit) -> FitEntry:
         heldout_rms_after=each.filtered.after,
         heldout_rms_named=each.filtered.named,
         heldout_rms_identify=each.filtered.identified,
+        heldout_rms_plain=each.plain,
         noise_floor=each.noise_floor,
         gap_closed=each.gap_closed,
         recorded=RecordedEntry(

@@ -224,6 +224,8 @@ class LinearSpring(Term):
 
     def first_name(self, coefficients: Array, scenes: Sequence[Scene]) -> Candidate:
         """A spring that carries a good part of gravity is a compensator: no cable does."""
+        if not feels_gravity(scenes[0].arm, self.joints[0]):
+            return self
         springs, weights = [], []
         for scene in scenes:
             position = scene.motion.position

@@ -58,6 +58,11 @@ class TrimmedButterworth(Butterworth):
         """Rows at each end that the end of the recording disturbs."""
         return int(np.ceil(TRIMMED_PERIODS * self.rate_hz / self.cutoff_hz))
 
+    @classmethod
+    def possible(cls, even: Run, cutoff_hz: float, step: int = 1) -> "TrimmedButterworth":
+        """The filter of a run with this cut-off, or the highest that its rate carries."""
+        return cls(even.rate_hz, min(cutoff_hz, MAX_CUTOFF_SHARE * even.rate_hz), even.samples, step)
+
 
 @dataclass(frozen=True, eq=False)
 class PlainRows:
@@ -127,6 +132,31 @@ class PlainFit:
         return float(dict(zip(self.names, self.values, strict=True)).get(f"{name}{joint}", 0.0))
 
 
+@dataclass(frozen=True, eq=False)
+class PlainModel:
+    """Plain least squares on runs that identify. joints, values: as of `PlainFit`."""
+
+    layout: "PlainLayout"
+    cutoff_hz: float
+    values: Array
+
+    def predict(self, run: Run) -> Array:
+        """Torque at every sample of a run that is even in time, (samples, joints), N m (N)."""
+        motion = smooth_motion(run, TrimmedButterworth.possible(run, self.cutoff_hz))
+        return np.asarray(self.layout.matrix(motion) @ self.values)
+
+
+def fit_plain_model(arm: Arm, runs: Sequence[Run], cutoff_hz: float) -> PlainModel:
+    """The model of an arm of which all joints move. Raises ValueError where no rows are left."""
+    prepared = [each for each in (prepare_rows(run, cutoff_hz) for run in runs) if len(each.torque)]
+    if not prepared:
+        raise DataError(f"no run is longer than {2 * TRIMMED_PERIODS} periods of {cutoff_hz:g} Hz")
+    top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
+    layout = PlainLayout(arm, tuple(range(len(arm))), top_speed)
+    matrix = np.concatenate([layout.matrix(each.motion) for each in prepared])
+    return PlainModel(layout, cutoff_hz, weighted_solution(matrix, np.concatenate([each.torque for each in prepared])))
+
+
 def fit_plain_recording(folder: Path, cutoff_hz: float | None = None) -> PlainFit:
     """Plain least squares on a recording folder, of motion only, too.
 
@@ -158,15 +188,15 @@ def fit_plain(
         missing = "identifies" if not fitted else "validates"
         raise DataError(f"no run that {missing} is longer than {2 * TRIMMED_PERIODS} periods of {cutoff:g} Hz")
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
-    layout = _Layout(arm, joints, top_speed)
+    layout = PlainLayout(arm, joints, top_speed)
     matrix = np.concatenate([layout.matrix(each.motion) for each in fitted])
-    values = _weighted_solution(matrix, np.concatenate([each.torque for each in fitted]))
+    values = weighted_solution(matrix, np.concatenate([each.torque for each in fitted]))
     left = [HeldOutRows(each, each.torque - layout.matrix(each.motion) @ values) for each in held_out]
     return PlainFit(joints, cutoff, top_speed, layout.names, values, tuple(left))
 
 
 @dataclass(frozen=True, eq=False)
-class _Layout:
+class PlainLayout:
     """The columns of an arm. joints: places of those with torque; top_speed: (joints,), theirs."""
 
     arm: Arm
@@ -248,17 +278,21 @@ def suggested_cutoff_hz(runs: Sequence[Run]) -> float:
 def prepare_rows(run: Run, cutoff_hz: float) -> PlainRows:
     """Position and torque behind one low-pass, and central differences of the position; no rows of a short run."""
     even = resample_evenly(run)
-    cutoff = min(cutoff_hz, MAX_CUTOFF_SHARE * even.rate_hz)
-    step = max(int(even.rate_hz / (ROWS_PER_CUTOFF * cutoff)), 1)
-    low_pass = TrimmedButterworth(even.rate_hz, cutoff, even.samples, step)
-    position = low_pass.smooth(even.position)
-    velocity = np.gradient(position, 1 / even.rate_hz, axis=0)
-    acceleration = np.gradient(velocity, 1 / even.rate_hz, axis=0)
-    motion = Motion(*(each[low_pass.rows] for each in (position, velocity, acceleration)))
+    step = max(int(even.rate_hz / (ROWS_PER_CUTOFF * min(cutoff_hz, MAX_CUTOFF_SHARE * even.rate_hz))), 1)
+    low_pass = TrimmedButterworth.possible(even, cutoff_hz, step)
+    whole = smooth_motion(even, low_pass)
+    motion = Motion(*(each[low_pass.rows] for each in (whole.position, whole.velocity, whole.acceleration)))
     return PlainRows(even, low_pass, motion, low_pass(even.torque))
 
 
-def _weighted_solution(matrix: Array, torque: Array) -> Array:
+def smooth_motion(even: Run, low_pass: TrimmedButterworth) -> Motion:
+    """The low-passed position and its central differences, at every sample."""
+    position = low_pass.smooth(even.position)
+    velocity = np.gradient(position, 1 / even.rate_hz, axis=0)
+    return Motion(position, velocity, np.gradient(velocity, 1 / even.rate_hz, axis=0))
+
+
+def weighted_solution(matrix: Array, torque: Array) -> Array:
     """Least squares with joints weighted by their own residuals. matrix: (samples, joints, columns)."""
     weights = np.ones(torque.shape[1])
     for _ in range(WEIGHT_ROUNDS):

@@ -12,6 +12,8 @@ from armlab.diagnosis.naming.choice import Example, Weights, fit_lapse, fit_weig
 from armlab.diagnosis.naming.decide import calibrated_weights, named_claims, naming_of, unknown_limit
 from armlab.diagnosis.result import Claim, Rival, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings, vary
+from armlab.diagnosis.told.statement import Statement, statement_of
+from armlab.effects.drive import TorqueOffset
 from armlab.effects.friction import CoulombFriction
 
 
@@ -110,12 +112,28 @@ def test_friction_keeps_its_law_at_a_joint_of_whose_friction_the_simulation_says
     own = replace(claim("coulomb_friction", names), candidate=CoulombFriction(2, (2,), (1,)))
     (found,) = named_claims([own], Settings(), plain={2})
     assert (found.effect, found.probability) == ("coulomb_friction", pytest.approx(0.3))
-    assert [each.effect for each in found.members] == ["unknown", "coulomb_friction", "stribeck_friction"]
+    assert [each.effect for each in found.members] == ["friction_curve", "coulomb_friction", "stribeck_friction"]
     likelier = replace(own, weighed=weighed(0.02, coulomb_friction=0.03, viscous_friction=0.95))
     (found,) = named_claims([likelier], Settings(), plain={2})
     assert (found.effect, [each.effect for each in found.members]) == ("coulomb_friction", ["viscous_friction"])
-    (nameless,) = named_claims([own], Settings(), plain={1})
-    assert (nameless.effect, nameless.probability) == ("unknown", pytest.approx(0.5))
+    unlikely = replace(own, weighed=weighed(0.6, coulomb_friction=0.25, stribeck_friction=0.15))
+    (nameless,) = named_claims([unlikely], Settings(), plain={1})
+    assert (nameless.effect, nameless.probability) == ("unknown", pytest.approx(0.6))
+
+
+def test_friction_that_is_likelier_than_not_keeps_its_cause_where_no_law_is_sure() -> None:
+    names = weighed(0.4, coulomb_friction=0.3, stribeck_friction=0.3)
+    own = replace(claim("coulomb_friction", names), candidate=CoulombFriction(2, (2,), (1,)))
+    (found,) = named_claims([own], Settings())
+    assert statement_of(found) == Statement("cause", ("coulomb_friction",), pytest.approx(0.6))
+
+
+def test_of_an_offset_that_every_arm_has_the_names_share_what_no_name_had() -> None:
+    names = weighed(0.2, torque_offset=0.5, cable_stiffness=0.3)
+    own = replace(claim("torque_offset", names), candidate=TorqueOffset(2, (2,), (1,)))
+    (found,) = named_claims([own], Settings(), plain={2})
+    assert found.probability == pytest.approx(0.625)
+    assert statement_of(found).kind == "class"
 
 
 def test_a_link_that_is_off_keeps_its_name_where_nothing_is_likelier() -> None:

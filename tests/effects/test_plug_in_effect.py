@@ -114,7 +114,9 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def diagnosed(installed: None, tmp_path_factory: pytest.TempPathFactory) -> Diagnosed:
     folder = tmp_path_factory.mktemp("diagnosed")
     recording = write_recording(folder / "recording")
-    return Diagnosed(recording, folder / "out", tuple(diagnose_recording(recording, folder / "out", None, 0)))
+    return Diagnosed(
+        recording, folder / "out", tuple(diagnose_recording(recording, folder / "out", None, 0, verbose=True))
+    )
 
 
 def test_the_library_lists_an_installed_effect_after_its_own() -> None:

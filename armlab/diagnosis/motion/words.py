@@ -112,14 +112,17 @@ def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
     return f" Something else than the servos moves the arm in {shown}{more}: contact, or commands that came late."
 
 
-def motion_lines(diagnosis: MotionDiagnosis) -> Iterator[str]:
-    """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint."""
+def motion_lines(diagnosis: MotionDiagnosis, verbose: bool = False) -> Iterator[str]:
+    """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint.
+
+    verbose: what the currents of the joints say, too.
+    """
     arm = diagnosis.simulation.arm
     yield from wrap(f"{diagnosis.status.upper()}: {summary_of(diagnosis)}", LINE_WIDTH)
     yield from (f"  {each}" for each in finding_phrases(diagnosis))
     for error in diagnosis.errors:
         yield f"  {error_phrase(arm, error)}"
-    for current in diagnosis.currents:
+    for current in diagnosis.currents if verbose else ():
         yield f"  {current_phrase(arm, current)}"
 
 

@@ -25,12 +25,13 @@ def diagnose_motion_recording(
     changes: Sequence[str] = (),
     with_signals: bool = False,
     tables: Sequence[str] = (),
+    verbose: bool = False,
 ) -> ResultLines:
     """Diagnoses the recording in `folder`, writes all files into `out` or none, and yields lines to print.
 
     changes: tuning numbers like `motion.min_gain=0.05`. with_signals: whether `signals.mcap` is written. tables: forms
-    in which the table of joints is written, too (`TABLE_FORMS`). Raises InputError, in one line, for a recording or a
-    number that cannot be used.
+    in which the table of joints is written, too (`TABLE_FORMS`). verbose: whether the lines tell of every finding.
+    Raises InputError, in one line, for a recording or a number that cannot be used.
     """
     tuning = Tuning()
     for change in changes:
@@ -51,7 +52,7 @@ def diagnose_motion_recording(
         joints = [joint.name for joint in recording.recorded_arm.joints]
         texts[SIGNALS_FILE], moved = signals_content(motion_tracks(diagnosis), joints)
     written = write_texts(texts, out)
-    yield from motion_lines(diagnosis)
+    yield from motion_lines(diagnosis, verbose)
     yield f"wrote {out}: {', '.join(texts)}"
     if tables and diagnosis.servos is None:
         yield "no table of joints: no servo was identified"

@@ -1,7 +1,7 @@
 """From probabilities to what a finding is called: a name, a class of names, or `unknown`."""
 
 import json
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
@@ -15,10 +15,12 @@ from armlab.diagnosis.result import Claim, Member, Weighed, WeighedName
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import NamingTuning
 from armlab.effects.contract import UNKNOWN
+from armlab.effects.friction_curve import FRICTION_CURVE_FACTS
 from armlab.effects.library import effect_named
 
 CALIBRATION_FILE: Final = "calibration.json"
 LIMIT_FILE: Final = "unknown_limit.json"
+MIN_CAUSE_PROBABILITY: Final = 0.5  # of a cause that is stated without its law
 MOTION_AXES: Final = ("velocity", "position", "acceleration")
 
 
@@ -81,9 +83,13 @@ def with_probabilities(weighed: Weighed, settings: Settings) -> list[tuple[Weigh
 
 def naming_of(weighed: Weighed, settings: Settings) -> Naming:
     """The probabilities of the names of a finding, and what of that is claimed."""
+    pairs = with_probabilities(weighed, settings)
+    return _naming([Member(each.effect, each.joint, each.joints, chance) for each, chance in pairs], settings)
+
+
+def _naming(weighed: Iterable[Member], settings: Settings) -> Naming:
     tuning = settings.tuning.naming
-    pairs = sorted(with_probabilities(weighed, settings), key=lambda pair: -pair[1])
-    answers = tuple(Member(each.effect, each.joint, each.joints, chance) for each, chance in pairs)
+    answers = tuple(sorted(weighed, key=lambda each: -each.probability))
     enough = np.flatnonzero(np.cumsum([each.probability for each in answers])[: tuning.max_class] >= tuning.level)
     together = answers[: enough[0] + 1] if len(enough) else ()
     names = [each.probability for each in answers if each.effect != UNKNOWN.id]
@@ -132,12 +138,16 @@ def _limited(claim: Claim) -> Claim:
 def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
     naming, tuning = naming_of(claim.weighed, settings), settings.tuning.naming
     usual = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.is_friction)
+    has = claim.candidate is not None and (claim.candidate.facts.usual or claim.candidate.facts.cause == "friction")
+    if has and claim.evidence.joint + 1 in plain:
+        naming = _naming(_given_that_it_is_there(naming.answers, claim), settings)
     identical = [each for each in claim.rivals if each.identical]
     known = {(each.effect, each.joint) for each in identical}
     own = {(claim.effect, claim.joint), *known}
     nameless = not any(naming.may_be(*each) for each in own)
     likeliest = claim.in_links and naming.answers[0].is_of(claim.effect, claim.joint)
-    if claim.effect == UNKNOWN.id or (nameless and not likeliest and not (usual and claim.evidence.joint + 1 in plain)):
+    keeps_law = likeliest or (usual and claim.evidence.joint + 1 in plain) or _is_friction_for_sure(claim, naming)
+    if claim.effect == UNKNOWN.id or (nameless and not keeps_law):
         return _without_name(claim, naming, tuning)
     chance = sum(naming.probability_of(*each) for each in own)
     members = (naming.members(tuning) or naming.claimed) if chance < tuning.level else ()
@@ -150,6 +160,35 @@ def _named(claim: Claim, settings: Settings, plain: Collection[int]) -> Claim:
         rivals=tuple(rivals[: tuning.max_class - 1]),
         next_experiment=next_experiment(effect_named(claim.effect), rivals),
     )
+
+
+def _is_friction_for_sure(claim: Claim, naming: Naming) -> bool:
+    """Whether a law of friction is likelier friction of its joint than not, by whatever law."""
+    if claim.candidate is None or claim.candidate.facts.cause != "friction":
+        return False
+    laws = (each for each in naming.answers if each.joint == claim.joint and each.effect != UNKNOWN.id)
+    friction = sum(each.probability for each in laws if effect_named(each.effect).cause == "friction")
+    return friction >= MIN_CAUSE_PROBABILITY
+
+
+def _given_that_it_is_there(answers: Sequence[Member], claim: Claim) -> Iterator[Member]:
+    """The names of what every arm has and the simulation does not: that none of them is right is no answer.
+
+    Friction that is none of the formulas is friction by another curve. A constant torque has no other law: there the
+    names share what `unknown` had.
+    """
+    none = sum(each.probability for each in answers if each.effect == UNKNOWN.id)
+    names = [each for each in answers if each.effect != UNKNOWN.id]
+    if claim.candidate is None or claim.candidate.facts.cause != "friction":
+        yield from (replace(each, probability=each.probability / max(1 - none, 1e-300)) for each in names)
+        return
+    curve = Member(FRICTION_CURVE_FACTS.id, claim.joint, claim.joints, none)
+    for each in names:
+        if each.is_of(curve.effect, curve.joint):
+            curve = replace(curve, probability=none + each.probability)
+        else:
+            yield each
+    yield curve
 
 
 def _without_name(claim: Claim, naming: Naming, tuning: NamingTuning) -> Claim:
@@ -174,6 +213,7 @@ def _without_name(claim: Claim, naming: Naming, tuning: NamingTuning) -> Claim:
         depends_on=depends_on,
         in_links=False,
         group=None,
+        unnamed=() if claim.group is None else (claim.group,),
         probability=naming.probability_of(UNKNOWN.id, joint),
         members=tuple(each for each in naming.answers[: tuning.max_class] if each.probability >= tuning.shown),
     )
@@ -191,6 +231,7 @@ def _together(one: Claim, other: Claim) -> Claim:
         first,
         prediction=first.prediction + second.prediction,
         left_out=first.left_out + second.left_out,
+        unnamed=(*first.unnamed, *second.unnamed),
         depends_on=variables,
         equation=f"tau_{first.joint} += f({', '.join(variables) or 'the motion'})",
     )

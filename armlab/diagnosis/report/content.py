@@ -12,7 +12,6 @@ from armlab.diagnosis.report.gallery import Gallery
 from armlab.diagnosis.report.residuals import ShownResiduals, correlation_seconds, filter_correlation_seconds, is_white
 from armlab.diagnosis.report.words import (
     PARAMETER_DIGITS,
-    chance_at_start,
     compared_in_words,
     effect_in_words,
     finding_in_words,
@@ -24,17 +23,18 @@ from armlab.diagnosis.report.words import (
     member_in_words,
     parameter_rows,
     rival_in_words,
+    statement_in_words,
     variable_in_words,
     variables_in_words,
 )
 from armlab.diagnosis.result import Claim, Diagnosis
-from armlab.diagnosis.story import claims_by_share, tell_story
-from armlab.effects.contract import UNKNOWN
+from armlab.diagnosis.told.steps import next_steps
+from armlab.diagnosis.told.told import ToldFinding, finding_errors, tell
 from armlab.effects.library import effect_named
 from armlab.identification.export import has_place_in_simulator
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER
 from problem.arm import Arm
-from problem.joint_words import joint_at_start, joint_in_table, joint_in_words
+from problem.joint_words import joint_in_table, joint_in_words
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Origin:
 
 @dataclass(frozen=True)
 class FindingDetail:
-    """One finding. share: of the error that it explains. picture: its evidence. chance: how probable its name is."""
+    """One finding. share: of the error that it explains. picture: its evidence. chance: how sure it is."""
 
     title: str
     share: str
@@ -87,10 +87,10 @@ def error_note(diagnosis: Diagnosis, data: ShownResiduals) -> str:
 def cause_table(diagnosis: Diagnosis) -> Table | None:
     """The causes with their findings, the largest first; None without findings."""
     rows = []
-    for each in tell_story(diagnosis):
+    for each in tell(diagnosis).causes:
         names = dict.fromkeys(effect_in_words(diagnosis.claims[place].effect) for place in each.findings)
         joints = ", ".join(joint_in_table(diagnosis.simulation.arm, joint) for joint in each.joints) or "all"
-        rows.append([each.cause, joints, format_share(each.share), join_words(list(names))])
+        rows.append([each.cause.replace("_", " "), joints, format_share(each.share), join_words(list(names))])
     headings = ["cause", "joints", "share of the error", "findings"]
     return Table(headings, rows, (0, 1, 3), stacked=True) if rows else None
 
@@ -122,12 +122,14 @@ def setup_part(diagnosis: Diagnosis) -> SetupPart | None:
 def fit_table(diagnosis: Diagnosis, data: ShownResiduals) -> Table:
     """Held-out errors by joint, the gap that is closed, and how long what is left remembers itself."""
     given = None if data.given is None else data.held_out_rms(data.given)
-    headings = ["joint", *(["as given"] if given is not None else []), "refitted", "found", "noise floor", "gap closed"]
+    first = ["as given"] if given is not None else []
+    headings = ["joint", *first, "refitted", "plain least squares", "found", "noise floor", "gap closed"]
     rows = []
     for joint, each in enumerate(diagnosis.fit):
         size = joint_unit(diagnosis.simulation.arm, joint)
         first = [] if given is None else [f"{format_number(float(given[joint]))} {size}"]
-        errors = [f"{format_number(value)} {size}" for value in (each.before, each.after, each.noise_floor)]
+        values = (each.before, each.plain, each.after, each.noise_floor)
+        errors = ["–" if value is None else f"{format_number(value)} {size}" for value in values]
         times = [
             1e3 * correlation_seconds(residual[:, joint], joint, data.observed) for residual in (data.refit, data.final)
         ]
@@ -154,35 +156,38 @@ def whiteness_text(diagnosis: Diagnosis, data: ShownResiduals) -> str:
     )
 
 
-def finding_details(diagnosis: Diagnosis, gallery: Gallery) -> list[FindingDetail]:
-    """Each finding with its equation, numbers, evidence and rivals, the largest share of the error first."""
-    pictures = {id(claim): picture for claim, picture in gallery.evidence}
+def finding_details(diagnosis: Diagnosis, gallery: Gallery, minor: bool = False) -> list[FindingDetail]:
+    """Each finding that is told with its equation, numbers, evidence and rivals, the largest share of the error first.
+
+    minor: those that are not told instead.
+    """
+    pictures, told = {id(claim): picture for claim, picture in gallery.evidence}, tell(diagnosis)
     return [
-        _finding_detail(diagnosis, claim, pictures[id(claim)], share) for claim, share in claims_by_share(diagnosis)
+        _finding_detail(diagnosis, each, pictures[id(each.claim)]) for each in (told.minor if minor else told.findings)
     ]
 
 
-def _finding_detail(diagnosis: Diagnosis, claim: Claim, picture: Markup, share: float) -> FindingDetail:
-    evidence, arm = claim.evidence, diagnosis.simulation.arm
-    size, where = joint_unit(arm, evidence.joint), joint_in_words(arm, evidence.joint + 1)
-    before, after = format_number(evidence.rms_before), format_number(evidence.rms_after)
+def _finding_detail(diagnosis: Diagnosis, finding: ToldFinding, picture: Markup) -> FindingDetail:
+    claim, arm = finding.claim, diagnosis.simulation.arm
+    joint = (claim.removal or claim.evidence).joint
+    size, where = joint_unit(arm, joint), joint_in_words(arm, joint + 1)
+    before, after = finding_errors(claim)
     gain = (
-        f"Tested on held-out data of {where}, all other findings kept: the error is {before} {size} without it and "
-        f"{after} {size} with it (whitened, its variance is {format_number(1 + evidence.gain)} times as large without "
-        f"it). p-value {format_probability(evidence.corrected)} after correction for everything that was compared. "
-        f"The test has a fit of its own; the model found leaves "
-        f"{format_number(diagnosis.fit[evidence.joint].after)} {size} there."
+        f"Held-out error of {where}: {format_number(before)} {size} without it, all others fitted anew, and "
+        f"{format_number(after)} {size} with it. p-value {format_probability(claim.evidence.corrected)} after "
+        "correction for everything that was compared."
     )
+    chance = statement_in_words(finding.statement)
     return FindingDetail(
         title=_finding_at_start(arm, claim),
-        share=format_share(share),
-        error=f"without it the error of {where} is {format_growth(evidence.rms_before, evidence.rms_after)}",
+        share=format_share(finding.share),
+        error=f"without it the error of {where} is {format_growth(before, after)}",
         about=effect_named(claim.effect).meaning,
         equation=claim.equation,
         picture=picture,
         numbers=parameter_table(claim),
         gain=gain,
-        chance=chance_at_start(claim),
+        chance=f"{chance[0].upper()}{chance[1:]}",
         rivals=_rival_texts(arm, claim),
         next_experiment=claim.next_experiment or "",
     )
@@ -222,15 +227,16 @@ def _rival_texts(arm: Arm, claim: Claim) -> list[str]:
     return [*chances, *(f"{rival_in_words(arm, each)}: {why}" for each in same)]
 
 
-def unexplained_lines(diagnosis: Diagnosis) -> list[str]:
-    """What stays without a name, joint by joint."""
-    arm = diagnosis.simulation.arm
-    return [
-        f"{joint_at_start(arm, each.joint)}: {100 * each.share:.0f} % of the held-out error variance depends on "
-        f"{variables_in_words(arm, each.depends_on)}, and no effect of the library has "
-        "that form. Neither model.yaml nor the errors of the model found hold it."
-        for each in diagnosis.unexplained
-    ]
+def left_table(diagnosis: Diagnosis) -> Table:
+    """What is left at each joint: of its torque, beside the noise, and on what it depends most."""
+    arm, rows = diagnosis.simulation.arm, []
+    for each in tell(diagnosis).left:
+        size = joint_unit(arm, each.joint - 1)
+        errors = [f"{format_number(value)} {size}" for value in (each.rms, each.noise)]
+        depends = variables_in_words(arm, each.depends_on) if each.depends_on else "–"
+        usual = "as real arms leave" if each.usual else "more than real arms leave"
+        rows.append([joint_in_table(arm, each.joint), f"{each.share_of_torque:.1%}", *errors, depends, usual])
+    return Table(["joint", "of the torque", "rms", "noise", "depends on", "usual"], rows, (4, 5), stacked=True)
 
 
 def located_table(diagnosis: Diagnosis) -> Table:
@@ -247,19 +253,13 @@ def located_table(diagnosis: Diagnosis) -> Table:
     return Table(headings, rows, (2, 3, 4), stacked=True)
 
 
-def next_steps(diagnosis: Diagnosis) -> list[str]:
-    """Which experiments would tell rivals apart, and what to do with the model."""
+def steps_and_uses(diagnosis: Diagnosis) -> list[str]:
+    """What decides what is open, and what to do with the model."""
     if not diagnosis.fit:
         return []
-    asked = [
-        f"{_finding_at_start(diagnosis.simulation.arm, claim)}: {claim.next_experiment}."
-        for claim, _ in claims_by_share(diagnosis)
-        if claim.next_experiment
-    ]
+    asked = list(next_steps(diagnosis, tell(diagnosis)))
     if any(_motion_may_tell(claim) for claim in diagnosis.claims):
         asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
-    elif any(claim.effect == UNKNOWN.id for claim in diagnosis.claims):
-        asked.append("Look at the details of what is unknown: the variables that it depends on say where to look.")
     use = [
         "model.yaml beside this page holds the links and every named effect: `armlab predict model.yaml RECORDING` "
         "compares it with another recording.",

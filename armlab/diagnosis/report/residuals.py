@@ -29,7 +29,7 @@ class ShownResiduals:
 
     def held_out(self, joint: int) -> NDArray[np.bool_]:
         """Rows (rows,) that took no part in the fit, and in which a joint (from 0) moves."""
-        return rows_in(self.observed.of_role("validate", joint), self.observed.rows)
+        return self.observed.rows_held_out(joint)
 
     def used(self, joint: int) -> Rows:
         """Numbers of the rows in which a joint (from 0) moves."""

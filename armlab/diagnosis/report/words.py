@@ -11,6 +11,7 @@ from armlab.common.report.wording import format_number, format_unit, join_words
 from armlab.diagnosis.result import Claim, Member, Rival
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.simulation import Simulation
+from armlab.diagnosis.told.statement import Statement
 from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from armlab.effects.links import PAYLOAD_FACTS
@@ -26,6 +27,7 @@ COMPARED: Mapping[Baseline, str] = {
 }
 SOMETHING_UNKNOWN = "something unknown"
 LESS_MASS = "less mass than modelled"
+LINKS_IN_WORDS = "masses and inertias"  # where these data do not tell which of them is off
 MAX_NAME_LENGTH = 24  # letters
 PARAMETER_DIGITS = 4  # of a parameter
 COMPONENT_NAMES = {3: ("x", "y", "z"), 6: ("xx", "yy", "zz", "xy", "xz", "yz")}
@@ -53,27 +55,19 @@ def rival_in_words(arm: Arm, rival: Rival) -> str:
     return _at_place(arm, effect_in_words(rival.effect), rival)
 
 
-def chance_in_words(arm: Arm, claim: Claim) -> str:
-    """How probable the name of a finding is, and what else it may be; empty where that was not weighed."""
-    if claim.probability is None:
-        return ""
-    others = [each for each in claim.members if not each.is_of(claim.effect, claim.joint)]
-    also = [f"{member_in_words(arm, each)} {each.probability:.2f}" for each in others]
-    what = "that no effect of the library is it" if claim.effect == UNKNOWN.id else "of the name"
-    return f"probability {what} {format_chance(claim.probability)}" + (f"; or {', '.join(also)}" if also else "")
+def statement_in_words(statement: Statement) -> str:
+    """How sure a finding is: `named with probability 0.96`, `backlash or joint elasticity, together 0.93`."""
+    chance = format_chance(statement.probability)
+    if statement.kind == "class":
+        return f"{join_words([effect_in_words(each) for each in statement.effects], 'or')}, together {chance}"
+    if statement.kind == "cause":
+        return f"its law is not certain, the cause has probability {chance}"
+    return f"named with probability {chance}"
 
 
 def member_in_words(arm: Arm, member: Member) -> str:
     """A name that a finding may have, with its place."""
     return SOMETHING_UNKNOWN if member.effect == UNKNOWN.id else rival_in_words(arm, member.as_rival)
-
-
-def chance_at_start(claim: Claim) -> str:
-    """The probability of a finding, at the start of a line; empty where it was not weighed."""
-    if claim.probability is None:
-        return ""
-    what = "that no effect of the library is it" if claim.effect == UNKNOWN.id else "of the name"
-    return f"Probability {what}: {format_chance(claim.probability)}"
 
 
 def format_chance(value: float) -> str:
@@ -97,6 +91,8 @@ def claim_name(claim: Claim) -> str:
         return SOMETHING_UNKNOWN
     if is_negative_load(claim):
         return LESS_MASS
+    if claim.joint is None and effect_named(claim.effect).where == "link":
+        return LINKS_IN_WORDS
     return f"{'too much ' if is_excess(claim) else ''}{effect_in_words(claim.effect)}"
 
 

@@ -47,7 +47,7 @@ def report_page(diagnosis: Diagnosis, gallery: Gallery | None, command: str) -> 
         joints=measured.joint_table(diagnosis) if diagnosis.claims else None,
         bodies=measured.body_sentences(diagnosis),
         free_joints=measured.joints_without_finding(diagnosis),
-        steps=content.next_steps(diagnosis),
+        steps=content.steps_and_uses(diagnosis),
         gallery=gallery,
         origin=content.origin_of(diagnosis, command),
         **more,
@@ -61,7 +61,8 @@ def _details(diagnosis: Diagnosis, gallery: Gallery) -> dict[str, Any]:
         "filtered": gallery.data.filtered,
         "causes": content.cause_table(diagnosis),
         "findings": content.finding_details(diagnosis, gallery),
-        "unexplained": content.unexplained_lines(diagnosis),
+        "minor": content.finding_details(diagnosis, gallery, minor=True),
+        "left": content.left_table(diagnosis),
         "fits": content.fit_table(diagnosis, gallery.data),
         "whiteness": content.whiteness_text(diagnosis, gallery.data),
         "located": content.located_table(diagnosis),
@@ -103,6 +104,7 @@ def diagnose_recording(
     progress: Callable[[str], None] = lambda message: None,
     with_signals: bool = False,
     tables: Sequence[str] = (),
+    verbose: bool = False,
 ) -> ResultLines:
     """Diagnoses a recording, writes verdict.json, report.html, model.yaml and figures, and yields lines to print.
 
@@ -111,8 +113,9 @@ def diagnose_recording(
     out: the folder, into which all files are written or none. without: guards that are switched off. changes: tuning
     numbers with other values, like `noise.max_order=8`. as_read: the reading of the recording is not doubted.
     only_setup: nothing but the reading is asked. progress: called with the name of each step. with_signals: whether
-    `signals.mcap` is written. tables: forms in which the table of joints is written, too (`TABLE_FORMS`). Raises
-    InputError, in one line, for a recording that cannot be used, an unknown guard or an unknown tuning number.
+    `signals.mcap` is written. tables: forms in which the table of joints is written, too (`TABLE_FORMS`). verbose:
+    whether the lines tell of every finding. Raises InputError, in one line, for a recording that cannot be used, an
+    unknown guard or an unknown tuning number.
     """
     if with_signals:
         check_signals_writer()
@@ -142,7 +145,7 @@ def diagnose_recording(
         joints = [joint.name for joint in diagnosis.recording.arm.joints]
         texts[SIGNALS_FILE], moved = signals_content(diagnosis_tracks(diagnosis), joints)
     written = write_texts(texts, out)
-    yield from verdict_lines(diagnosis)
+    yield from verdict_lines(diagnosis, verbose)
     pictures = sum(name.startswith(FIGURES_FOLDER) for name in texts)
     files = ", ".join(name for name in texts if not name.startswith((FIGURES_FOLDER, PREDICTED_FOLDER)))
     more = f", {pictures} pictures in {FIGURES_FOLDER}" if pictures else ""

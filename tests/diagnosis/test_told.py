@@ -1,0 +1,163 @@
+"""What is said of a diagnosis: names by their probability, causes by their share, nothing that nobody would miss."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from armlab.diagnosis.parts import add_in_order, cause_of, stack_in_units
+from armlab.diagnosis.result import Claim, Member, Part, Removal
+from armlab.diagnosis.told.causes import causes_of, finding_shares, leading_causes
+from armlab.diagnosis.told.selection import stated_findings, with_minor_ones, without_lesser_unknowns
+from armlab.diagnosis.told.statement import Statement, statement_of
+from armlab.effects.contract import UNKNOWN, Effect
+from armlab.effects.library import effect_named
+
+MISSED = Removal(0, growth=0.5, rms=1.0, torque=10.0, joints=(0, 1))
+HARDLY = Removal(0, growth=0.04, rms=1.0, torque=1.0)
+
+
+def claim(effect: str, joint: int | None = 1, probability: float | None = 0.95, removal: Removal = MISSED) -> Claim:
+    """A finding."""
+    nothing: Any = None
+    return Claim(effect, joint, (), (), "", nothing, nothing, probability=probability, removal=removal)
+
+
+def part(cause: str, claims: tuple[int, ...], share: float, removal: Removal | None = MISSED, joint: int = 1) -> Part:
+    """A part whose claims explain equal shares of it."""
+    shares = tuple(share / len(claims) for _ in claims)
+    return Part(cause, joint, (), (), claims, removal, share, shares)
+
+
+def members(**probabilities: float) -> tuple[Member, ...]:
+    return tuple(Member(effect, 1, (), chance) for effect, chance in probabilities.items())
+
+
+@pytest.mark.parametrize(
+    ("own", "names", "expected"),
+    [
+        (0.9, members(), Statement("name", ("coulomb_friction",), 0.9)),
+        (
+            0.6,
+            members(unknown=0.05, coulomb_friction=0.6, asymmetric_friction=0.35),
+            Statement("class", ("coulomb_friction", "asymmetric_friction"), 0.95),
+        ),
+        (
+            0.3,
+            members(unknown=0.4, coulomb_friction=0.3, stribeck_friction=0.3),
+            Statement("cause", ("coulomb_friction",), 0.6),
+        ),
+        (0.3, members(unknown=0.6, coulomb_friction=0.3), Statement("nothing", ("coulomb_friction",), 0.3)),
+        (None, members(), Statement("name", ("coulomb_friction",), 1.0)),
+    ],
+)
+def test_a_name_needs_nine_tenths_a_cause_one_half_and_less_is_not_stated(
+    own: float | None, names: tuple[Member, ...], expected: Statement
+) -> None:
+    found = statement_of(replace(claim("coulomb_friction", probability=own), members=names))
+    assert (found.kind, found.effects) == (expected.kind, expected.effects)
+    assert found.probability == pytest.approx(expected.probability)
+
+
+def test_a_finding_that_nobody_misses_is_none() -> None:
+    useless = claim("torque_offset", removal=replace(MISSED, growth=0.0))
+    improbable = claim("backlash", probability=0.2)
+    kept = stated_findings([useless, improbable, claim("payload")], joints=6)
+    assert [each.effect for each in kept] == ["payload"]
+
+
+@pytest.mark.parametrize(("joints", "better", "kept"), [((0, 1), (), True), ((0,), (), False), ((0, 1), (2,), False)])
+def test_an_effect_of_the_whole_robot_is_missed_at_two_joints_and_hurts_at_none(
+    joints: tuple[int, ...], better: tuple[int, ...], kept: bool
+) -> None:
+    base = claim("flexible_base", None, removal=replace(MISSED, joints=joints, better=better))
+    assert bool(stated_findings([base], joints=7)) == kept
+
+
+def test_minor_is_what_is_missed_by_little_together_with_all_of_its_cause() -> None:
+    hidden = [claim("coulomb_friction", removal=HARDLY), claim("viscous_friction", removal=HARDLY)]
+    both = with_minor_ones(hidden, [part("friction", (0, 1), 0.9)])
+    assert [each.minor for each in both] == [False, False]
+    both = with_minor_ones(hidden, [part("friction", (0, 1), 0.9, HARDLY)])
+    assert [each.minor for each in both] == [True, True]
+
+
+def test_a_change_below_one_percent_of_the_torque_is_minor_though_the_error_grows() -> None:
+    assert Removal(0, growth=0.5, rms=0.01, torque=1.0).is_minor
+    assert not Removal(0, growth=0.5, rms=0.03, torque=1.0).is_minor
+
+
+def test_of_a_joint_two_findings_are_told_of_two_causes_where_it_has_them() -> None:
+    names = ("coulomb_friction", "viscous_friction", "torque_offset")
+    found = [
+        claim(name, removal=replace(MISSED, growth=growth)) for name, growth in zip(names, (0.9, 0.6, 0.5), strict=True)
+    ]
+    told = with_minor_ones(found, [part("friction", (0, 1), 0.6), part("torque_offset", (2,), 0.3)])
+    assert [each.effect for each in told if not each.minor] == ["coulomb_friction", "torque_offset"]
+
+
+def test_at_most_four_causes_are_told() -> None:
+    effects = ("coulomb_friction", "payload", "torque_offset", "backlash", "torque_ripple")
+    found = [claim(effect, joint) for joint, effect in enumerate(effects, 1)]
+    parts = [part(cause_of(effect_named(each)), (at,), 0.5 / (at + 1), joint=at + 1) for at, each in enumerate(effects)]
+    assert [each.minor for each in with_minor_ones(found, parts)] == [False, False, False, False, True]
+
+
+def test_causes_are_told_by_size_until_nearly_all_is_explained() -> None:
+    parts = [part("friction", (0,), 0.7), part("links", (1,), 0.26), part("torque_offset", (2,), 0.03)]
+    assert [each.cause for each in leading_causes(causes_of(parts))] == ["friction", "links"]
+
+
+def test_what_has_no_name_is_a_finding_only_where_it_leads() -> None:
+    found = [claim("coulomb_friction"), claim(UNKNOWN.id)]
+    lesser = [part("friction", (0,), 0.97), part("unknown", (1,), 0.03)]
+    leading = [part("friction", (0,), 0.6), part("unknown", (1,), 0.3)]
+    assert [each.effect for each in without_lesser_unknowns(found, lesser)] == ["coulomb_friction"]
+    assert len(without_lesser_unknowns(found, leading)) == 2
+
+
+def test_shares_of_findings_sum_to_that_of_their_cause() -> None:
+    parts = [part("friction", (0, 2), 0.6), part("friction", (1,), 0.2, joint=2), part("links", (2,), 0.1)]
+    assert sum(finding_shares(parts, 3)) == pytest.approx(0.9)
+    assert causes_of(parts)[0].share == pytest.approx(0.8)
+
+
+def test_the_largest_cause_is_added_first_and_falls_sum_to_the_whole_fall() -> None:
+    start = np.array([3.0, 1.0, 0.0])
+    falls = add_in_order(start, {"small": np.array([0.0, 1.0, 0.0]), "large": np.array([3.0, 0.0, 0.0])})
+    assert list(falls) == ["large", "small"]
+    assert falls == pytest.approx({"large": 9.0, "small": 1.0})
+
+
+def test_torques_that_explain_the_same_error_do_not_count_it_twice() -> None:
+    start = np.array([2.0, 0.0])
+    falls = add_in_order(start, {"one": np.array([1.5, 0.0]), "other": np.array([0.5, 0.0])})
+    assert sum(falls.values()) == pytest.approx(4.0)
+
+
+def test_each_joint_counts_in_units_of_its_own_torque() -> None:
+    torque = np.array([[100.0, 1.0], [-100.0, -1.0]])
+    rows = [np.array([True, True])] * 2
+    stacked = stack_in_units(torque, rows, np.array([100.0, 1.0]))
+    assert stacked @ stacked == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "cause"),
+    [
+        ("coulomb_friction", "friction"),
+        ("load_dependent_friction", "friction"),
+        ("torque_offset", "torque_offset"),
+        ("payload", "links"),
+        ("inertial_parameter_error", "links"),
+        ("time_delay", "time_delay"),
+        ("unknown", "unknown"),
+    ],
+)
+def test_a_cause_is_what_a_person_fixes_or_models_at_once(effect: str, cause: str) -> None:
+    assert cause_of(effect_named(effect)) == cause
+
+
+def test_an_effect_of_a_plug_in_gets_its_cause_from_its_facts() -> None:
+    assert cause_of(Effect("lip_seal", "friction of a seal", dissipates=True)) == "friction"

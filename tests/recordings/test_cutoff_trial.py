@@ -1,0 +1,48 @@
+"""The cut-off of an identification by what it predicts on blocks of the runs that identify."""
+
+import numpy as np
+import pytest
+
+from armlab.common.errors import DataError
+from armlab.recordings.cutoff_trial import CutoffTrial, choose_cutoff_hz, try_cutoffs
+from armlab.recordings.plain_least_squares import suggested_cutoff_hz
+from armlab.recordings.recording import Run
+from problem.presets import load_arm
+
+ARM = load_arm("irb120-arm")
+RATE_HZ = 500.0
+
+
+def run_with_vibration(amplitude: float) -> Run:
+    """Motion of about 1 Hz behind encoders of no noise, friction, and torque that vibrates with the arm at 60 Hz."""
+    time = np.arange(0, 12, 1 / RATE_HZ)
+    rng = np.random.default_rng(0)
+    waves = [(0.4, rate, phase) for rate, phase in zip((0.5, 0.8, 1.1), rng.uniform(0, 6, 3), strict=True)]
+    slow = np.column_stack([a * np.sin(2 * np.pi * f * time + p) for a, f, p in waves])
+    fast = amplitude * np.sin(2 * np.pi * 60 * time)[:, None] * np.ones(3)
+    speed = np.gradient(slow, 1 / RATE_HZ, axis=0)
+    torque = 2.0 * np.sign(speed) + 1.5 * speed + 3.0 * np.gradient(speed, 1 / RATE_HZ, axis=0)
+    torque = torque + 0.2 * rng.standard_normal(torque.shape)
+    return Run("run.csv", "identify", time, slow + fast, torque=torque)
+
+
+def test_vibrations_that_the_torque_does_not_follow_are_filtered_away() -> None:
+    shaken = run_with_vibration(1e-3)
+    assert suggested_cutoff_hz([shaken]) > 60
+    assert choose_cutoff_hz(ARM, [shaken]) < 40
+
+
+def test_the_cutoff_with_the_least_error_in_the_mean_of_the_blocks_is_chosen() -> None:
+    trial = CutoffTrial((40.0, 20.0, 10.0), np.array([[1.0, 1.0], [0.2, 0.4], [0.1, 0.6]]))
+    assert trial.best_hz == 20.0
+
+
+def test_cutoffs_are_tried_down_to_ten_periods_of_the_longest_run() -> None:
+    trial = try_cutoffs(ARM, [run_with_vibration(0.0)], 50.0)
+    assert trial.candidates_hz[0] == 50.0
+    assert 10 / 12 <= trial.candidates_hz[-1] < 2 * 10 / 12
+
+
+def test_without_a_run_there_is_no_cutoff() -> None:
+    with pytest.raises(DataError, match="no run identifies"):
+        try_cutoffs(ARM, [], 50.0)
