@@ -79,8 +79,8 @@ def test_a_verdict_says_what_the_simulation_has_beside_what_has_to_be_added(foun
 
 def test_the_summary_says_too_much_where_the_file_has_more_than_the_arm(found: Diagnosis) -> None:
     summary = " ".join("\n".join(verdict_lines(found)).split())
-    assert re.search(r"too much Coulomb friction 2\.00 N m \(the simulation has 2\.00 N m\)", summary)
-    assert re.search(r"Coulomb friction 0\.\d+ N m \(the simulation has 1\.00 N m\)", summary)
+    assert re.search(r"too much Coulomb friction, 2\.00 of 2\.00 N m", summary)
+    assert re.search(r"Coulomb friction 0\.\d+ N m beyond 1\.00 N m", summary)
 
 
 def test_the_model_found_holds_the_laws_of_the_file_and_the_differences(found: Diagnosis) -> None:

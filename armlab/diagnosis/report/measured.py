@@ -65,7 +65,7 @@ def friction_cell(told: Told, joint: int, arm: Arm) -> str:
         return NOTHING
     unit = joint_unit(arm, joint - 1)
     low, high = (f"{format_fixed(size)} {unit}" for size in row.torque)
-    first, last = (f"{speed:.2g} {speed_unit(unit)}" for speed in row.speeds)
+    first, last = (f"{format_number(speed, 2)} {speed_unit(unit)}" for speed in row.speeds)
     return ", ".join((_together(f"{low} at {first}"), _together(f"{high} at {last}")))
 
 

@@ -80,7 +80,7 @@ def _largest_error_text(worst: JointFit, arm: Arm) -> str:
 
 LINE_WIDTH = 110  # letters in a line of the terminal
 MAX_WARNINGS = 3  # lines; all of them are on the page
-MIN_CELL = 24  # letters of the last column
+MIN_CELL, MAX_CELL_LINES = 24, 2  # letters and lines of the last column; all is on the page and with --verbose
 
 
 def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
@@ -125,6 +125,8 @@ def _joint_lines(diagnosis: Diagnosis, told: Told) -> Iterator[str]:
     for row in rows:
         start = "  ".join(cell.ljust(width) for cell, width in zip(row[:3], widths, strict=True)) + "  "
         lines = wrap(row[3], max(LINE_WIDTH - len(start) - 2, MIN_CELL)) or [NOTHING]
+        if len(lines) > MAX_CELL_LINES:
+            lines = [*lines[: MAX_CELL_LINES - 1], f"{lines[MAX_CELL_LINES - 1].rstrip(';,')} …"]
         yield f"  {start}{lines[0]}"
         yield from (f"  {' ' * len(start)}{line}" for line in lines[1:])
 
@@ -140,8 +142,11 @@ def _found_in_words(found: Sequence[ToldFinding], simulation: Simulation) -> str
         elif each not in laws:
             numbers = claim_figures(_shorter(each.claim), simulation)
             links = " of the links" if each.claim.joint is None and each.cause == LINKS else ""
-            present = simulated_figures(each.claim)
-            size = f"{f' {numbers}' if numbers else ''}{f' (the simulation has {present})' if present else ''}"
+            present, size = simulated_figures(each.claim), f" {numbers}" if numbers else ""
+            if present:
+                size = (
+                    f", {numbers.split(' ')[0]} of {present}" if is_excess(each.claim) else f"{size} beyond {present}"
+                )
             words.append(f"{claim_name(each.claim)}{links}{size}{doubt_in_words(each)}")
     return "; ".join(words)
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from armlab.common.report.wording import join_words
+from armlab.diagnosis.report.words import variables_in_words
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.told.statement import FRICTION
 from armlab.diagnosis.told.told import Told, ToldFinding
@@ -21,29 +22,35 @@ def next_steps(diagnosis: Diagnosis, told: Told) -> tuple[str, ...]:
     """Instructions for what the told findings leave open, those that explain most first."""
     groups: dict[str, list[ToldFinding]] = {}
     for each in told.findings:
-        if each.statement.kind != "name" or each.claim.rivals:
+        if each.statement.kind != "name" or each.claim.rivals or _is_of_unknown_links(each):
             groups.setdefault(_experiment_of(each), []).append(each)
     steps = dict.fromkeys(step for text, own in groups.items() for step in _steps(text, own, diagnosis, told))
     return tuple(steps)[:MAX_STEPS]
 
 
+def _is_of_unknown_links(each: ToldFinding) -> bool:
+    """Whether links are off, and these data do not tell which."""
+    return each.claim.joint is None and effect_named(each.claim.effect).where == "link"
+
+
 def _experiment_of(each: ToldFinding) -> str:
-    """What would tell it from what else it may be: all friction needs the same."""
-    return FRICTION if each.cause == FRICTION else effect_named(each.claim.effect).experiment
+    """What would tell it from what else it may be: laws of friction that follow the speed need the same."""
+    facts = effect_named(each.claim.effect)
+    return FRICTION if facts.cause == FRICTION and facts.axis == "velocity" else facts.experiment
 
 
 def _steps(text: str, own: Sequence[ToldFinding], diagnosis: Diagnosis, told: Told) -> Iterator[str]:
     arm = diagnosis.simulation.arm
     joints = sorted({each.claim.joint for each in own if each.claim.joint is not None})
-    if text == FRICTION:
+    if text == FRICTION and any(told.friction_of(joint) for joint in joints):
         yield _friction_step(joints, diagnosis, told)
     elif text == TORQUE_OFFSET_FACTS.experiment and joints:
         yield _offset_step(joints, diagnosis)
     elif text:
         is_link = effect_named(own[0].claim.effect).where == "link"
-        place = links_in_words(arm, joints) if is_link else joints_in_words(arm, joints)
+        place = "" if not joints else links_in_words(arm, joints) if is_link else joints_in_words(arm, joints)
         variables = own[0].claim.depends_on if own[0].claim.effect == UNKNOWN.id else ()
-        of = f"{place}{f', by {join_words(list(variables))}' if variables else ''}" if joints else ""
+        of = f"{place}{f', by {variables_in_words(arm, variables)}' if variables else ''}"
         yield f"{text[0].upper()}{text[1:]}{f' ({of})' if of else ''}."
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from armlab.common.report.wording import count_of, join_words
+from armlab.common.report.wording import count_of, format_number, join_words
 from armlab.diagnosis.parts import LINKS, UNKNOWN_CAUSE
 from armlab.diagnosis.report.sentences import claim_figures, model_in_words
 from armlab.diagnosis.report.words import (
@@ -131,14 +131,16 @@ class _Writer:
         unit = joint_unit(arm, high.joint - 1)
         if low is high:
             speed = speed_unit(unit)
-            yield (
-                f"friction is {high.torque[0]:.3g} {unit} at {high.speeds[0]:.2g} {speed} "
-                f"and {high.torque[1]:.3g} {unit} at {high.speeds[1]:.2g} {speed}"
-            )
+            sizes = [
+                f"{format_number(torque)} {unit} at {format_number(at, 2)} {speed}"
+                for torque, at in zip(high.torque, high.speeds, strict=True)
+            ]
+            yield f"friction is {join_words(sizes)}"
             return
         yield (
-            f"friction at higher speeds is {low.torque[1]:.3g} {joint_unit(arm, low.joint - 1)} "
-            f"({joint_in_words(arm, low.joint)}) to {high.torque[1]:.3g} {unit} ({joint_in_words(arm, high.joint)})"
+            f"friction at higher speeds is {format_number(low.torque[1])} {joint_unit(arm, low.joint - 1)} "
+            f"({joint_in_words(arm, low.joint)}) to {format_number(high.torque[1])} {unit} "
+            f"({joint_in_words(arm, high.joint)})"
         )
 
     def _other_figures(self, cause: ToldCause) -> Iterator[str]:
@@ -148,7 +150,8 @@ class _Writer:
             if not numbers:
                 continue
             if each.claim.effect == PAYLOAD_FACTS.id:
-                yield f"{'it lacks' if is_negative_load(each.claim) else 'the load is'} {numbers}"
+                mass = numbers.split(" at ")[0]
+                yield f"{'it lacks' if is_negative_load(each.claim) else 'the load is'} {mass}"
                 continue
             place = place_in_words(arm, each.claim.effect, each.claim.joint, each.claim.joints)
             name = LINKS_IN_WORDS if cause.cause == LINKS else effect_in_words(each.claim.effect)
@@ -214,11 +217,13 @@ def _name_of_links(own: Sequence[ToldFinding]) -> str:
 
 
 def _name_of(own: Sequence[ToldFinding]) -> str:
-    """Of findings with one effect: its name, the names of its class, or `probably` before it."""
+    """Of findings with one effect: its name, the names of its class, or its name with a doubt."""
     first = own[0].statement
     if first.kind == "class":
         return join_words([effect_named(each).words for each in first.effects], "or")
-    return f"{'probably ' if first.kind == 'cause' else ''}{effect_named(first.effects[0]).words}"
+    name = effect_named(first.effects[0]).words
+    behind = f" with {FRICTION}" if own[0].is_friction else ""
+    return f"{name}{behind}{' (not certain)' if first.kind == 'cause' else ''}"
 
 
 def unnamed_gain(fits: Sequence[JointFit], tuning: ClaimTuning) -> JointFit | None:
