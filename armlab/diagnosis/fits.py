@@ -2,6 +2,8 @@
 effects, the model.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from armlab.common.arrays import Array
@@ -14,6 +16,7 @@ from armlab.identification.identifier import Identifier
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.plain_least_squares import fit_plain_model
+from armlab.recordings.recording import Run
 from problem.arm import Arm
 
 
@@ -22,10 +25,10 @@ def joint_fits(
 ) -> tuple[JointFit, ...]:
     """The fits of all joints. refit: residual (rows, joints) of the refitted rigid arm; floor: (joints,), N m (N)."""
     runs = identification_runs(observed)
-    rigid, identified = (
-        with_smoothing_of(found, Identifier(found.arm, parts).fit(runs).model_) for parts in ((), None)
-    )
-    models, plain = (found, alone, identified), plain_residual(found.arm, observed)
+    cutoff = _best_cutoff(found.arm, runs)
+    rigid = with_smoothing_of(found, Identifier(found.arm, ()).fit(runs).model_)
+    identified = with_smoothing_of(found, Identifier(found.arm, cutoff_hz=cutoff).fit(runs).model_)
+    models, plain = (found, alone, identified), plain_residual(found.arm, observed, cutoff)
     filtered = [refit, *(filtered_residual(each, observed) for each in models)]
     recorded = [recorded_residual(each, observed) for each in (rigid, *models)]
     out = []
@@ -42,14 +45,23 @@ def joint_fits(
     return tuple(out)
 
 
-def plain_residual(arm: Arm, observed: Observed) -> Array | None:
+def _best_cutoff(arm: Arm, runs: Sequence[Run]) -> float | None:
+    """The cut-off that predicts best inside the runs that identify, Hz; None where they are too short to tell."""
+    try:
+        return choose_cutoff_hz(arm, runs)
+    except DataError:
+        return None
+
+
+def plain_residual(arm: Arm, observed: Observed, cutoff_hz: float | None) -> Array | None:
     """What plain least squares leaves behind the filter of the torque, (rows, joints); None where it has no rows.
 
-    It is fitted to the stretches that identify, at the cut-off that predicts best inside them.
+    It is fitted to the stretches that identify. cutoff_hz: None where these are too short to tell one.
     """
-    runs = identification_runs(observed)
     try:
-        model = fit_plain_model(arm, runs, choose_cutoff_hz(arm, runs))
+        model = None if cutoff_hz is None else fit_plain_model(arm, identification_runs(observed), cutoff_hz)
     except DataError:
+        model = None
+    if model is None:
         return None
     return np.concatenate([each.torque - each.filter(model.predict(each.run)) for each in observed.signals])

@@ -12,6 +12,7 @@ from armlab.identification.components import usual_components
 from armlab.identification.covariance import uncertainty
 from armlab.identification.cross_validation import held_out_error
 from armlab.identification.estimators.least_squares import (
+    EXCITED_TOLERANCE,
     RANK_TOLERANCE,
     BayesianLeastSquares,
     Estimate,
@@ -69,6 +70,7 @@ METHODS: dict[str, Callable[[PreparedData, Pull], Estimator]] = {
     "ordinary": lambda fitted, pull: OrdinaryLeastSquares(),
     "alike": lambda fitted, pull: _bayesian_estimator(fitted, pull, by_joint=False),
     "weighted": _bayesian_estimator,
+    "excited": lambda fitted, pull: WeightedLeastSquares(tolerance=EXCITED_TOLERANCE),
     "huber": lambda fitted, pull: RobustLeastSquares("huber"),
     "tukey": lambda fitted, pull: RobustLeastSquares("tukey"),
     "total": lambda fitted, pull: TotalLeastSquares(_draw_column_noise(fitted)),

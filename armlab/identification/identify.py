@@ -1,6 +1,7 @@
 """The flows of `armlab identify` and `armlab predict`: from a recording folder to lines, a model file and a page."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -24,6 +25,7 @@ from armlab.identification.selection import (
     describe_choice,
     select_structure,
 )
+from armlab.identification.torque_model import is_told, parameter_line
 from armlab.identification.validation import (
     JointError,
     RunError,
@@ -32,11 +34,12 @@ from armlab.identification.validation import (
     run_error,
     total_error_line,
 )
+from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
 from armlab.recordings.reading.tuning import ReadingTuning
-from armlab.recordings.recording import Recording, Run
+from armlab.recordings.recording import ROLES, Recording, Role, Run
 
 
 def identification_page(recording: Recording, identifier: Identifier, errors: tuple[RunError, ...]) -> str:
@@ -54,8 +57,47 @@ def identification_page(recording: Recording, identifier: Identifier, errors: tu
         filtered=filter_of_errors(errors),
         totals=[total_error_line(each) for each in errors],
         parameters=_parameters(model),
+        untold=untold_names(model),
+        warnings=list(overfit_warnings(errors)),
         pictures=pictures,
     )
+
+
+def parameter_lines(model: Model) -> Iterator[str]:
+    """Each parameter that the data tell with its interval; the names of the others, which may as well be zero."""
+    told = [(part, each) for part, each in model.named_parameters() if is_told(each)]
+    yield from (f"{part}: {parameter_line(each)}" for part, each in told)
+    others = untold_names(model)
+    if others:
+        yield f"not told by these data, each may be zero: {', '.join(others)}"
+
+
+def untold_names(model: Model) -> list[str]:
+    """What the data do not tell: components as they are labelled, base parameters by the first of their sum."""
+    untold = [(part, each) for part, each in model.named_parameters() if not is_told(each)]
+    names = ((part, each.name.split(" ")[0]) for part, each in untold)
+    return [name if part == "base parameters" else f"{part}: {name}" for part, name in names]
+
+
+def overfit_warnings(errors: tuple[RunError, ...]) -> Iterator[str]:
+    """A line for each joint that held-out runs leave much more of than the runs that were fitted, in percent."""
+    fitted, held_out = (_percent_by_joint(errors, role) for role in ROLES)
+    for joint, percent in held_out.items():
+        known = fitted.get(joint)
+        if known is not None and percent > MAX_HELD_OUT_RATIO * known:
+            yield (
+                f"warning: joint {joint} leaves {percent:.0f} % of its torque held out and {known:.0f} % of what was "
+                "fitted: the model does not carry over; record longer motion, or fit fewer numbers (--tolerance)"
+            )
+
+
+def _percent_by_joint(errors: tuple[RunError, ...], role: Role) -> dict[int, float]:
+    """The mean error of each joint over the runs of a role, percent of the torque."""
+    own = [each for each in errors if each.role == role]
+    return {
+        joint.joint: float(np.mean([each.joints[number].percent for each in own]))
+        for number, joint in enumerate(own[0].joints if own else ())
+    }
 
 
 def _joint_errors(errors: tuple[RunError, ...]) -> Table:
@@ -72,9 +114,11 @@ def _percent_of_rated(error: JointError) -> str:
 
 
 def _parameters(model: Model) -> Table:
-    """Each parameter with its 95 % interval and its unit; a dash where nothing determines it."""
+    """Each parameter that the data tell with its 95 % interval and its unit; a dash where it has none."""
     rows = []
     for part, each in model.named_parameters():
+        if not is_told(each):
+            continue
         interval = "–"
         if each.interval is not None:
             interval = " to ".join(format_number(float(end), 4) for end in np.asarray(each.interval))
@@ -83,6 +127,7 @@ def _parameters(model: Model) -> Table:
     return Table(["parameter", "value", "95 % interval", "unit"], rows, (0, 3), stacked=True)
 
 
+MAX_HELD_OUT_RATIO = 2.0  # of the errors on runs that were held out to those that were fitted (chosen by eye)
 NO_VALIDATION_WARNING = (
     "no run validates: these are errors on the identification runs themselves, so they are too small"
 )
@@ -116,8 +161,8 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
     if not options.as_read:
         _refuse_wrong_reading(recording, out)
-    identifier, how = _build_identifier(recording, options)
     try:
+        identifier, how = _build_identifier(recording, options)
         identifier.fit(runs)
     except DataError as error:
         raise InputError(f"{folder}: {error}") from None
@@ -125,12 +170,13 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
     model.provenance.update(recording=recording.name, runs=[run.name for run in runs], version=version("armlab"))
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     yield from how
-    yield str(model)
+    yield from parameter_lines(model)
     yield from (f"{part.label}: no motion separates it from the links, left out" for part in identifier.absorbed_)
     yield f"condition number: {identifier.condition_number_:.4g} (columns at unit length)"
     yield error_table(errors)
     if not recording.with_role("validate"):
         yield NO_VALIDATION_WARNING
+    yield from overfit_warnings(errors)
     page = identification_page(recording, identifier, errors)
     file, report = write_texts({"model.yaml": model_text(model, out), "report.html": page}, out)
     yield f"model: {file}"
@@ -173,7 +219,14 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
     arm, robot = recording.arm, robot_path(recording)
     pull = Pull("nominal", options.tolerance) if options.tolerance else NO_PULL
     if not options.choose:
-        return Identifier(arm, None, options.method, pull, options.cutoff_hz, robot), []
+        cutoff, how = options.cutoff_hz, list[str]()
+        if cutoff is None:
+            cutoff = choose_cutoff_hz(arm, recording.runs_to_identify())
+            how = [f"cut-off: {cutoff:.4g} Hz, which predicts best on blocks of the runs that identify"]
+        usual = Identifier(arm, None, options.method, pull, cutoff, robot)
+        if options.method == "weighted" and pull == NO_PULL:
+            return best_inside([usual, replace(usual, method="excited")], recording.runs_to_identify()), how
+        return usual, how
     groups = candidate_groups(arm)
     candidates = (pull,) if options.tolerance else candidate_pulls(arm)
     choice = select_structure(arm, recording.with_role("identify"), groups, candidates).choice
@@ -182,6 +235,12 @@ def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[I
     components = components_of(groups, choice.groups)
     filters = choice.cutoff_hz, robot, choice.position_factor
     return Identifier(arm, components, method, choice.pull, *filters), [line]
+
+
+def best_inside(identifiers: Sequence[Identifier], runs: Sequence[Run]) -> Identifier:
+    """The one that predicts best on blocks of the runs that identify, left out in turn; the first of equals."""
+    errors = [each.held_out_error(runs) for each in identifiers]
+    return identifiers[int(np.argmin(errors))]
 
 
 def robot_path(recording: Recording) -> str:

@@ -148,7 +148,7 @@ class TorqueModel:
 
     def __str__(self) -> str:
         """A table of all parameters."""
-        return "\n".join(f"{what}: {_parameter_line(each)}" for what, each in self.named_parameters())
+        return "\n".join(f"{what}: {parameter_line(each)}" for what, each in self.named_parameters())
 
     def named_parameters(self) -> list[tuple[str, ParameterValue]]:
         """All parameters, each with what it is a parameter of."""
@@ -167,7 +167,16 @@ def _is_held(parameter: ParameterValue) -> bool:
     return parameter.interval is not None and parameter.interval[0] == parameter.interval[-1]
 
 
-def _parameter_line(parameter: ParameterValue) -> str:
+def is_told(parameter: ParameterValue) -> bool:
+    """Whether the data tell a scalar parameter: its 95 % interval does not hold zero; vectors and what has none are."""
+    if parameter.interval is None or isinstance(parameter.value, tuple):
+        return True
+    low, high = parameter.interval
+    return not float(np.asarray(low)) <= 0 <= float(np.asarray(high))
+
+
+def parameter_line(parameter: ParameterValue) -> str:
+    """`coefficient = 2.31 [2.27, 2.35] N.m.s/rad`."""
     values = parameter.value if isinstance(parameter.value, tuple) else (parameter.value,)
     numbers = ", ".join(f"{value:.4g}" for value in values)
     spread = ""

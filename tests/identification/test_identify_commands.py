@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,13 @@ from armlab.cli.diagnosis import export_model, real
 from armlab.cli.identification import coverage, identify, predict
 from armlab.common.errors import InputError
 from armlab.common.report.wording import format_number
+from armlab.effects.parameters import ParameterValue
+from armlab.identification.estimators.least_squares import EXCITED_TOLERANCE, WeightedLeastSquares
+from armlab.identification.identify import overfit_warnings
 from armlab.identification.model import Model
-from armlab.identification.validation import filter_in_words
+from armlab.identification.regression import Regression
+from armlab.identification.torque_model import is_told
+from armlab.identification.validation import JointError, RunError, filter_in_words
 from armlab.recordings.recording_file import Draft, DraftRun, write_recording
 
 COLUMNS = {"time": "t", "position": ("q1", "q2", "q3"), "torque": ("tau1", "tau2", "tau3")}
@@ -103,3 +109,39 @@ def test_errors_say_which_torque_they_are_of() -> None:
     assert filter_in_words([]) == "as recorded"
     assert filter_in_words([8.0, 8.0]) == "filtered below 8 Hz"
     assert filter_in_words([8.0, 6.25]) == "filtered below 6.25 to 8 Hz"
+
+
+def test_identify_says_which_cutoff_it_takes_and_takes_the_one_that_is_given(recording: Path, tmp_path: Path) -> None:
+    text = invoke(identify, recording, "--out", tmp_path / "out")
+    found = re.search(r"cut-off: ([\d.]+) Hz, which predicts best on blocks", text)
+    assert found is not None
+    assert f"errors of torque filtered below {format_number(float(found[1]))} Hz" in text
+    given = invoke(identify, recording, "--cutoff-hz", 7.5, "--out", tmp_path / "given")
+    assert "errors of torque filtered below 7.5 Hz" in given
+    assert "which predicts best" not in given
+
+
+def test_numbers_that_may_be_zero_are_listed_by_name_alone() -> None:
+    told = ParameterValue("level", 2.0, (1.9, 2.1), "N.m")
+    doubtful = ParameterValue("level", -3534.0, (-12360.0, 5290.0), "kg.m")
+    assert (is_told(told), is_told(doubtful), is_told(replace(told, interval=None))) == (True, False, True)
+
+
+def test_a_joint_that_leaves_twice_as_much_held_out_is_warned_of() -> None:
+    def error(role: str, *percent: float) -> RunError:
+        joints = tuple(JointError(number, 1.0, each, None) for number, each in enumerate(percent, 1))
+        return RunError("run.csv", role, 1.0, 8.0, 1.0, joints)
+
+    (line,) = overfit_warnings((error("identify", 15.0, 10.0), error("validate", 64.0, 19.0)))
+    assert line.startswith("warning: joint 1 leaves 64 % of its torque held out and 15 % of what was fitted")
+
+
+def test_directions_that_the_motion_hardly_excites_stay_zero_and_keep_the_interval_of_a_fit() -> None:
+    rng = np.random.default_rng(0)
+    first = rng.standard_normal(400)
+    matrix = np.column_stack([first, first + 1e-4 * rng.standard_normal(400)])
+    data = Regression(matrix, 3.0 * first + 0.1 * rng.standard_normal(400), 1, (400,), 100.0, 0.1)
+    free, excited = WeightedLeastSquares()(data), WeightedLeastSquares(tolerance=EXCITED_TOLERANCE)(data)
+    assert np.abs(free.values).max() > 10
+    np.testing.assert_allclose(excited.values, [1.5, 1.5], atol=0.05)
+    np.testing.assert_allclose(excited.bread, free.bread, rtol=0.3)

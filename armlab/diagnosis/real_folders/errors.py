@@ -13,6 +13,7 @@ from armlab.common.errors import InputError
 from armlab.identification.identifier import Identifier
 from armlab.identification.model_file import read_model
 from armlab.identification.torque_model import TorqueModel
+from armlab.recordings.cutoff_trial import choose_cutoff_hz
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only
 from armlab.recordings.plain_least_squares import (
@@ -91,7 +92,7 @@ def measure_errors(folder: Path, verdict_folder: Path, cutoff_hz: float | None) 
 def _left_by_identification(recording: Recording, plain: PlainFit) -> Array:
     """Residual of the usual identification, (rows, joints), as a share of each joint's torque."""
     runs = [run for run in split_runs(recording.runs) if run.role == "identify"]
-    model = Identifier(recording.arm).fit(runs).model_
+    model = Identifier(recording.arm, cutoff_hz=choose_cutoff_hz(recording.arm, runs)).fit(runs).model_
     return _share_left(model, [each.rows for each in plain.held_out])
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.identification.regression import Regression
 
+EXCITED_TOLERANCE = 1e-3  # the same, of directions that a motion excites: its square is that of plain least squares
 RANK_TOLERANCE = 1e-7  # of the largest singular value, columns scaled to unit length; its square is near rounding
 
 
@@ -50,11 +51,14 @@ def pseudo_inverse(gram: Array) -> Array:
     return np.asarray(np.linalg.pinv(gram / both, rcond=RANK_TOLERANCE**2, hermitian=True) / both)
 
 
-def least_squares(matrix: Array, torque: Array) -> Array:
-    """Solution of least squares with columns scaled to unit length, (columns,); (columns, k) for k torques at once."""
+def least_squares(matrix: Array, torque: Array, tolerance: float = RANK_TOLERANCE) -> Array:
+    """Solution of least squares with columns scaled to unit length, (columns,); (columns, k) for k torques at once.
+
+    tolerance: directions with a smaller singular value, as a share of the largest, stay zero.
+    """
     lengths = column_lengths(matrix)
     basis, triangle = np.linalg.qr(matrix / lengths)
-    return np.asarray((np.linalg.lstsq(triangle, basis.T @ torque, rcond=RANK_TOLERANCE)[0].T / lengths).T)
+    return np.asarray((np.linalg.lstsq(triangle, basis.T @ torque, rcond=tolerance)[0].T / lengths).T)
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,13 @@ def joint_weights(data: Regression, values: Array) -> Array:
 
 @dataclass(frozen=True)
 class WeightedLeastSquares:
-    """Joints weighted by their residuals' deviation (Gautier 1997): a small motor's N m counts for more."""
+    """Joints weighted by their residuals' deviation (Gautier 1997): a small motor's N m counts for more.
+
+    tolerance: of `least_squares`. What it leaves at zero has the interval that it would have if it were fitted.
+    """
 
     rounds: int = 2
+    tolerance: float = RANK_TOLERANCE
 
     def __call__(self, data: Regression) -> Estimate:
         """The estimate from these data."""
@@ -86,7 +94,7 @@ class WeightedLeastSquares:
         for _ in range(self.rounds):
             weights = joint_weights(data, values)
             weighted = data.weighted(weights)
-            values = least_squares(weighted.matrix, weighted.torque)
+            values = least_squares(weighted.matrix, weighted.torque, self.tolerance)
         return Estimate(values, pseudo_inverse(weighted.matrix.T @ weighted.matrix), data.weighted(weights**2).matrix)
 
 
