@@ -27,8 +27,10 @@ with (folder.parent / "asked.txt").open("a") as asked:
 if folder.name == "broken":
     sys.exit("armlab: link 1 is no body")
 out.mkdir(parents=True)
-finding = {"effect": "payload", "joint": 3, "parameters": {}, "probability": 0.95}
-(out / "verdict.json").write_text(json.dumps({"status": "mismatch", "summary": "A payload.", "findings": [finding]}))
+finding = {"effect": "payload", "joint": 3, "parameters": {}, "probability": 0.95, "equation": "m_3 += 1 kg"}
+finding |= {"heldout_rms_before": 1.0, "heldout_rms_after": 2.0, "rivals": []}
+verdict = {"schema": "verdict/1", "status": "mismatch", "summary": "A payload.", "findings": [finding]}
+(out / "verdict.json").write_text(json.dumps(verdict | {"located": [], "unexplained": [], "fit": []}))
 """
 FACTS = {
     "schema": "facts/1",
@@ -94,7 +96,7 @@ def test_rows_without_a_licence_stand_on_the_local_page_alone(bench: FolderBench
 
 def test_folders_of_which_nothing_is_known_have_a_row_and_stay_local(bench: FolderBench) -> None:
     lines = list(bench_folders(FolderBench(bench.root, None, bench.results, bench.work, jobs=1), ["open"]))
-    assert any(line.startswith("open: status mismatch, words 2, findings 1") for line in lines)
+    assert any(line.startswith("open: status mismatch, contradictions 1, words 2, findings 1") for line in lines)
     assert not bench.results.exists()
 
 

@@ -11,6 +11,8 @@ from joblib import Parallel, delayed
 
 from armlab.common.errors import InputError, describe_failure
 from armlab.common.files import write_texts
+from armlab.diagnosis.formats import read_verdict_file
+from armlab.diagnosis.real_folders.consistency import contradictions
 from armlab.diagnosis.real_folders.errors import FolderErrors, measure_errors
 from armlab.diagnosis.real_folders.facts import FactsFile, PairFacts, SingleFacts, read_facts
 from armlab.diagnosis.real_folders.folders import RecordingFolder, check_facts, choose_folders, find_folders
@@ -93,7 +95,18 @@ def _row(run: FolderRun, errors: FolderErrors, facts: FactsFile | None) -> Folde
         outcome = replace(outcome, failure=str(error))
     known = None if facts is None else facts.of(run.folder.name)
     score = None if facts is None or known is None else _score(known, verdict, facts)
-    return FolderRow(run.folder, known is not None and known.licensed, outcome, verdict, score, errors)
+    licensed = known is not None and known.licensed
+    return FolderRow(run.folder, licensed, outcome, verdict, score, errors, _contradictions(run))
+
+
+def _contradictions(run: FolderRun) -> tuple[str, ...]:
+    """Of the verdict of one recording; none of a comparison, or where there is none."""
+    if run.folder.pair or not run.verdict_file.is_file():
+        return ()
+    try:
+        return contradictions(read_verdict_file(run.verdict_file))
+    except InputError as error:
+        return (str(error),)
 
 
 def _score(known: SingleFacts | PairFacts, verdict: ToldVerdict | None, facts: FactsFile) -> FolderScore:

@@ -20,6 +20,7 @@ FOLDER_HEADINGS = (
     "wrong",
     "extra",
     "below 0.5",
+    "contradictions",
     "words",
     "findings",
     "seconds",
@@ -37,6 +38,8 @@ JOINT_HEADINGS = (
 )
 EXPLANATION = """*Named*, *class*, *cause*, *minor*, *missed*: how the known facts of a folder are told. *Wrong*: what
 contradicts them; *extra*: what is told and neither known nor allowed; *below 0.5*: what is too improbable to be told.
+*Contradictions*: of a verdict in itself: a finding without which the error falls, shares that do not add up, numbers
+without a unit, a sentence that the table refutes.
 *Words*: of the summary. *Findings*: those that are told. *Seconds*, *processor s*, *MB*: of the process that diagnoses
 the folder. The words are explained in docs/recordings.md.
 
@@ -48,7 +51,10 @@ the same for both. Torque in N m (N, or what the recording has); of motion only 
 
 @dataclass(frozen=True)
 class FolderRow:
-    """Everything of one folder. verdict: None where there is none. score: None without facts about it."""
+    """Everything of one folder. verdict: None where there is none. score: None without facts about it.
+
+    contradictions: what its verdict contradicts in itself.
+    """
 
     folder: RecordingFolder
     licensed: bool
@@ -56,6 +62,7 @@ class FolderRow:
     verdict: ToldVerdict | None
     score: FolderScore | None
     errors: FolderErrors
+    contradictions: tuple[str, ...] = ()
 
     @property
     def cells(self) -> dict[str, str]:
@@ -66,6 +73,7 @@ class FolderRow:
             "status": "no verdict" if verdict is None else verdict.status,
             "words": "" if verdict is None else str(len(verdict.summary.split())),
             "findings": "" if verdict is None else str(sum(not each.minor for each in verdict.found)),
+            "contradictions": "" if verdict is None or self.folder.pair else str(len(self.contradictions)),
             "seconds": f"{took.seconds:.0f}",
             "processor s": f"{took.processor_seconds:.0f}",
             "MB": f"{took.memory_mb:.0f}",
@@ -102,6 +110,7 @@ class FolderRow:
             for name, items in (("wrong", self.score.wrong), ("extra", self.score.extra), ("below", self.score.below)):
                 if items:
                     yield f"{name}: {', '.join(items)}"
+        yield from (f"contradiction: {each}" for each in self.contradictions)
         yield from self.errors.notes
 
     @property
