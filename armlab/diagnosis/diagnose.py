@@ -11,9 +11,10 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
+from armlab.common.errors import DataError
 from armlab.diagnosis.added_body import possible_links, with_possible_bodies
 from armlab.diagnosis.claims import Names, links_claim, make_claims
-from armlab.diagnosis.data import in_fixed_order, observe
+from armlab.diagnosis.data import Observed, in_fixed_order, observe
 from armlab.diagnosis.design import DesignMatrix, build_design_matrix
 from armlab.diagnosis.evidence import Evidence, Judge, count_looks
 from armlab.diagnosis.expected_parts import claim_expected_parts
@@ -42,6 +43,7 @@ from armlab.diagnosis.prediction import (
     choose_smoothing,
     filtered_residual,
     fit_prediction,
+    identification_runs,
     with_smoothing_of,
     with_usual,
 )
@@ -61,7 +63,9 @@ from armlab.diagnosis.unknown import (
     names_contradicted_by_residual,
     predict_residual_structure,
 )
+from armlab.diagnosis.yardstick import Yardstick, fit_yardstick, predicts_better, squared_errors, with_claims
 from armlab.effects.library import library
+from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.recording import Recording
@@ -288,9 +292,14 @@ def _assemble(
         "unknown": [each.equation for each in claims if each.candidate is None],
         "in_links": [f"{each.effect}: {each.equation}" for each in claims if each.in_links],
     }
+    plain = fit_yardstick(simulation.arm, observed)
+    is_plain_best = plain is not None and simulation.kind != "simulated" and _is_beaten_by(plain, prediction)
     found = choose_smoothing(
         build_model(recording, simulation, prediction.model, named, notes), observed, tuning.prediction
     )
+    if is_plain_best:
+        assert plain is not None
+        found = _delivered(plain, found, observed, claims)
     alone = build_model(recording, simulation, prediction.with_names_alone(named), named, {})
     alone = with_smoothing_of(found, alone)
     final = filtered_residual(found, observed)
@@ -300,7 +309,7 @@ def _assemble(
     for each in unknowns:
         noise[:, each.joint] -= each.prediction
     floor = noise_floor(noise, design.features, observed, tuning.surrogate)
-    fits = joint_fits(refit, found, alone, floor, observed, tuning)
+    fits = joint_fits(refit, (found, alone), plain, floor, observed, tuning)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
     claims = without_lesser_unknowns(claims, parts)
     parts = explain_error(prediction.model, observed, claims, (start, final), floor)
@@ -327,6 +336,7 @@ def _assemble(
         base_covariance=covariance,
         claims=claims,
         parts=parts,
+        is_plain=is_plain_best,
         friction=joint_friction(replace(model, state=with_usual(model, model.state.groups))),
         located=locate_excess(start, floor, observed, tuning.location) if claims else (),
         unexplained=tuple(
@@ -338,6 +348,26 @@ def _assemble(
         settings=settings,
     )
     return diagnosis if hidden is not None else replace(diagnosis, summary=summary_of(diagnosis))
+
+
+def _is_beaten_by(plain: Yardstick, prediction: Prediction) -> bool:
+    """Whether plain least squares predicts blocks of the runs that identify better than the model that predicts."""
+    judged, arm = prediction.judged, prediction.model.design.simulation.arm
+    try:
+        errors = squared_errors(arm, judged, prediction.block, plain.cutoff_hz)
+    except DataError:
+        return False
+    return predicts_better(
+        errors, prediction.squared_errors, prediction.model.design.settings.tuning.prediction.min_trial_gain
+    )
+
+
+def _delivered(plain: Yardstick, found: TorqueModel, observed: Observed, claims: Sequence[Claim]) -> TorqueModel:
+    """Plain least squares in the place of a model, with its robot and provenance."""
+    model = with_claims(
+        plain.as_torque_model(identification_runs(observed)), [(each.effect, each.joint) for each in claims]
+    )
+    return replace(model, robot=found.robot, provenance={**found.provenance, "model": "plain least squares"})
 
 
 def _settings_used(settings: Settings) -> dict[str, float | str | bool]:

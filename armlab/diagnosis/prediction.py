@@ -37,12 +37,15 @@ from armlab.recordings.recording import Role, Run
 class Prediction:
     """A model that predicts. places: of its groups, by the number that each has in the model of the names; what is not
     claimed there is present here. held_out: ||tau - tau_hat|| / ||tau|| of the filtered torque on blocks held out in
-    turn.
+    turn; squared_errors: of each joint there, (joints,). judged, block: the rows of that, and the block of each.
     """
 
     model: FittedModel
     places: dict[int, int]
     held_out: float
+    squared_errors: Array
+    judged: Observed
+    block: NDArray[np.intp]
 
     def with_names_alone(self, names: Iterable[int]) -> FittedModel:
         """The model fitted with some of its groups alone."""
@@ -78,7 +81,8 @@ def fit_prediction(named: FittedModel) -> Prediction:
     best = _better(best, known, tuning)
     model = _settled(replace(best.trial.model, state=best.state), tuning)
     places = {group: place for place, group in enumerate(numbers) if place in best.state.groups}
-    return Prediction(model, places, best.held_out)
+    squares, judged = best.trial.errors(best.state).sum(axis=0), judge.observed
+    return Prediction(model, places, best.held_out, squares, judged, judge.blocks(judged))
 
 
 def _may_help(law: Candidate) -> bool:

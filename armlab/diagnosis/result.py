@@ -226,7 +226,8 @@ class Diagnosis:
 
     nominal, refit, final: residuals (rows, joints), N m, of the simulation as it is, of its links refitted, and of
     the model found, without surrogates of what is unknown. inertial: (10 * joints,) of the model found. model: the
-    same to predict with; named_model: fitted with the named effects alone.
+    same to predict with; named_model: fitted with the named effects alone. is_plain: whether plain least squares is
+    delivered in the place of the model that predicts, because it predicts the runs that identify better.
     steps: the log of the search. looks: how many candidates and shapes were compared. signs: warnings about
     limits, names, clock and standstill of the recording as it is. setup: how it is to be read, None where that was not
     asked; `recording` is then as it should be read. weighed: the names of each finding, and of what was not probable
@@ -248,6 +249,7 @@ class Diagnosis:
     base_covariance: Array | None = None
     claims: tuple[Claim, ...] = ()
     parts: tuple[Part, ...] = ()
+    is_plain: bool = False
     friction: tuple[JointFriction, ...] = ()
     located: tuple[Located, ...] = ()
     unexplained: tuple[Unexplained, ...] = ()

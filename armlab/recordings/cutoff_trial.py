@@ -28,6 +28,7 @@ from problem.arm import Arm
 from problem.motion import Motion
 
 BLOCKS = 6  # of time, of all runs together, as for the model that predicts
+MIN_SAMPLES = 20  # of a run whose spectrum tells a cut-off
 MAX_ROWS = 1000  # of all runs, at which the torque is predicted
 STEP = 2.0  # from one candidate to the next
 
@@ -47,7 +48,8 @@ class CutoffTrial:
 
 def choose_cutoff_hz(arm: Arm, runs: Sequence[Run]) -> float:
     """The best cut-off, Hz, of those up to what the positions suggest. Raises ValueError without rows."""
-    return try_cutoffs(arm, runs, suggested_cutoff_hz(runs)).best_hz
+    long = [run for run in runs if run.samples >= MIN_SAMPLES]
+    return try_cutoffs(arm, long, suggested_cutoff_hz(long)).best_hz
 
 
 def try_cutoffs(arm: Arm, runs: Sequence[Run], highest_hz: float) -> CutoffTrial:

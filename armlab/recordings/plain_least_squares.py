@@ -82,6 +82,11 @@ class PlainRows:
         """Stamps of the kept rows, (kept,), s."""
         return self.run.time[self.low_pass.rows]
 
+    def where(self, chosen: NDArray[np.bool_]) -> "PlainRows":
+        """Some of the kept rows, (kept,), for a fit; their stamps are those of all."""
+        parts = (self.motion.position, self.motion.velocity, self.motion.acceleration)
+        return replace(self, motion=Motion(*(part[chosen] for part in parts)), torque=self.torque[chosen])
+
 
 @dataclass(frozen=True, eq=False)
 class HeldOutRows:
@@ -146,9 +151,9 @@ class PlainModel:
         return np.asarray(self.layout.matrix(motion) @ self.values)
 
 
-def fit_plain_model(arm: Arm, runs: Sequence[Run], cutoff_hz: float) -> PlainModel:
+def fit_plain_rows(arm: Arm, rows: Sequence[PlainRows], cutoff_hz: float) -> PlainModel:
     """The model of an arm of which all joints move. Raises ValueError where no rows are left."""
-    prepared = [each for each in (prepare_rows(run, cutoff_hz) for run in runs) if len(each.torque)]
+    prepared = [each for each in rows if len(each.torque)]
     if not prepared:
         raise DataError(f"no run is longer than {2 * TRIMMED_PERIODS} periods of {cutoff_hz:g} Hz")
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)

@@ -81,11 +81,13 @@ def test_gain_friction_and_delay_are_named_with_their_numbers(diagnosis: MotionD
 
 
 def test_a_finding_is_told_in_the_units_of_a_reader(diagnosis: MotionDiagnosis) -> None:
-    lines = list(motion_lines(diagnosis))
+    lines = list(motion_lines(diagnosis, verbose=True))
     delay = next(each for each in diagnosis.findings if each.effect == "command_delay")
     assert any(f"command delay, {1e3 * delay.value:.4g} ms (" in line for line in lines)
     assert any("controller gain kp, " in line for line in lines)
-    assert not any("_" in line.split(": ", 1)[1] for line in lines if "Coulomb" in line or "delay" in line)
+    told = [line for line in lines if line.startswith("  ") and ("Coulomb" in line or "delay" in line)]
+    assert told
+    assert not any("_" in line for line in told)
 
 
 def test_held_out_replay_comes_near_the_encoder(diagnosis: MotionDiagnosis) -> None:
@@ -187,7 +189,7 @@ def test_without_a_controller_and_with_dropped_rows_the_gain_is_found_all_the_sa
     result = diagnose_motion(load_motion_recording(folder))
     assert found(result)["controller_gain_error", 1] == pytest.approx(8.0, rel=0.06)
     assert all(np.isnan(each.nominal) for each in result.findings if each.effect == "controller_gain_error")
-    limits = [line for line in motion_lines(result) if ": torque saturation," in line]
+    limits = [line for line in motion_lines(result, verbose=True) if ": torque saturation," in line]
     assert limits
     assert all("; the simulation has none" in line for line in limits)
     assert all(each.replay_before is None for each in result.errors)

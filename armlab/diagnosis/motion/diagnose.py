@@ -6,7 +6,7 @@ commands of the held-out runs through the simulation before and after (`replay`)
 """
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -23,7 +23,7 @@ from armlab.diagnosis.motion.hold import hold_commands, holds_samples
 from armlab.diagnosis.motion.joint_replay import joint_errors
 from armlab.diagnosis.motion.replay import Replayed, joint_rms, replay
 from armlab.diagnosis.motion.separate import TORQUE_SCALED, confused_parameters, has_weak_load
-from armlab.diagnosis.motion.servo import OPTIONAL, PARAMETERS, ServoParameter, Servos, place
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT, KEYS, OPTIONAL, PARAMETERS, ServoParameter, Servos, place
 from armlab.diagnosis.motion.shared_number import (
     COMMON_DELAY,
     TOOL_MASS,
@@ -167,7 +167,8 @@ def diagnose_motion(
         judged = coupled_windows(taken, fit.simulation, fit.values, fit.tuning)
         whole = replace(fit.tuning, wanted_windows=1, longest_window_s=np.inf)
         runs = coupled_windows(taken, fit.simulation, fit.values, whole)
-        kept = replace(fit, chosen=_without_worse(fit, runs, tuning))
+        stated = replace(fit, chosen=_with_stated_scale(fit, tuning))
+        kept = replace(stated, chosen=_without_worse(stated, runs, tuning))
         placed = replace(fit, chosen=_place_damping(kept, judged, tuning))
         return _conclude(recording, bare_simulation, (placed, shared), (judged, runs), taken, tuning)
 
@@ -247,6 +248,41 @@ def _first_fits(runs: Sequence[MotionRun], simulation: ServoSimulation, tuning: 
         None if np.ptp(joint.position) < MIN_MOVED else first_fit(joint, nominal, tuning).values
         for joint, nominal in zip(make_windows(runs, simulation, tuning), simulation.nominal.values, strict=True)
     ]
+
+
+def _with_stated_scale(fit: ArmFit, tuning: MotionTuning) -> list[ChosenServo | None]:
+    """The servos with the kp of the simulation where nothing else tells the scale of their torques.
+
+    What scales kp, damping, friction and rotor inertia alike changes no motion, but for gravity and the links' inertia.
+    Where gravity is weak, and the inertia of the links is a smaller part of the whole than kp is uncertain, neither
+    tells the scale: then kp is as stated, and the others are fitted anew.
+    """
+    out: list[ChosenServo | None] = []
+    looks, kp = number_of_tests(len(fit.chosen)), place("kp")
+    for each, learned in zip(fit.chosen, fit.windows, strict=True):
+        if each is not None and kp in each.gains and np.isfinite(each.nominal[kp]) and _is_scale_open(each, learned):
+            few = thin_windows(
+                learned.select(np.setdiff1d(np.arange(learned.count), each.odd)), tuning.max_judged_windows
+            )
+            each = judge_again(learned, _in_scale_of(each, each.nominal[kp]).without(kp, few, tuning), looks, tuning)
+        out.append(each)
+    return out
+
+
+def _in_scale_of(chosen: ChosenServo, gain: float) -> ChosenServo:
+    """The servo with all its torques in another scale, in which kp is this."""
+    values, places = chosen.fit.values.copy(), [KEYS.index(key) for key in TORQUE_SCALED]
+    finite = [at for at in places if values[at] < INFINITE_LIMIT]
+    values[finite] *= gain / values[place("kp")]
+    return replace(chosen, fit=replace(chosen.fit, values=values))
+
+
+def _is_scale_open(chosen: ChosenServo, learned: Windows) -> bool:
+    """Whether neither gravity nor the inertia of the links tells the scale of a joint's torques."""
+    kp, values, (low, high) = place("kp"), chosen.fit.values, chosen.fit.interval()
+    uncertain = float(high[kp] - low[kp]) / (2 * values[kp])
+    links = float(np.median(learned.inertia))
+    return has_weak_load(learned, values) and links < uncertain * (links + float(values[place("armature")]))
 
 
 def _without_worse(fit: ArmFit, judged: Sequence[Windows], tuning: MotionTuning) -> list[ChosenServo | None]:
@@ -387,6 +423,8 @@ def _conclude(
     if not any(follows.values()):
         return MotionDiagnosis(recording, given, "inconclusive", NO_SERVO)
     findings = [each for each in findings if each.parameter.key == TOOL_MASS.key or follows[each.joint]]
+    helped = {each.joint for each in errors if each.replay_before is None or each.replay_after < each.replay_before}
+    findings = [each for each in findings if each.after < each.before and _is_at_one_of(each, helped)]
     status, reason = _status(findings, errors, chosen, tuning.same_error if known else None)
     tools = [
         float(np.sqrt(np.mean(np.concatenate([each.tool_distance for each in part]) ** 2)))
@@ -526,6 +564,11 @@ def _values_after(simulation: ServoSimulation, number: int, chosen: ChosenServo 
             "tells its gain: leave it out by `joints`, or give `controller.kp` and `torque_limit`"
         )
     return np.asarray(nominal)
+
+
+def _is_at_one_of(finding: ServoFinding, joints: Set[int]) -> bool:
+    """Whether a finding is at one of these joints; a mass at the tool is at all."""
+    return bool(joints) if finding.parameter.key == TOOL_MASS.key else finding.joint in joints
 
 
 def _status(

@@ -41,7 +41,7 @@ def bench_real_motion(
     alone = _replay_one_gain(diagnosis)
     lines = [
         summary_of(diagnosis),
-        *finding_phrases(diagnosis),
+        *finding_phrases(diagnosis, minor=False),
         *(current_phrase(diagnosis.simulation.arm, each) for each in diagnosis.currents),
     ]
     table = _replay_table(diagnosis, alone)
@@ -64,7 +64,7 @@ def bench_real_motion(
         f"Held out: {_held_out(diagnosis)}. Left out before any fit, as contact: {_contact()}. "
         f"{diagnosis.seconds:.0f} s for the diagnosis.",
         summary_of(diagnosis),
-        "\n".join(f"- {each}" for each in finding_phrases(diagnosis)),
+        "\n".join(f"- {each}" for each in finding_phrases(diagnosis, minor=False)),
         "The current is that of the supply, without sign; it took no part in the diagnosis.",
         "\n".join(f"- {current_phrase(diagnosis.simulation.arm, each)}" for each in diagnosis.currents),
         "Root mean square of simulated minus measured position on the held-out runs, mrad; at the tool mm. Whole arm, "

@@ -9,7 +9,15 @@ from armlab.common.report.wording import format_unit
 from armlab.diagnosis.motion.diagnose import MotionDiagnosis
 from armlab.diagnosis.motion.export import lines_without_field
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
-from armlab.diagnosis.motion.words import current_phrase, finding_phrases, finding_with_numbers, summary_of
+from armlab.diagnosis.motion.told import told_numbers
+from armlab.diagnosis.motion.words import (
+    current_phrase,
+    finding_phrases,
+    finding_with_numbers,
+    remarks,
+    summary_of,
+)
+from armlab.diagnosis.told.steps import MAX_STEPS
 from armlab.effects.library import effect_named
 from problem.joint_words import joint_at_start, joint_in_table
 
@@ -20,6 +28,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
     """HTML text of the page. command: that repeats the diagnosis."""
     known = diagnosis.servos is not None
     first, _, rest = summary_of(diagnosis).partition(". ")
+    rest = " ".join([rest, *remarks(diagnosis)]).strip()
     pictures = _pictures(diagnosis) if known else []
     shown = _most_telling_row(diagnosis) if known else 0
     return render_page(
@@ -35,7 +44,7 @@ def motion_page(diagnosis: MotionDiagnosis, command: str) -> str:
         tool=_tool_text(diagnosis),
         replayed=pictures[shown : shown + 1],
         pictures=[*pictures[:shown], *pictures[shown + 1 :]],
-        findings=finding_phrases(diagnosis),
+        findings=[*finding_phrases(diagnosis, minor=False), *finding_phrases(diagnosis, minor=True)],
         currents=[current_phrase(diagnosis.simulation.arm, each) for each in diagnosis.currents],
         numbers=_number_table(diagnosis) if known else None,
         missing=_missing_fields(diagnosis),
@@ -47,7 +56,8 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
     """What is wrong with the servo of each joint, with its interval, and the replay error before and after."""
     rows, arm = [], diagnosis.simulation.arm
     for each in diagnosis.errors:
-        own = [finding for finding in diagnosis.findings if finding.joint == each.joint]
+        told = [one for one in told_numbers(diagnosis) if not one.minor]
+        own = [one.finding for one in told if one.finding.joint == each.joint]
         words = "; ".join(finding_with_numbers(finding) for finding in own) or "–"
         before = "–" if each.replay_before is None else f"{1e3 * each.replay_before:.3g} mrad"
         rows.append((joint_in_table(arm, each.joint), words, before, f"{1e3 * each.replay_after:.3g} mrad"))
@@ -58,9 +68,11 @@ def joint_table(diagnosis: MotionDiagnosis) -> Table:
 def _next_recordings(diagnosis: MotionDiagnosis) -> list[str]:
     """Recordings that separate the findings from their rivals."""
     steps = {
-        each.parameter.experiment or effect_named(each.effect).experiment for each in diagnosis.findings if each.rivals
+        each.finding.parameter.experiment or effect_named(each.finding.effect).experiment: None
+        for each in sorted(told_numbers(diagnosis), key=lambda each: -each.share)
+        if each.finding.rivals and not each.minor
     }
-    return sorted(f"{step[0].upper()}{step[1:]}." for step in steps if step)
+    return [f"{step[0].upper()}{step[1:]}." for step in steps if step][:MAX_STEPS]
 
 
 def _error_table(diagnosis: MotionDiagnosis) -> Table:

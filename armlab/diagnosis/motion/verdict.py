@@ -26,17 +26,17 @@ from armlab.diagnosis.formats import (
     kind_of_effect,
 )
 from armlab.diagnosis.motion import servo_plugin
-from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
+from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis
 from armlab.diagnosis.motion.export import lines_without_field, mjcf_text, servos_json
-from armlab.diagnosis.motion.naming import servo_naming, weigh_servo
+from armlab.diagnosis.motion.naming import weigh_servo
 from armlab.diagnosis.motion.robot_learning import isaac_lab_text, mjlab_text
 from armlab.diagnosis.motion.ros2_control import controllers_text, ros_urdf_text
 from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
+from armlab.diagnosis.motion.told import ToldNumber, causes_told, told_numbers
 from armlab.diagnosis.motion.words import summary_of
 from armlab.diagnosis.naming.names_file import names_texts
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.tuning import NamingTuning
-from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from problem.robot_file import built_in_arms
 
@@ -70,41 +70,20 @@ def motion_texts(diagnosis: MotionDiagnosis, folder: Path) -> dict[str, str]:
 
 def make_motion_verdict(diagnosis: MotionDiagnosis) -> VerdictFile:
     """The content of `verdict.json`. Errors are of positions, rad (m): there is no torque to compare with."""
+    told = told_numbers(diagnosis)
     return VerdictFile(
         schema=VERDICT_SCHEMA,
         status=diagnosis.status,
         summary=summary_of(diagnosis),
-        story=_story(diagnosis),
-        located=_located(diagnosis),
-        findings=tuple(
-            _finding(each, share, diagnosis.simulation.last_link)
-            for each, share in zip(diagnosis.findings, _shares(diagnosis), strict=True)
+        story=tuple(
+            StoryEntry(cause=each.cause, joints=each.joints, share_of_gap=each.share, findings=each.findings)
+            for each in causes_told(told)
         ),
+        located=_located(diagnosis),
+        findings=tuple(_finding(each, diagnosis.simulation.last_link) for each in told),
         unexplained=_unexplained(diagnosis),
         fit=tuple(_fit(each, _current(diagnosis, each.joint)) for each in diagnosis.errors),
     )
-
-
-def _shares(diagnosis: MotionDiagnosis) -> list[float]:
-    """Of each finding: its part in the squared error that all findings take away on held-out data."""
-    gains = np.array([max(each.before**2 - each.after**2, 0.0) for each in diagnosis.findings])
-    return [float(each) for each in gains / max(gains.sum(), 1e-300)]
-
-
-def _story(diagnosis: MotionDiagnosis) -> tuple[StoryEntry, ...]:
-    shares, causes = _shares(diagnosis), dict[str, list[int]]()
-    for number, each in enumerate(diagnosis.findings):
-        causes.setdefault(effect_named(each.effect).cause, []).append(number)
-    entries = [
-        StoryEntry(
-            cause=cause,
-            joints=tuple(sorted({diagnosis.findings[number].joint for number in numbers})),
-            share_of_gap=sum(shares[number] for number in numbers),
-            findings=tuple(numbers),
-        )
-        for cause, numbers in causes.items()
-    ]
-    return tuple(sorted(entries, key=lambda entry: -entry.share_of_gap))
 
 
 def _located(diagnosis: MotionDiagnosis) -> tuple[LocatedEntry, ...]:
@@ -122,32 +101,32 @@ def _located(diagnosis: MotionDiagnosis) -> tuple[LocatedEntry, ...]:
     return tuple(sorted(located, key=lambda entry: -entry.share))
 
 
-def _finding(each: ServoFinding, share: float, last: int) -> FindingEntry:
+def _finding(told: ToldNumber, last: int) -> FindingEntry:
     """An entry of the verdict. last: the link that carries the tool."""
+    each, naming = told.finding, told.naming
     parameter = ParameterEntry(
         value=each.value, ci95=(float(each.interval[0]), float(each.interval[1])), unit=each.parameter.unit
     )
     if math.isfinite(each.nominal) and each.nominal < INFINITE_LIMIT:
         parameter = parameter.model_copy(update={"simulation": float(each.nominal)})
-    naming = servo_naming(each, last)
     members = [
         ClassMember(effect=member.effect, joint=member.joint, probability=member.probability)
         for member in naming.members(NamingTuning())
     ]
-    effect = UNKNOWN.id if naming.is_unknown else each.effect
     entry = FindingEntry(
-        effect=effect,
-        kind=kind_of_effect(effect_named(effect)),
+        effect=told.effect,
+        kind=kind_of_effect(effect_named(told.effect)),
         joint=each.joint,
         joints=(each.joint,),
-        form=each.name if effect == "controller_gain_error" else None,
+        form=each.name if told.effect == "controller_gain_error" else None,
         parameters={} if naming.is_unknown else {each.name: parameter},
-        probability=naming.probability_of(effect, each.joint),
+        minor=told.minor,
+        probability=naming.probability_of(told.effect, each.joint),
         equation=each.equation,
         heldout_rms_before=each.before,
         heldout_rms_after=each.after,
         p_value=each.p_value,
-        share_of_gap=share,
+        share_of_gap=told.share,
         rivals=tuple(
             RivalEntry(effect=rival, joint=last if rival == "payload" else each.joint) for rival in each.rivals
         ),

@@ -4,13 +4,16 @@ import math
 from collections.abc import Iterator, Sequence
 from textwrap import wrap
 
-from armlab.common.report.wording import format_unit, join_words
+from armlab.common.report.wording import count_of, format_unit, join_words
 from armlab.diagnosis.motion.diagnose import JointError, MotionDiagnosis, ServoFinding
-from armlab.diagnosis.motion.naming import servo_naming
-from armlab.diagnosis.motion.servo import INFINITE_LIMIT, PARAMETERS
+from armlab.diagnosis.motion.servo import INFINITE_LIMIT
+from armlab.diagnosis.motion.told import ToldNumber, causes_told, told_numbers
 from armlab.diagnosis.motion.witness import CurrentWitness
 from armlab.diagnosis.report.verdict import LINE_WIDTH
-from armlab.diagnosis.report.words import LESS_MASS, format_chance
+from armlab.diagnosis.report.words import LESS_MASS, SOMETHING_UNKNOWN, format_chance
+from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.summary import MAX_FIRST_WORDS, MAX_WORDS
+from armlab.effects.contract import UNKNOWN
 from armlab.effects.library import effect_named
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words
@@ -26,35 +29,51 @@ NUMBER_WORDS = {
     "static_excess": " (more at rest)",
 }
 SHOWN_RISE = 1.02  # of a replay error: a smaller one is none
-MAX_LISTED_WORDS = 24  # of the findings with their places in the first sentence; more are named without
+MAX_FIGURES = 2  # of the second sentence
 
 
 def summary_of(diagnosis: MotionDiagnosis) -> str:
-    """One paragraph; its first sentence has at most 30 words."""
+    """At most three sentences and MAX_WORDS words; the first has at most MAX_FIRST_WORDS."""
     if diagnosis.status == "inconclusive":
         return f"Nothing can be said: {diagnosis.reason}."
+    told = [each for each in told_numbers(diagnosis) if not each.minor]
     if diagnosis.status == "none":
         first = "The simulation replays the held-out commands as well as any servo of this law."
-        return first + _replay_sentence(diagnosis)
-    arm = diagnosis.simulation.arm
-    found = findings_by_name(diagnosis)
-    listed = join_words([f"{name} at {_places(arm, own)}" for name, own in found.items()])
-    if len(listed.split()) > MAX_LISTED_WORDS:
-        listed = join_words(list(found))
-    first = f"The simulation differs from the arm in {listed}."
-    return first + _replay_sentence(diagnosis) + _silent_sentence(diagnosis) + _odd_sentence(diagnosis)
+    elif not told:
+        first = "Nothing of practical size is missing: no number changes the replay by 5 %."
+    else:
+        first = _where(diagnosis, told)
+    last = _replay_sentence(diagnosis)
+    left = MAX_WORDS - len(first.split()) - len(last.split())
+    shown = list[str]()
+    for each in sorted(told, key=lambda each: -each.share)[:MAX_FIGURES]:
+        phrase = f"{finding_with_numbers(each.finding)} at {_places(diagnosis.simulation.arm, [each.finding])}"
+        if len("; ".join([*shown, phrase]).split()) > left:
+            break
+        shown.append(phrase)
+    sizes = "; ".join(shown)
+    middle = f"{sizes[0].upper()}{sizes[1:]}." if sizes else ""
+    return " ".join(each for each in (first, middle, last) if each)
 
 
-def findings_by_name(diagnosis: MotionDiagnosis) -> dict[str, list[ServoFinding]]:
-    """The findings of each name, in the order of the law's parameters; those that may be nothing at the end."""
-    places = {parameter.effect: number for number, parameter in enumerate(PARAMETERS)}
-    ordered = sorted(
-        diagnosis.findings, key=lambda each: (is_doubtful(each), places.get(each.effect, len(places)), each.joint)
-    )
-    found: dict[str, list[ServoFinding]] = {}
-    for each in ordered:
-        found.setdefault(finding_name(each), []).append(each)
-    return found
+def _where(diagnosis: MotionDiagnosis, told: Sequence[ToldNumber]) -> str:
+    """The causes with their shares of the replay error, the largest first."""
+    arm, shown = diagnosis.simulation.arm, list[str]()
+    causes = causes_told(told)
+    for each in causes:
+        own = [told[at] for at in each.findings]
+        names = list(dict.fromkeys(finding_name(one.finding) for one in own))
+        name = each.cause if each.cause == FRICTION and len(names) > 1 else join_words(names)
+        name = SOMETHING_UNKNOWN if each.cause == UNKNOWN.id else name
+        doubt = " (not certain)" if all(one.statement.kind == "cause" for one in own) else ""
+        places = join_words(list(dict.fromkeys(_places(arm, [one.finding]) for one in own)))
+        places = places if "tool" in places else _places(arm, [one.finding for one in own])
+        share = f"{max(min(round(100 * each.share), 99 if len(causes) > 1 else 100), 1)} %"
+        part = f"{share}{' of the replay error that goes comes' if not shown else ''} from {name}{doubt} at {places}"
+        if shown and len(", ".join([*shown, part]).split()) > MAX_FIRST_WORDS:
+            break
+        shown.append(part)
+    return f"{', '.join(shown)}."
 
 
 def finding_name(finding: ServoFinding) -> str:
@@ -77,23 +96,29 @@ def _places(arm: Arm, findings: Sequence[ServoFinding]) -> str:
 
 
 def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
+    """The joint whose replay gains most, or is worst where there is nothing to compare with."""
     if not diagnosis.errors:
         return ""
     arm = diagnosis.simulation.arm
-    places = [
-        (joint_in_words(arm, each.joint), each.replay_before, each.replay_after, "mrad") for each in diagnosis.errors
-    ]
-    tool_before, tool_after = diagnosis.tool
-    if tool_before is not None:
-        places.append(("at the tool", tool_before, tool_after, "mm"))
-    words = [
-        f"{place} {'' if before is None else f'from {1e3 * before:.3g} to '}{1e3 * after:.3g} {unit}"
-        for place, before, after, unit in places
-    ]
-    known = all(before is not None for _, before, _, _ in places)
-    start = "with the simulation as given and with what was found" if known else "with what was found"
-    text = f" Replay error, rms of the position over held-out runs, {start}: {', '.join(words)}."
-    return text if known else f"{text} The simulation as given has no drive to replay with."
+    if any(each.replay_before is None for each in diagnosis.errors):
+        worst = max(diagnosis.errors, key=lambda each: each.replay_after / max(each.spread, 1e-300))
+        left = f"{1e3 * worst.replay_after:.3g} mrad, {100 * worst.replay_after / max(worst.spread, 1e-300):.0f} %"
+        return f"With what was found {joint_in_words(arm, worst.joint)} is replayed with {left} of its motion."
+    if diagnosis.status == "none":
+        worst = max(diagnosis.errors, key=lambda each: each.replay_after)
+        return f"Its largest replay error is {1e3 * worst.replay_after:.3g} mrad ({joint_in_words(arm, worst.joint)})."
+    best = max(diagnosis.errors, key=lambda each: (each.replay_before or 0.0) / max(each.replay_after, 1e-300))
+    before, after = 1e3 * (best.replay_before or 0.0), 1e3 * best.replay_after
+    falls = "falls" if after < before else "does not fall:"
+    return (
+        f"On held-out runs the replay error of {joint_in_words(arm, best.joint)} {falls} from {before:.3g} to "
+        f"{after:.3g} mrad, {100 * best.replay_after / max(best.spread, 1e-300):.0f} % of its motion."
+    )
+
+
+def remarks(diagnosis: MotionDiagnosis) -> list[str]:
+    """Joints of which nothing can be said, and stretches in which something else moves the arm."""
+    return [each for each in (_silent_sentence(diagnosis), _odd_sentence(diagnosis)) if each]
 
 
 def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
@@ -101,7 +126,7 @@ def _silent_sentence(diagnosis: MotionDiagnosis) -> str:
         return ""
     joints = joints_in_words(diagnosis.simulation.arm, diagnosis.silent)
     stands = "it stands still or follows" if len(diagnosis.silent) == 1 else "they stand still or follow"
-    return f" Of {joints} nothing can be said: {stands} no servo."
+    return f"Of {joints} nothing can be said: {stands} no servo."
 
 
 def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
@@ -109,33 +134,40 @@ def _odd_sentence(diagnosis: MotionDiagnosis) -> str:
         return ""
     shown = ", ".join(f"{run} {start:.0f} to {end:.0f} s" for run, start, end in diagnosis.odd[:3])
     more = f" and {len(diagnosis.odd) - 3} more" if len(diagnosis.odd) > 3 else ""
-    return f" Something else than the servos moves the arm in {shown}{more}: contact, or commands that came late."
+    return f"Something else than the servos moves the arm in {shown}{more}: contact, or commands that came late."
 
 
 def motion_lines(diagnosis: MotionDiagnosis, verbose: bool = False) -> Iterator[str]:
     """The verdict, each finding with its interval, the simulation's number and rivals, and the errors of each joint.
 
-    verbose: what the currents of the joints say, too.
+    verbose: minor findings and what the currents of the joints say, too.
     """
     arm = diagnosis.simulation.arm
     yield from wrap(f"{diagnosis.status.upper()}: {summary_of(diagnosis)}", LINE_WIDTH)
-    yield from (f"  {each}" for each in finding_phrases(diagnosis))
+    yield from (f"  {line}" for each in remarks(diagnosis) for line in wrap(each, LINE_WIDTH - 2))
+    yield from (f"  {each}" for each in finding_phrases(diagnosis, minor=False))
+    minor = finding_phrases(diagnosis, minor=True)
+    if verbose:
+        yield from (f"  small: {each}" for each in minor)
+    elif minor:
+        yield f"  {count_of(len(minor), 'small difference')} more, in verdict.json and on the page"
     for error in diagnosis.errors:
         yield f"  {error_phrase(arm, error)}"
     for current in diagnosis.currents if verbose else ():
         yield f"  {current_phrase(arm, current)}"
 
 
-def finding_phrases(diagnosis: MotionDiagnosis) -> list[str]:
-    """Each finding in one line, with the probability of its name."""
-    arm, last = diagnosis.simulation.arm, diagnosis.simulation.last_link
-    return [_finding_phrase(arm, each, last) for each in diagnosis.findings]
+def finding_phrases(diagnosis: MotionDiagnosis, minor: bool) -> list[str]:
+    """Each finding that is told, or each minor one, in one line with the probability of its name."""
+    told = [each for each in told_numbers(diagnosis) if each.minor == minor]
+    return [_finding_phrase(diagnosis.simulation.arm, each) for each in told]
 
 
-def _finding_phrase(arm: Arm, finding: ServoFinding, last: int) -> str:
+def _finding_phrase(arm: Arm, told: ToldNumber) -> str:
+    finding = told.finding
     rivals = " or ".join(effect_named(each).words for each in finding.rivals)
     also = f"; it could also be {rivals}" if rivals else ""
-    chance = format_chance(servo_naming(finding, last).probability_of(finding.effect, finding.joint))
+    chance = format_chance(told.naming.probability_of(finding.effect, finding.joint))
     return f"{_places(arm, [finding])}: {finding_with_numbers(finding)}; probability of the name {chance}{also}"
 
 

@@ -260,9 +260,12 @@ def steps_and_uses(diagnosis: Diagnosis) -> list[str]:
     asked = list(next_steps(diagnosis, tell(diagnosis)))
     if any(_motion_may_tell(claim) for claim in diagnosis.claims):
         asked.append("`armlab next verdict.json --robot ROBOT` designs a motion that decides between rivals.")
+    held = "the links and every named effect"
+    if diagnosis.is_plain:
+        held = "plain least squares, which predicts blocks of these runs better than a model with the named effects"
     use = [
-        "model.yaml beside this page holds the links and every named effect: `armlab predict model.yaml RECORDING` "
-        "compares it with another recording.",
+        f"model.yaml beside this page holds {held}: `armlab predict model.yaml RECORDING` compares it with another "
+        "recording.",
         _export_text(diagnosis),
     ]
     return asked + use
@@ -275,7 +278,7 @@ def _motion_may_tell(claim: Claim) -> bool:
 
 
 def _export_text(diagnosis: Diagnosis) -> str:
-    if diagnosis.simulation.inertial is None:
+    if diagnosis.simulation.inertial is None or diagnosis.is_plain:
         return "It has base parameters, which simulators do not take: they need nominal `links` to start from."
     missing = dict.fromkeys(claim.effect for claim in diagnosis.claims if not _has_place_in_simulator(claim))
     lost = f" That has no place for {join_words([effect_in_words(each) for each in missing])}." if missing else ""

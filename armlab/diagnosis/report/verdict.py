@@ -102,6 +102,8 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
         yield from _joint_lines(diagnosis, told)
     if told.minor:
         yield f"  {count_of(len(told.minor), 'small difference')} more, in verdict.json and folded on the page"
+    if diagnosis.is_plain:
+        yield "  model.yaml holds plain least squares: it predicts blocks of these runs better than the named effects"
     for number, step in enumerate(next_steps(diagnosis, told), 1):
         yield from (f"  {line}" for line in wrap(f"next {number}: {step}", LINE_WIDTH - 2))
     if verbose:

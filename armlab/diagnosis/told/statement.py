@@ -1,6 +1,6 @@
 """How a finding may be stated: by its name, as one of a few names, as a cause without its law, or not at all."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from typing import Literal
 
@@ -29,28 +29,28 @@ def statement_of(claim: Claim) -> Statement:
     """How a finding is stated. A finding whose names were not weighed has its name."""
     if claim.probability is None:
         return Statement("name", (claim.effect,), 1.0)
-    if claim.probability >= MIN_NAME_PROBABILITY:
-        return Statement("name", (claim.effect,), claim.probability)
-    names = sorted(_names_here(claim), key=lambda each: -each.probability)
+    return state_name(claim.effect, claim.probability, claim.members, {claim.joint, *claim.joints})
+
+
+def state_name(effect: str, probability: float, members: Sequence[Member], places: Set[int | None]) -> Statement:
+    """How an effect with a probability is stated, of a class of names with theirs. places: joints of the finding."""
+    if probability >= MIN_NAME_PROBABILITY:
+        return Statement("name", (effect,), probability)
+    here = [each for each in members if each.effect != UNKNOWN.id and each.joint in places]
+    names = sorted(here, key=lambda each: -each.probability)
     effects, total = list[str](), 0.0
     for each in names[:MAX_CLASS_NAMES]:
         effects.append(each.effect)
         total += each.probability
         if total >= MIN_NAME_PROBABILITY:
-            kind: Kind = "class" if claim.effect in effects else "nothing"
+            kind: Kind = "class" if effect in effects else "nothing"
             return Statement(kind, tuple(effects), total)
-    probability = max(claim.probability, _probability_of_friction(claim, names))
-    return Statement("cause" if probability >= MIN_CAUSE_PROBABILITY else "nothing", (claim.effect,), probability)
+    chance = max(probability, _probability_of_friction(effect, names))
+    return Statement("cause" if chance >= MIN_CAUSE_PROBABILITY else "nothing", (effect,), chance)
 
 
-def _names_here(claim: Claim) -> list[Member]:
-    """The names of a class at the places of the finding, `unknown` left out."""
-    places = {claim.joint, *claim.joints}
-    return [each for each in claim.members if each.effect != UNKNOWN.id and each.joint in places]
-
-
-def _probability_of_friction(claim: Claim, names: Sequence[Member]) -> float:
-    """All laws of friction together, of a finding that is one; else 0."""
-    if effect_named(claim.effect).cause != FRICTION:
+def _probability_of_friction(effect: str, names: Sequence[Member]) -> float:
+    """All laws of friction together, of an effect that is one; else 0."""
+    if effect_named(effect).cause != FRICTION:
         return 0.0
     return sum(each.probability for each in names if effect_named(each.effect).cause == FRICTION)
