@@ -150,16 +150,17 @@ def _link_claim(
     )
 
 
-def links_claim(model: FittedModel, evidence: Evidence) -> Claim:
+def links_claim(model: FittedModel, evidence: Evidence, link: int) -> Claim:
     """That links are off, where these data do not tell which: no numbers, and the probability that any is.
 
     evidence: for all of them together; its score is the log of a Bayes factor. model: on whose rows it is predicted.
+    link: the one that is missed most, from 1.
     """
     torque, own = model.coefficients(model.fit), np.zeros(model.moments.size)
     own[: model.columns.base] = torque[: model.columns.base]
     return Claim(
         effect=INERTIAL_ERROR_FACTS.id,
-        joint=None,
+        joint=link,
         joints=(),
         parameters=(),
         equation="tau += Y(q, qd, qdd) delta_phi",

@@ -36,7 +36,7 @@ from armlab.diagnosis.location import locate_excess, noise_floor
 from armlab.diagnosis.naming.additions import Additions, add_probable, with_likeliest_names
 from armlab.diagnosis.naming.decide import named_claims
 from armlab.diagnosis.naming.weighing import weigh_effect, weigh_link, weigh_structure
-from armlab.diagnosis.parts import as_found, claim_facts, explain_error, weigh_claims
+from armlab.diagnosis.parts import LINKS, as_found, claim_facts, explain_error, weigh_claims, weigh_parts
 from armlab.diagnosis.plausibility import links_that_data_tell, unclaim_implausible, withdraw_implausible
 from armlab.diagnosis.prediction import (
     Prediction,
@@ -211,10 +211,11 @@ def links_in_doubt(names: FittedModel, model: FittedModel, claims: Sequence[Clai
     widths = model.state.widths
     about_links = any(claim_facts(each).where == "link" for each in claims)
     if model.design.simulation.kind == "nominal" and widths is not None and any(widths) and not about_links:
-        claim = links_claim(names, Judge(model, model.state).together())
-        (weighed,) = weigh_claims(model, (claim,))
-        if weighed.removal is not None and not weighed.removal.is_minor:
-            yield weighed
+        evidence = Judge(model, model.state).together()
+        off = [links_claim(names, evidence, link) for link, width in enumerate(widths, 1) if width]
+        together = next(part for part in weigh_parts(model, off[:1]) if part.cause == LINKS and part.joint is None)
+        if together.removal is not None and not together.removal.is_minor:
+            yield max(weigh_claims(model, off), key=lambda each: each.removal.growth if each.removal else 0.0)
 
 
 def _without_prediction_of(claim: Claim, unknowns: Sequence[Structure]) -> Claim:

@@ -120,7 +120,7 @@ class _Parts:
         widths = self.model.state.widths
         for number, claim in enumerate(self.claims):
             if claim.in_links and widths is not None:
-                less = tuple(0.0 if claim.joint in (None, link) else width for link, width in enumerate(widths, 1))
+                less = tuple(0.0 if claim.joint == link else width for link, width in enumerate(widths, 1))
                 without, last = State(self.model.state.groups, less), claim.joint or self.model.columns.joints
                 out[number] = replace(claim, removal=self.removal(self.model.state, without, range(last)))
         return tuple(out)

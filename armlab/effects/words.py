@@ -14,10 +14,9 @@ from problem.joint_words import joint_in_words, links_in_words
 
 def place_in_words(arm: Arm, effect: str, joint: int | None, joints: Sequence[int] = ()) -> str:
     """Where an effect is: a joint, a link, a coupling, or the whole robot."""
-    is_link = effect_named(effect).where == "link"
     if joint is None:
-        return "the links" if is_link else "the whole robot"
-    if is_link:
+        return "the whole robot"
+    if effect_named(effect).where == "link":
         return links_in_words(arm, (joint,))
     driver = f" from {joint_in_words(arm, joints[1])}" if len(joints) > 1 else ""
     return f"{joint_in_words(arm, joint)}{driver}"

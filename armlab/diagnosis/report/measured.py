@@ -12,6 +12,7 @@ from armlab.diagnosis.report.words import (
     format_fixed,
     format_measured,
     is_doubtful,
+    is_of_unknown_links,
     joint_unit,
     may_be_zero,
 )
@@ -113,7 +114,7 @@ def _other_cell(found: ToldFinding, simulation: Simulation) -> str:
         return "something that no known effect explains"
     facts, words = effect_named(claim.effect), effect_in_words(claim.effect)
     if facts.where == "link":
-        if claim.joint is None:
+        if is_of_unknown_links(claim):
             return "masses and inertias of the links, which of them is not certain"
         return f"{words} of its link: {_together(claim_figures(claim, simulation))}{doubt_in_words(found)}"
     if facts.where == "coupling":

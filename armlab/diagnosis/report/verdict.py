@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from textwrap import wrap
 
 from armlab.common.report.wording import count_of, format_number
-from armlab.diagnosis.parts import LINKS
 from armlab.diagnosis.report.measured import NOTHING, doubt_in_words, friction_cell
 from armlab.diagnosis.report.residuals import select_residuals
 from armlab.diagnosis.report.sentences import claim_figures, model_in_words, simulated_figures
@@ -18,6 +17,7 @@ from armlab.diagnosis.report.words import (
     format_probability,
     format_share,
     is_excess,
+    is_of_unknown_links,
     joint_unit,
     rival_in_words,
     shorten_name,
@@ -143,7 +143,7 @@ def _found_in_words(found: Sequence[ToldFinding], simulation: Simulation) -> str
             words.append(f"{effect_in_words(each.claim.effect)}{doubt_in_words(each)}")
         elif each not in laws:
             numbers = claim_figures(_shorter(each.claim), simulation)
-            links = " of the links" if each.claim.joint is None and each.cause == LINKS else ""
+            links = " of the links, which is not certain" if is_of_unknown_links(each.claim) else ""
             present, size = simulated_figures(each.claim), f" {numbers}" if numbers else ""
             if present:
                 size = (

@@ -47,6 +47,8 @@ def compared_in_words(simulation: Simulation) -> str:
 
 def finding_in_words(arm: Arm, claim: Claim) -> str:
     """A finding with its place."""
+    if is_of_unknown_links(claim):
+        return f"{LINKS_IN_WORDS} of the links"
     return _at_place(arm, claim_in_words(claim), claim)
 
 
@@ -91,9 +93,14 @@ def claim_name(claim: Claim) -> str:
         return SOMETHING_UNKNOWN
     if is_negative_load(claim):
         return LESS_MASS
-    if claim.joint is None and effect_named(claim.effect).where == "link":
+    if is_of_unknown_links(claim):
         return LINKS_IN_WORDS
     return f"{'too much ' if is_excess(claim) else ''}{effect_in_words(claim.effect)}"
+
+
+def is_of_unknown_links(claim: Claim) -> bool:
+    """Whether links are off, and these data do not tell which: its link is the one that is missed most."""
+    return effect_named(claim.effect).where == "link" and not claim.parameters
 
 
 def is_negative_load(claim: Claim) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from armlab.common.report.wording import join_words
-from armlab.diagnosis.report.words import variables_in_words
+from armlab.diagnosis.report.words import is_of_unknown_links, variables_in_words
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.told.statement import FRICTION
 from armlab.diagnosis.told.told import Told, ToldFinding
@@ -22,15 +22,10 @@ def next_steps(diagnosis: Diagnosis, told: Told) -> tuple[str, ...]:
     """Instructions for what the told findings leave open, those that explain most first."""
     groups: dict[str, list[ToldFinding]] = {}
     for each in told.findings:
-        if each.statement.kind != "name" or each.claim.rivals or _is_of_unknown_links(each):
+        if each.statement.kind != "name" or each.claim.rivals or is_of_unknown_links(each.claim):
             groups.setdefault(_experiment_of(each), []).append(each)
     steps = dict.fromkeys(step for text, own in groups.items() for step in _steps(text, own, diagnosis, told))
     return tuple(steps)[:MAX_STEPS]
-
-
-def _is_of_unknown_links(each: ToldFinding) -> bool:
-    """Whether links are off, and these data do not tell which."""
-    return each.claim.joint is None and effect_named(each.claim.effect).where == "link"
 
 
 def _experiment_of(each: ToldFinding) -> str:

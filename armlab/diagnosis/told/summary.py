@@ -15,6 +15,7 @@ from armlab.diagnosis.report.words import (
     effect_in_words,
     format_fixed,
     is_negative_load,
+    is_of_unknown_links,
     joint_unit,
 )
 from armlab.diagnosis.result import Diagnosis, JointFit
@@ -105,6 +106,7 @@ class _Writer:
         joints = sorted({each.claim.joint for each in own if each.claim.joint is not None})
         if cause.cause == LINKS:
             name = _name_of_links(own)
+            joints = [] if all(is_of_unknown_links(each.claim) for each in own) else joints
             return f"{name} of {links_in_words(arm, joints)}" if joints else f"{LINKS_IN_WORDS} of the links"
         if cause.cause == UNKNOWN_CAUSE:
             name = "something without a name"
