@@ -678,6 +678,14 @@ class ComparisonTuning:
         least=1e-3,
     )
     min_stretches: int = tuned(6, unit="stretches", meaning="shorter ones where a recording has fewer", least=2)
+    plain_cutoff_hz: float = tuned(
+        5.0,
+        unit="Hz",
+        meaning="cut-off at which rigid links and friction are compared",
+        source="least squares on real arms: 3 to 10 Hz leave the least of the torque",
+        least=0.1,
+    )
+    plain_segment_rows: int = tuned(8, unit="rows", meaning="a shorter run is not compared by them", least=2)
     same_length: float = tuned(
         0.9, unit="of the longer run", meaning="runs of one motion are so long at least", most=1.0
     )

@@ -63,7 +63,7 @@ def test_a_gain_has_no_level_where_the_recordings_have_it_by_sign_in_common() ->
     """Its change is told alone, since two numbers of the wider form are no level of one."""
     by_sign, gain = TorqueGainBySign.at(ARM, 2), TorqueGain.at(ARM, 2)
     pooled = SimpleNamespace(design=SimpleNamespace(blocks=[SimpleNamespace(candidate=by_sign)]))
-    group = SimpleNamespace(candidate=gain, laws=(), whole_law=False, common=np.array([0, 1]))
+    group = SimpleNamespace(candidate=gain, laws=(), parts=(), whole_law=False, common=np.array([0, 1]))
     table = SimpleNamespace(groups=[group], contrast=np.array([[-0.5], [0.5]]))
     ((law, numbers, _),) = laws_of(pooled, table, (), SimpleNamespace(group=0, values=np.array([0.1])))
     assert not law.known

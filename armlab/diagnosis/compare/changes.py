@@ -4,7 +4,7 @@ As a change is tested beside its common part, a recording compared with itself h
 changes and the table of parameters come from this one test.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -18,10 +18,9 @@ from armlab.diagnosis.compare.mixed import JointRows, MixedModel, WeightedRows, 
 from armlab.diagnosis.compare.pooled import Pooled, is_body
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Candidate
-from armlab.effects.links import BODY_SIZE_M
 
+NO_COLUMNS = np.empty(0, dtype=np.intp)
 SHAPE_STEP = 0.05  # of a nonlinear parameter, for derivatives: a gap's torque has corners
-BODY_SCALES = np.array([1.0, *[BODY_SIZE_M] * 3, *[BODY_SIZE_M**2] * 6])  # of a body of one kilogram
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +28,10 @@ class ChangeGroup:
     """One thing that may have changed. block: its columns in common; columns: their numbers, times the recording.
 
     scales: (columns,), of their normal prior. laws: where all friction of a joint changes by one factor, its laws with
-    their coefficients. common: numbers of the same columns in common; empty where links hold them. least: a smaller
-    change is how logs are made, see `Parameter.sampled`. shaped: where nonlinear parameters change, the coefficients of
-    the law; the columns are derivatives. familiar: whether the common model has it.
+    their coefficients. parts: laws that change together, each with its own coefficients. common: numbers of the same
+    columns in common; empty where links hold them. least: a smaller change is how logs are made, see
+    `Parameter.sampled`. whole_law: nonlinear parameters change with the coefficients of the law; their columns are
+    derivatives. familiar: whether the common model has it.
     """
 
     block: Block
@@ -39,6 +39,7 @@ class ChangeGroup:
     scales: Array
     common: NDArray[np.intp]
     laws: tuple[tuple[Candidate, Array], ...] = ()
+    parts: tuple[Candidate, ...] = ()
     least: float = 0.0
     whole_law: bool = False
     familiar: bool = False
@@ -199,82 +200,120 @@ class _Offer:
     common: NDArray[np.intp]
     scales: Array
     laws: tuple[tuple[Candidate, Array], ...] = ()
+    parts: tuple[Candidate, ...] = ()
     whole_law: bool = False
 
 
 def make_table(pooled: Pooled) -> ChangeTable:
     """Columns of the common model and of all changes, row by row, with the drift of each run."""
-    design, observed, tuning = pooled.design, pooled.observed, pooled.tuning
-    count = pooled.recordings
-    contrast = np.eye(count)[:, 1:] - 1 / count
-    interval = max(1 / each.run.rate_hz for each in observed.signals)
-    known = {place_of(block.candidate) for block in design.blocks}
-    shared = [*design.blocks, *(each for each in pooled.changes if place_of(each.candidate) not in known)]
-    shared = [each for each in shared if not is_body(each.candidate)]
-    parts = _Columns(observed.joints)
-    for joint in range(observed.joints):
-        loading = np.flatnonzero(design.base.columns >= 10 * joint)
-        parts.add(joint, np.concatenate([run[joint] for run in design.rigid]), loading)
-    at, prior, common = len(design.base), [np.zeros(len(design.base))], dict[Place, NDArray[np.intp]]()
-    for block in shared:
-        columns = np.arange(at, at + block.values.shape[2])
-        at += len(columns)
-        scale = block.candidate.prior_scale(design.simulation.inertial)
-        prior.append(np.full(len(columns), scale**-2.0 if np.isfinite(scale) else 0.0))
-        common[place_of(block.candidate)] = columns
-        for place, row in enumerate(block.candidate.rows):
-            parts.add(row, block.values[:, place], columns)
+    parts = _CommonColumns(pooled)
     whole = []
     for block in _whole_laws(pooled):
-        shapes = np.arange(at, at + len(block.candidate.shape))
-        at += len(shapes)
-        prior.append(_shape_scales(block.candidate, tuning) ** -2.0)
-        both = np.concatenate([common[place_of(block.candidate)], shapes])
+        scales = _shape_scales(block.candidate, pooled.tuning)
+        shapes = parts.add(block.candidate.rows, block.values[:, :, -len(scales) :], scales)
+        both = np.concatenate([parts.common[place_of(block.candidate)], shapes])
         whole.append(_Offer(block, both, _whole_law_scales(block, pooled), whole_law=True))
-        for place, row in enumerate(block.candidate.rows):
-            parts.add(row, block.values[:, place, -len(shapes) :], shapes)
-    everything, groups = np.arange(at), []
-    none = np.empty(0, dtype=np.intp)
-    scaled = [_Offer(block, none, np.full(1, tuning.typical_scale), laws) for block, laws in _scaled_frictions(pooled)]
-    plain = [
-        _Offer(block, common.get(place_of(block.candidate), none), _prior_scales(block, pooled))
-        for block in pooled.changes
-    ]
-    for offer in (*plain, *scaled, *whole):
-        block = offer.block
-        columns = np.arange(at, at + block.values.shape[2] * contrast.shape[1])
-        at += len(columns)
-        scales = np.repeat(offer.scales, contrast.shape[1])
-        sampled = any(each.sampled for each in block.candidate.facts.parameters)
-        least = interval if sampled else 0.0
-        familiar = place_of(block.candidate) in known
-        groups.append(ChangeGroup(block, columns, scales, offer.common, offer.laws, least, offer.whole_law, familiar))
-        prior.append(scales**-2.0)
-        for place, row in enumerate(block.candidate.rows):
-            values = block.values[:, place, :, None] * contrast[pooled.members][:, None, :]
-            parts.add(row, values.reshape(len(values), -1), columns)
+    scale = np.full(1, pooled.tuning.typical_scale)
+    scaled = [_Offer(block, NO_COLUMNS, scale, laws=laws) for block, laws in _scaled_frictions(pooled)]
     friction = {each.block.candidate.rows[0]: each.block.values[:, 0, 0] for each in scaled}
-    joints = tuple(_weighted_rows(pooled, parts, joint, friction.get(joint)) for joint in range(observed.joints))
-    mixed = MixedModel(joints, at, np.concatenate(prior))
-    own = np.arange(design.columns.size)
-    return ChangeTable(mixed, everything, own, tuple(groups), contrast, tuning)
+    plain = [parts.offer((block,)) for block in pooled.changes]
+    return _finish_table(parts, (*plain, *scaled, *whole), friction)
 
 
-class _Columns:
-    """Columns of each joint with their numbers, as they are added."""
+def make_plain_table(pooled: Pooled) -> ChangeTable:
+    """The same with Coulomb and viscous friction of a joint as one cause, each with its own change."""
+    parts = _CommonColumns(pooled)
+    friction: dict[int, list[Block]] = {}
+    others = []
+    for block in pooled.changes:
+        joint = block.candidate.joint
+        if joint is not None and block.candidate.is_friction_of(joint):
+            friction.setdefault(joint, []).append(block)
+        else:
+            others.append(block)
+    causes = [(each,) for each in others] + [tuple(each) for each in friction.values()]
+    return _finish_table(parts, [parts.offer(each) for each in causes], {})
 
-    def __init__(self, joints: int) -> None:
+
+def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer], friction: Mapping[int, Array]) -> ChangeTable:
+    """The table with the columns of what may have changed. friction: of a joint, its torque in the common model."""
+    pooled, size, groups = parts.pooled, parts.size, list[ChangeGroup]()
+    contrast = np.eye(pooled.recordings)[:, 1:] - 1 / pooled.recordings
+    interval = max(1 / each.run.rate_hz for each in pooled.observed.signals)
+    for offer in offers:
+        block = offer.block
+        scales = np.repeat(offer.scales, contrast.shape[1])
+        values = block.values[..., None] * contrast[pooled.members][:, None, None, :]
+        columns = parts.add(block.candidate.rows, values.reshape(*values.shape[:2], -1), scales)
+        sampled = any(each.sampled for each in block.candidate.facts.parameters)
+        groups.append(
+            ChangeGroup(
+                block,
+                columns,
+                scales,
+                offer.common,
+                laws=offer.laws,
+                parts=offer.parts,
+                least=interval if sampled else 0.0,
+                whole_law=offer.whole_law,
+                familiar=place_of(block.candidate) in parts.known,
+            )
+        )
+    joints = tuple(_weighted_rows(parts, joint, friction.get(joint)) for joint in range(pooled.observed.joints))
+    mixed = MixedModel(joints, parts.size, np.concatenate(parts.prior))
+    own = np.arange(pooled.design.columns.size)
+    return ChangeTable(mixed, np.arange(size), own, tuple(groups), contrast, pooled.tuning)
+
+
+class _CommonColumns:
+    """Columns of each joint with their numbers, as they are added; first those that all recordings share.
+
+    common: numbers of the columns of each law; known: places of the laws of the common model.
+    """
+
+    def __init__(self, pooled: Pooled) -> None:
+        design = pooled.design
+        joints = pooled.observed.joints
+        self.pooled = pooled
         self.values: list[list[Array]] = [[] for _ in range(joints)]
         self.numbers: list[list[NDArray[np.intp]]] = [[] for _ in range(joints)]
+        self.size = len(design.base)
+        self.prior = [np.zeros(self.size)]
+        for joint in range(joints):
+            loading = np.flatnonzero(design.base.columns >= 10 * joint)
+            self.values[joint].append(np.concatenate([run[joint] for run in design.rigid]))
+            self.numbers[joint].append(loading)
+        self.common: dict[Place, NDArray[np.intp]] = {}
+        self.known = {place_of(block.candidate) for block in design.blocks}
+        shared = [*design.blocks, *(each for each in pooled.changes if place_of(each.candidate) not in self.known)]
+        for block in shared:
+            if not is_body(block.candidate):
+                scale = block.candidate.prior_scale(design.simulation.inertial)
+                scales = np.full(block.values.shape[2], scale)
+                self.common[place_of(block.candidate)] = self.add(block.candidate.rows, block.values, scales)
 
-    def add(self, joint: int, values: Array, numbers: NDArray[np.intp]) -> None:
-        """Columns (rows, count) of a joint."""
-        self.values[joint].append(values)
-        self.numbers[joint].append(numbers)
+    def add(self, rows: Sequence[int], values: Array, scales: Array) -> NDArray[np.intp]:
+        """Columns (rows, joints, count) at some joints, with the scales (count,) of their prior; their numbers."""
+        columns = np.arange(self.size, self.size + len(scales))
+        self.size += len(scales)
+        self.prior.append(np.where(np.isfinite(scales), scales, np.inf) ** -2.0)
+        for place, row in enumerate(rows):
+            self.values[row].append(values[:, place])
+            self.numbers[row].append(columns)
+        return columns
+
+    def offer(self, blocks: tuple[Block, ...]) -> _Offer:
+        """Laws at one place that change together, each with its own coefficients."""
+        values = np.concatenate([each.values for each in blocks], axis=2)
+        common = [self.common.get(place_of(each.candidate), NO_COLUMNS) for each in blocks]
+        scales = np.concatenate([_prior_scales(each, self.pooled) for each in blocks])
+        laws = tuple(each.candidate for each in blocks) if len(blocks) > 1 else ()
+        return _Offer(Block(blocks[0].candidate, 0, values), np.concatenate(common), scales, parts=laws)
 
 
-def _weighted_rows(pooled: Pooled, parts: _Columns, joint: int, friction: Array | None) -> WeightedRows:
+def _weighted_rows(parts: _CommonColumns, joint: int, friction: Array | None) -> WeightedRows:
     """The rows in which a joint moves. friction: (rows,), its torque in the common model."""
+    pooled = parts.pooled
     observed = pooled.observed
     rows = observed.moving[:, joint]
     slow = _slow_waves(pooled)
@@ -393,8 +432,4 @@ def _prior_scales(block: Block, pooled: Pooled) -> Array:
     rows = list(candidate.rows)
     torque = pooled.tuning.typical_share * np.sqrt(np.mean(observed.torque[:, rows] ** 2, axis=0))
     size = np.sqrt(np.mean(block.values**2, axis=0))  # (rows, coefficients)
-    if is_body(candidate):
-        inner = BODY_SCALES[list(getattr(candidate, "felt", range(10)))]
-        total = np.sqrt(np.sum((size * inner) ** 2, axis=1))
-        return np.asarray(inner * np.min(torque / np.maximum(total, 1e-300)))
     return np.asarray(np.min(torque[:, None] / np.maximum(size, 1e-300), axis=0))

@@ -1,8 +1,8 @@
 """The comparison of recordings of one robot, step by step.
 
-`compare` is the whole flow: diagnose each recording (what there is), put all on one table with one common model
-(`pool_recordings`), test what changed beside it (`find_changes`), name it (`name_changes`), and say what would have
-been seen (`list_table`).
+`compare` is the whole flow: diagnose each recording (what there is), look for changes of rigid links and friction
+(`pool_plainly`), for finer ones beside a common model of all that was found where there are none (`pool_recordings`),
+name them (`name_changes`), and say what would have been seen (`list_table`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,11 +13,11 @@ import numpy as np
 
 from armlab.common.errors import DataError, InputError
 from armlab.common.notebook import notebook_html
-from armlab.diagnosis.compare.changes import ChangeTable, Tested, make_table
+from armlab.diagnosis.compare.changes import ChangeTable, Tested, make_plain_table, make_table
 from armlab.diagnosis.compare.named import NamedChange, list_table, name_changes
 from armlab.diagnosis.compare.numbers import Change, common_values, list_movements
-from armlab.diagnosis.compare.pooled import Pooled, follow_levels, pool_recordings
-from armlab.diagnosis.compare.soundness import find_sound_changes
+from armlab.diagnosis.compare.pooled import Pooled, follow_levels, pool_plainly, pool_recordings, unite_candidates
+from armlab.diagnosis.compare.soundness import SoundChanges, find_sound_changes
 from armlab.diagnosis.compare.trends import Trend, find_trends, recording_date
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
@@ -123,22 +123,20 @@ def compare_diagnosed(
     progress: Callable[[str], None] = lambda message: None,
 ) -> Comparison:
     """What changed between recordings of one robot of which each is diagnosed."""
-    failed = next((each for each in diagnoses if each.model is None), None)
-    if failed is not None:
-        return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.summary}")
-    progress("putting the recordings on one table")
+    simulation, settings = read_simulation(recordings[0], baseline), Settings()
+    progress("looking for changes of links and friction")
     try:
-        pooled = pool_recordings(recordings, diagnoses, read_simulation(recordings[0], baseline), Settings())
+        seen = _look(pool_plainly(recordings, simulation, settings), make_plain_table)
+        if not seen.sound.named:
+            failed = next((each for each in diagnoses if each.model is None), None)
+            if failed is not None:
+                return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.summary}")
+            progress("looking for other changes")
+            found = unite_candidates(diagnoses)
+            seen = _look(pool_recordings(recordings, found, simulation, settings), make_table)
     except DataError as error:
         return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
-    progress("looking for changes")
-    table = make_table(pooled)
-    sound = find_sound_changes(pooled, table)
-    if sound.named:
-        progress("fitting what is common beside the changes")
-        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
-        table = make_table(pooled)
-        sound = find_sound_changes(pooled, table)
+    pooled, table, sound = seen.pooled, seen.table, seen.sound
     named = name_changes(pooled, table, sound.named)
     doubtful = () if sound.doubtful is None else name_changes(pooled, table, [sound.doubtful])
     return Comparison(
@@ -152,6 +150,26 @@ def compare_diagnosed(
         trends=_find_trends(pooled, table, sound.named, dates),
         dates=tuple(dates),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """A table of recordings and the changes that it shows."""
+
+    pooled: Pooled
+    table: ChangeTable
+    sound: SoundChanges
+
+
+def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> _Look:
+    """The changes, with columns that follow what is common beside them."""
+    table = table_of(pooled)
+    sound = find_sound_changes(pooled, table)
+    if sound.named:
+        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
+        table = table_of(pooled)
+        sound = find_sound_changes(pooled, table)
+    return _Look(pooled, table, sound)
 
 
 def _find_trends(

@@ -15,6 +15,7 @@ from armlab.diagnosis.compare.numbers import (
     between_ends,
     half_width_factor,
     list_changes,
+    moved_laws,
 )
 from armlab.diagnosis.compare.pooled import Pooled, is_body
 from armlab.diagnosis.compare.search import find_rivals, held_out_errors
@@ -69,20 +70,22 @@ def _name(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: T
     factor = half_width_factor(tested.degrees)
     difference, covariance = between_ends(table, tested)
     covariance = as_wide_as_runs(covariance, scatter_between_runs(table, chosen, tested.group).variances())
-    if group.laws or group.whole_law:
+    law = next(iter(moved_laws(table, tested)), group.candidate)
+    if group.laws or group.whole_law or group.parts:
+        changes = tuple(each for each in changes if each.changed or not group.parts)
         parameters = tuple(
             ParameterValue(each.parameter, each.difference, each.interval, each.unit) for each in changes
         )
         amounts = ", ".join(f"{each.parameter} {each.difference:+.4g} {each.unit}" for each in changes)
-        equation = f"{group.candidate.effect} of joint {group.candidate.joint}: {amounts}"
+        equation = f"{law.effect} of joint {law.joint}: {amounts}"
     else:
         parameters = parameter_values(group.candidate, difference, covariance, factor)
         equation = group.candidate.equation(difference)
     return NamedChange(
-        effect=group.candidate.effect,
-        joint=group.candidate.joint,
-        joints=group.candidate.joints,
-        form=ONE_FACTOR if group.laws else group.candidate.form,
+        effect=law.effect,
+        joint=law.joint,
+        joints=law.joints,
+        form=ONE_FACTOR if group.laws else law.form,
         parameters=parameters,
         changes=changes,
         equation=equation,

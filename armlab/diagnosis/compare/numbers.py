@@ -1,9 +1,10 @@
 """Numbers of a change: levels of the recordings, differences with intervals, ratios, and the smallest that is seen."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.probabilities import student_quantile
@@ -105,10 +106,32 @@ def list_changes(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], te
         covariance = as_wide_as_runs(
             covariance, scatter_between_runs(table, [each.group for each in found], tested.group).variances()
         )
-    for law, own, spread in laws_of(pooled, table, found, tested):
-        between = own[-1] - own[0]
-        own_spread = covariance if spread is None else covariance[0, 0] * spread
-        yield from _parameters(table, tested, law, own, between, own_spread)
+    moved = moved_laws(table, tested)
+    for law, own, slopes in laws_of(pooled, table, found, tested):
+        changed = not moved or law.candidate in moved
+        for each in _parameters(table, tested, law, own, own[-1] - own[0], slopes @ covariance @ slopes.T):
+            yield replace(each, changed=each.changed and changed)
+
+
+def moved_laws(table: ChangeTable, tested: Tested) -> list[Candidate]:
+    """Of laws that change together, those that differ between first and last recording, the largest torque first.
+
+    Where no single one is sure, all of them; empty for a group of one law.
+    """
+    group = table.groups[tested.group]
+    difference, covariance = between_ends(table, tested)
+    size = np.abs(difference) * np.sqrt(np.mean(group.block.values**2, axis=(0, 1)))
+    sure = np.abs(difference) > student_quantile(1 - table.tuning.level / 2, tested.degrees) * np.sqrt(
+        np.diag(covariance)
+    )
+    out: list[tuple[float, int, Candidate]] = []
+    start = 0
+    for number, law in enumerate(group.parts):
+        own = slice(start, start + law.size)
+        start = own.stop
+        if sure[own].any() or not sure.any():
+            out.append((-float(size[own].sum()), number, law))
+    return [law for _, _, law in sorted(out, key=lambda each: each[:2])]
 
 
 def list_movements(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested) -> Iterator[Movement]:
@@ -116,20 +139,16 @@ def list_movements(pooled: Pooled, table: ChangeTable, found: Sequence[Tested], 
     width = table.contrast.shape[1]
     count = len(tested.values) // width
     between = tested.covariance.reshape(count, width, count, width)
-    for law, own, spread in laws_of(pooled, table, found, tested):
-        slopes = law.slopes(own.mean(axis=0))
-        for name, slope in slopes.items():
+    moved = moved_laws(table, tested)
+    for law, own, of_group in laws_of(pooled, table, found, tested):
+        if moved and law.candidate not in moved:
+            continue
+        for name, slope in law.slopes(own.mean(axis=0)).items():
             values = [law.parameters(each)[name] for each in own]
             if any(isinstance(each, tuple) for each in values):
                 continue
-            if spread is None:
-                covariance = np.einsum(
-                    "i,iajb,j,ra,sb->rs", slope[0], between, slope[0], table.contrast, table.contrast
-                )
-            else:
-                covariance = (
-                    float(slope[0] @ spread @ slope[0]) * table.contrast @ between[0, :, 0, :] @ table.contrast.T
-                )
+            towards = slope[0] @ of_group
+            covariance = np.einsum("i,iajb,j,ra,sb->rs", towards, between, towards, table.contrast, table.contrast)
             if np.trace(covariance) <= 0:
                 continue
             candidate = law.candidate
@@ -156,28 +175,30 @@ def common_values(table: ChangeTable, found: Sequence[Tested]) -> Array:
 
 def laws_of(
     pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested
-) -> Iterator[tuple["Law", Array, Array | None]]:
+) -> Iterator[tuple["Law", Array, Array]]:
     """Each law of a group with its numbers in the recordings, (recordings, numbers).
 
-    Where all change by one factor, also what the factor's variance is to be multiplied by, (numbers, numbers).
+    The last is what a coefficient of the group moves of them, (numbers, coefficients).
     """
     group, offsets = table.groups[tested.group], recording_values(table, tested)
+    every = np.eye(offsets.shape[1])
     if group.laws:
         for candidate, coefficients in group.laws:
-            own = np.outer(1 + offsets[:, 0], coefficients)
-            yield Law(candidate, known=True), own, np.outer(coefficients, coefficients)
-    elif group.whole_law:
+            yield Law(candidate, known=True), np.outer(1 + offsets[:, 0], coefficients), coefficients[:, None]
+        return
+    if group.whole_law:
         size = group.candidate.size
         level = common_values(table, found)[group.common[:size]] + pooled.design.simulation.coefficients_of(
             group.candidate
         )
-        yield Law(group.candidate, known=True), np.concatenate([level, group.candidate.shape]) + offsets, None
-    elif _level_is_known(pooled, group.candidate):
-        at_mean = common_values(table, found)
-        mean = at_mean[group.common] + pooled.design.simulation.coefficients_of(group.candidate)
-        yield Law(group.candidate, known=True), mean + offsets, None
-    else:
-        yield Law(group.candidate, known=False), offsets, None
+        yield Law(group.candidate, known=True), np.concatenate([level, group.candidate.shape]) + offsets, every
+        return
+    start = 0
+    for candidate in group.parts or (group.candidate,):
+        own = slice(start, start + candidate.size)
+        start = own.stop
+        mean = _level(pooled, table, found, candidate, group.common[own])
+        yield Law(candidate, known=mean is not None), offsets[:, own] + (0.0 if mean is None else mean), every[own]
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,14 +229,27 @@ class Law:
         return parameter_slopes(self.shaped(numbers), self.coefficients(numbers), len(numbers))
 
 
-def _level_is_known(pooled: Pooled, candidate: Candidate) -> bool:
-    """Whether the common model has a level of it: faults of channels and loads are known as differences alone.
+def _level(
+    pooled: Pooled, table: ChangeTable, found: Sequence[Tested], candidate: Candidate, common: NDArray[np.intp]
+) -> Array | None:
+    """The mean of the recordings, (coefficients,); None for faults of channels, which are known as differences alone.
 
-    A law that the common model has in a wider form has no level in this one.
+    A law that the common model has in a wider form has no level in this one, and a body has one where each of its
+    parameters is a base parameter of the arm.
     """
+    if is_body(candidate):
+        places = 10 * (candidate.joints[0] - 1) + np.array(getattr(candidate, "felt", range(10)))
+        base = pooled.design.base
+        if not np.isin(places, base.columns).all():
+            return None
+        nominal = pooled.design.simulation.inertial
+        rows = np.searchsorted(base.columns, places)
+        mean = common_values(table, found)[rows]
+        return mean if nominal is None else mean + base.values(nominal)[rows]
     alike = (place_of(candidate), candidate.size)
-    known = ((place_of(each.candidate), each.candidate.size) for each in pooled.design.blocks)
-    return not is_body(candidate) and alike in known
+    if alike not in ((place_of(each.candidate), each.candidate.size) for each in pooled.design.blocks):
+        return None
+    return np.asarray(common_values(table, found)[common] + pooled.design.simulation.coefficients_of(candidate))
 
 
 def _parameters(
@@ -236,7 +270,8 @@ def _parameters(
         if law.known:
             change = value - float(np.asarray(start[name]))
             levels = tuple(float(np.asarray(law.parameters(each)[name])) for each in own)
-            ratio = ratio_of_levels(levels, change, half) if _is_positive(candidate, name) else None
+            sized = is_body(candidate) or _is_positive(candidate, name)
+            ratio = ratio_of_levels(levels, change, half) if sized else None
         else:
             change = value - float(np.asarray(law.parameters(zero)[name])) if name == "gain" else value
             ratio = (1 + change, 1 + change - half, 1 + change + half) if name == "gain" else None

@@ -139,10 +139,29 @@ class Pooled:
         return True
 
 
+def pool_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> Pooled:
+    """The recordings on one table as plain least squares sees them: rigid links, Coulomb and viscous friction, offsets.
+
+    The torque is filtered far below where the rest of a real arm begins, all rows count, and no drift within a run
+    stands for a change. Raises DataError where no run is long enough.
+    """
+    tuning = settings.tuning
+    data = replace(
+        tuning.data,
+        cutoff_hz=tuning.comparison.plain_cutoff_hz,
+        min_cutoff_hz=tuning.comparison.plain_cutoff_hz,
+        min_segment_rows=tuning.comparison.plain_segment_rows,
+        min_moving_share=1.0,
+    )
+    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0))
+    return pool_recordings(recordings, (), simulation, replace(settings, tuning=plain))
+
+
 def pool_recordings(
-    recordings: Sequence[Recording], diagnoses: Sequence[Diagnosis], simulation: Simulation, settings: Settings
+    recordings: Sequence[Recording], found: Sequence[Candidate], simulation: Simulation, settings: Settings
 ) -> Pooled:
-    """The recordings on one table. diagnoses: of each; simulation: what the columns are deviations from.
+    """The recordings on one table. found: laws of the common model beside what every arm has; simulation: what the
+    columns are deviations from.
 
     Raises DataError where no run has a joint in motion for long enough.
     """
@@ -153,7 +172,6 @@ def pool_recordings(
     if reason is not None:
         raise DataError(reason)
     bare = build_design_matrix(observed, simulation, base_parameters(simulation.arm), None, settings)
-    found = unite_candidates(diagnoses)
     design = _with_candidates(bare, [*found, *_usual_beside(bare, found)])
     first = _fit_common(design)
     model = _fit_common(follow_model(design, first))

@@ -80,16 +80,35 @@ def reason_impossible(pooled: Pooled, table: ChangeTable, found: Sequence[Tested
     if is_body(group.candidate):
         return _reason_no_body(pooled, table, tested)
     _, covariance = between_ends(table, tested)
-    for law, own, spread in laws_of(pooled, table, found, tested):
+    if group.parts:
+        return _reason_driving(pooled, table, found, tested, covariance)
+    for law, own, of_group in laws_of(pooled, table, found, tested):
         if not law.known:
             continue
-        doubt = covariance if spread is None else covariance[0, 0] * spread
+        doubt = of_group @ covariance @ of_group.T
         size = law.candidate.size
         reasons = (law.shaped(each).objection(law.coefficients(each), doubt[:size, :size]) for each in own)
         reason = next((each for each in reasons if each is not None), None)
         if reason is not None:
             return reason
     return None
+
+
+def _reason_driving(
+    pooled: Pooled, table: ChangeTable, found: Sequence[Tested], tested: Tested, covariance: Array
+) -> str | None:
+    """What speaks against all friction of a joint: that together it would drive the motion in one of the recordings.
+
+    A single coefficient may be negative: that of viscous friction is where friction saturates.
+    """
+    block = table.groups[tested.group].block
+    row = block.candidate.rows[0]
+    power = np.mean(block.values[:, 0] * pooled.observed.kept("velocity")[:, row, None], axis=0)
+    levels = np.concatenate([own for _, own, _ in laws_of(pooled, table, found, tested)], axis=1)
+    doubt = SIGN_SIGMAS * float(np.sqrt(power @ covariance @ power))
+    if np.all(levels @ power + doubt > 0):
+        return None
+    return f"the friction of joint {row + 1} would drive it"
 
 
 def runs_differ_as_much(table: ChangeTable, found: Sequence[Tested], tested: Tested) -> bool:
