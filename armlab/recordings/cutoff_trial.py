@@ -95,7 +95,7 @@ def _scores(arm: Arm, rows: Sequence[tuple[Motion, Array]], recorded: Array, blo
     out = []
     for number in range(BLOCKS):
         own = block == number
-        values = weighted_solution(matrix[~own], torque[~own])
+        values, _ = weighted_solution(matrix[~own], torque[~own])
         left = np.mean((recorded[own] - matrix[own] @ values) ** 2, axis=0)
         out.append(float(np.mean(0.5 * np.log(np.maximum(left, 1e-300)))))
     return np.array(out)

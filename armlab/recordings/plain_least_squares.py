@@ -30,6 +30,8 @@ from problem.regressor import observation_matrix
 COULOMB_WIDTH = 0.01  # of the top speed: where tanh has taken the place of the jump of a sign
 MIN_EXCITATION = 1e-6  # of the largest eigenvalue of the scaled normal matrix: directions below it stay zero
 WEIGHT_ROUNDS = 3
+BLOCKS = 30  # of time, of a recording, whose scatter says how sure a parameter is
+BOOTSTRAP_DRAWS = 200
 TRIMMED_PERIODS = 2  # of the cut-off, at each end
 IDENTIFYING_SHARE = 0.6  # of each run, where no run validates
 DEPENDENCE_TOLERANCE = 1e-7  # of a column's length: below it the rounded angles of a robot file make the difference
@@ -159,7 +161,8 @@ def fit_plain_rows(arm: Arm, rows: Sequence[PlainRows], cutoff_hz: float) -> Pla
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
     layout = PlainLayout(arm, tuple(range(len(arm))), top_speed)
     matrix = np.concatenate([layout.matrix(each.motion) for each in prepared])
-    return PlainModel(layout, cutoff_hz, weighted_solution(matrix, np.concatenate([each.torque for each in prepared])))
+    values, _ = weighted_solution(matrix, np.concatenate([each.torque for each in prepared]))
+    return PlainModel(layout, cutoff_hz, values)
 
 
 def fit_plain_recording(folder: Path, cutoff_hz: float | None = None) -> PlainFit:
@@ -195,9 +198,68 @@ def fit_plain(
     top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for each in prepared], axis=0)
     layout = PlainLayout(arm, joints, top_speed)
     matrix = np.concatenate([layout.matrix(each.motion) for each in fitted])
-    values = weighted_solution(matrix, np.concatenate([each.torque for each in fitted]))
+    values, _ = weighted_solution(matrix, np.concatenate([each.torque for each in fitted]))
     left = [HeldOutRows(each, each.torque - layout.matrix(each.motion) @ values) for each in held_out]
     return PlainFit(joints, cutoff, top_speed, layout.names, values, tuple(left))
+
+
+@dataclass(frozen=True, eq=False)
+class PlainChanges:
+    """What plain least squares finds in two recordings, each fitted alone on all its runs.
+
+    names, old, new: (columns,), as in `PlainFit`. errors: (columns,), standard errors of new less old, by blocks
+    of time that are drawn anew (Kuensch 1989).
+    """
+
+    names: tuple[str, ...]
+    old: Array
+    new: Array
+    errors: Array
+
+    @property
+    def in_errors(self) -> Array:
+        """The changes in standard errors, (columns,); 0 where the motion tells nothing of a column."""
+        return np.divide(self.new - self.old, self.errors, out=np.zeros(len(self.old)), where=self.errors > 0)
+
+
+def compare_plain(
+    arm: Arm,
+    old: Sequence[Run],
+    new: Sequence[Run],
+    cutoff_hz: float,
+    joints: tuple[int, ...] | None = None,
+) -> PlainChanges:
+    """What differs between the runs of two recordings of an arm; joints: as `fit_plain` has it.
+
+    Raises DataError where a recording has no run that is long enough.
+    """
+    joints = tuple(range(len(arm))) if joints is None else joints
+    both = [
+        [each for run in runs for each in [prepare_rows(run, cutoff_hz)] if len(each.torque)] for runs in (old, new)
+    ]
+    if not all(both):
+        raise DataError(f"a recording has no run longer than {2 * TRIMMED_PERIODS} periods of {cutoff_hz:g} Hz")
+    top_speed = np.max([np.abs(each.motion.velocity).max(axis=0) for rows in both for each in rows], axis=0)
+    layout = PlainLayout(arm, joints, top_speed)
+    fits = [_fit_with_error(layout, rows) for rows in both]
+    return PlainChanges(layout.names, fits[0][0], fits[1][0], np.hypot(fits[0][1], fits[1][1]))
+
+
+def _fit_with_error(layout: "PlainLayout", rows: Sequence[PlainRows]) -> tuple[Array, Array]:
+    """Parameters of a recording and their standard errors, (columns,) each."""
+    matrices, torques = [layout.matrix(each.motion) for each in rows], [each.torque for each in rows]
+    values, weights = weighted_solution(np.concatenate(matrices), np.concatenate(torques))
+    grams, rights = [], []
+    count = max(BLOCKS // len(rows), 1)
+    for matrix, torque in zip(matrices, torques, strict=True):
+        for block in np.array_split(np.arange(len(torque)), count):
+            weighted = matrix[block] * weights[:, None]
+            grams.append(np.tensordot(matrix[block], weighted, axes=((0, 1), (0, 1))))
+            rights.append(np.tensordot(weighted, torque[block], axes=((0, 1), (0, 1))))
+    draws = np.random.default_rng(0).integers(len(grams), size=(BOOTSTRAP_DRAWS, len(grams)))
+    stacked = np.array(grams), np.array(rights)
+    drawn = [_solve_excited(stacked[0][each].sum(axis=0), stacked[1][each].sum(axis=0)) for each in draws]
+    return values, np.std(drawn, axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,15 +359,18 @@ def smooth_motion(even: Run, low_pass: TrimmedButterworth) -> Motion:
     return Motion(position, velocity, np.gradient(velocity, 1 / even.rate_hz, axis=0))
 
 
-def weighted_solution(matrix: Array, torque: Array) -> Array:
-    """Least squares with joints weighted by their own residuals. matrix: (samples, joints, columns)."""
+def weighted_solution(matrix: Array, torque: Array) -> tuple[Array, Array]:
+    """Least squares with joints weighted by their own residuals, and the weights (joints,).
+
+    matrix: (samples, joints, columns).
+    """
     weights = np.ones(torque.shape[1])
     for _ in range(WEIGHT_ROUNDS):
         weighted = matrix * weights[:, None]
         gram = np.tensordot(matrix, weighted, axes=((0, 1), (0, 1)))
         values = _solve_excited(gram, np.tensordot(weighted, torque, axes=((0, 1), (0, 1))))
         weights = 1 / np.maximum(np.mean((torque - matrix @ values) ** 2, axis=0), 1e-18)
-    return values
+    return values, weights
 
 
 def _solve_excited(gram: Array, right: Array) -> Array:

@@ -23,7 +23,7 @@ from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
-from armlab.diagnosis.simulation import read_simulation
+from armlab.diagnosis.simulation import Simulation, read_simulation
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
@@ -126,7 +126,7 @@ def compare_diagnosed(
     simulation, settings = read_simulation(recordings[0], baseline), Settings()
     progress("looking for changes of links and friction")
     try:
-        seen = _look(pool_plainly(recordings, simulation, settings), make_plain_table)
+        seen = look_plainly(recordings, simulation, settings)
         if not seen.sound.named:
             failed = next((each for each in diagnoses if each.model is None), None)
             if failed is not None:
@@ -136,6 +136,38 @@ def compare_diagnosed(
             seen = _look(pool_recordings(recordings, found, simulation, settings), make_table)
     except DataError as error:
         return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
+    return conclude(seen, diagnoses, tuple(_notes(recordings, baseline)), dates)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A table of recordings and the changes that it shows."""
+
+    pooled: Pooled
+    table: ChangeTable
+    sound: SoundChanges
+
+
+def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> Look:
+    """What rigid links and friction show; DataError where no run is long enough."""
+    return _look(pool_plainly(recordings, simulation, settings), make_plain_table)
+
+
+def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> Look:
+    """The changes, with columns that follow what is common beside them."""
+    table = table_of(pooled)
+    sound = find_sound_changes(pooled, table)
+    if sound.named:
+        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
+        table = table_of(pooled)
+        sound = find_sound_changes(pooled, table)
+    return Look(pooled, table, sound)
+
+
+def conclude(
+    seen: Look, diagnoses: Sequence[Diagnosis], notes: tuple[str, ...], dates: Sequence[date | None]
+) -> Comparison:
+    """The changes with their names and numbers."""
     pooled, table, sound = seen.pooled, seen.table, seen.sound
     named = name_changes(pooled, table, sound.named)
     doubtful = () if sound.doubtful is None else name_changes(pooled, table, [sound.doubtful])
@@ -146,30 +178,10 @@ def compare_diagnosed(
         list_table(pooled, table, sound.named),
         reason=RUNS_DIFFER if doubtful else "",
         doubtful=next(iter(doubtful), None),
-        notes=tuple(_notes(recordings, baseline)),
+        notes=notes,
         trends=_find_trends(pooled, table, sound.named, dates),
         dates=tuple(dates),
     )
-
-
-@dataclass(frozen=True, eq=False)
-class _Look:
-    """A table of recordings and the changes that it shows."""
-
-    pooled: Pooled
-    table: ChangeTable
-    sound: SoundChanges
-
-
-def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> _Look:
-    """The changes, with columns that follow what is common beside them."""
-    table = table_of(pooled)
-    sound = find_sound_changes(pooled, table)
-    if sound.named:
-        pooled = follow_levels(pooled, common_values(table, sound.named)[table.model])
-        table = table_of(pooled)
-        sound = find_sound_changes(pooled, table)
-    return _Look(pooled, table, sound)
 
 
 def _find_trends(

@@ -503,6 +503,11 @@ def compare_recordings(
     options = [*(["--baseline", baseline] if baseline else []), *(["--seed", str(seed)] if seed else [])]
     options += ["--dates", ",".join(each.isoformat() for each in dates)] if dates else []
     command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out), *options])
+    return (yield from write_comparison(comparison, out, command))
+
+
+def write_comparison(comparison: Comparison, out: Path, command: str) -> ResultLines:
+    """Writes comparison.json and comparison.html into `out`, both or none, and yields lines to print."""
     file = make_comparison_file(comparison)
     texts = {"comparison.json": file.to_json(), "comparison.html": comparison_page(comparison, command)}
     written = write_texts(texts, out)

@@ -9,6 +9,7 @@ from armlab.common.errors import InputError
 from armlab.common.files import write_texts
 from armlab.common.report.page import Table, render_page
 from armlab.common.report.wording import format_unit
+from armlab.diagnosis.compare.report import write_comparison
 from armlab.diagnosis.formats import (
     COMPARISON_SCHEMA,
     ChangeEntry,
@@ -20,6 +21,7 @@ from armlab.diagnosis.formats import (
     kind_of_effect,
 )
 from armlab.diagnosis.motion.compare import MotionComparison, ServoChange, compare_motion
+from armlab.diagnosis.motion.compare_load import compare_load
 from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.effects.library import effect_named
 from armlab.recordings.motion import load_motion_recording
@@ -149,8 +151,11 @@ def compare_motion_recordings(
     if len(folders) != 2:
         raise InputError("recordings of motion only are compared two at a time: give one OLD and one NEW")
     old, new = (load_motion_recording(folder) for folder in folders)
-    comparison = compare_motion(old, new, progress)
     command = shlex.join(["armlab", "diagnose", "--compare", *map(str, folders), "--out", str(out)])
+    load = compare_load(old, new)
+    if load is not None:
+        return (yield from write_comparison(load, out, command))
+    comparison = compare_motion(old, new, progress)
     file = make_motion_comparison(comparison)
     texts = {"comparison.json": file.to_json(), "comparison.html": comparison_page(comparison, command)}
     written = write_texts(texts, out)
