@@ -685,7 +685,6 @@ class ComparisonTuning:
         source="least squares on real arms: 3 to 10 Hz leave the least of the torque",
         least=0.1,
     )
-    plain_segment_rows: int = tuned(8, unit="rows", meaning="a shorter run is not compared by them", least=2)
     same_length: float = tuned(
         0.9, unit="of the longer run", meaning="runs of one motion are so long at least", most=1.0
     )
@@ -712,6 +711,13 @@ class ComparisonTuning:
     )
     level: float = tuned(
         0.01, unit="probability", meaning="of a false change in all that is compared", source="convention", most=1.0
+    )
+    single_run_level: float = tuned(
+        1e-5,
+        unit="probability",
+        meaning="the same of a change of links and friction where one recording has no second run to differ from",
+        source="run against run of real arms with nothing changed: 1e-4 to 9e-3 where something was named",
+        most=1.0,
     )
     least_evidence: float = tuned(
         5.0, unit="log likelihood", meaning="least log evidence of a change", source="a Bayes factor of 150"

@@ -4,7 +4,7 @@ As a change is tested beside its common part, a recording compared with itself h
 changes and the table of parameters come from this one test.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -20,6 +20,7 @@ from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Candidate
 
 NO_COLUMNS = np.empty(0, dtype=np.intp)
+LEAST_TORQUE = 1e-9  # N m (N): of a joint whose drive reports none
 SHAPE_STEP = 0.05  # of a nonlinear parameter, for derivatives: a gap's torque has corners
 
 
@@ -213,15 +214,12 @@ def make_table(pooled: Pooled) -> ChangeTable:
         shapes = parts.add(block.candidate.rows, block.values[:, :, -len(scales) :], scales)
         both = np.concatenate([parts.common[place_of(block.candidate)], shapes])
         whole.append(_Offer(block, both, _whole_law_scales(block, pooled), whole_law=True))
-    scale = np.full(1, pooled.tuning.typical_scale)
-    scaled = [_Offer(block, NO_COLUMNS, scale, laws=laws) for block, laws in _scaled_frictions(pooled)]
-    friction = {each.block.candidate.rows[0]: each.block.values[:, 0, 0] for each in scaled}
     plain = [parts.offer((block,)) for block in pooled.changes]
-    return _finish_table(parts, (*plain, *scaled, *whole), friction)
+    return _finish_table(parts, (*plain, *_friction_by_one_factor(pooled), *whole))
 
 
 def make_plain_table(pooled: Pooled) -> ChangeTable:
-    """The same with Coulomb and viscous friction of a joint as one cause, each with its own change."""
+    """The same with Coulomb and viscous friction of a joint as one cause, by one factor or each by its own change."""
     parts = _CommonColumns(pooled)
     friction: dict[int, list[Block]] = {}
     others = []
@@ -232,11 +230,16 @@ def make_plain_table(pooled: Pooled) -> ChangeTable:
         else:
             others.append(block)
     causes = [(each,) for each in others] + [tuple(each) for each in friction.values()]
-    return _finish_table(parts, [parts.offer(each) for each in causes], {})
+    return _finish_table(parts, [*(parts.offer(each) for each in causes), *_friction_by_one_factor(pooled)])
 
 
-def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer], friction: Mapping[int, Array]) -> ChangeTable:
-    """The table with the columns of what may have changed. friction: of a joint, its torque in the common model."""
+def _friction_by_one_factor(pooled: Pooled) -> list[_Offer]:
+    scale = np.full(1, pooled.tuning.typical_scale)
+    return [_Offer(block, NO_COLUMNS, scale, laws=laws) for block, laws in _scaled_frictions(pooled)]
+
+
+def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer]) -> ChangeTable:
+    """The table with the columns of what may have changed."""
     pooled, size, groups = parts.pooled, parts.size, list[ChangeGroup]()
     contrast = np.eye(pooled.recordings)[:, 1:] - 1 / pooled.recordings
     interval = max(1 / each.run.rate_hz for each in pooled.observed.signals)
@@ -259,6 +262,7 @@ def _finish_table(parts: "_CommonColumns", offers: Sequence[_Offer], friction: M
                 familiar=place_of(block.candidate) in parts.known,
             )
         )
+    friction = {each.block.candidate.rows[0]: each.block.values[:, 0, 0] for each in offers if each.laws}
     joints = tuple(_weighted_rows(parts, joint, friction.get(joint)) for joint in range(pooled.observed.joints))
     mixed = MixedModel(joints, parts.size, np.concatenate(parts.prior))
     own = np.arange(pooled.design.columns.size)
@@ -431,5 +435,6 @@ def _prior_scales(block: Block, pooled: Pooled) -> Array:
         return np.full(block.values.shape[2], known)
     rows = list(candidate.rows)
     torque = pooled.tuning.typical_share * np.sqrt(np.mean(observed.torque[:, rows] ** 2, axis=0))
+    torque = np.maximum(torque, LEAST_TORQUE)
     size = np.sqrt(np.mean(block.values**2, axis=0))  # (rows, coefficients)
     return np.asarray(np.min(torque[:, None] / np.maximum(size, 1e-300), axis=0))

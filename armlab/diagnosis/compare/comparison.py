@@ -125,17 +125,17 @@ def compare_diagnosed(
     """What changed between recordings of one robot of which each is diagnosed."""
     simulation, settings = read_simulation(recordings[0], baseline), Settings()
     progress("looking for changes of links and friction")
-    try:
-        seen = look_plainly(recordings, simulation, settings)
-        if not seen.sound.named:
-            failed = next((each for each in diagnoses if each.model is None), None)
-            if failed is not None:
-                return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.summary}")
-            progress("looking for other changes")
-            found = unite_candidates(diagnoses)
-            seen = _look(pool_recordings(recordings, found, simulation, settings), make_table)
-    except DataError as error:
-        return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
+    seen = look_plainly(recordings, simulation, settings)
+    if seen is None or not seen.sound.named:
+        failed = next((each for each in diagnoses if each.model is None), None)
+        if failed is not None:
+            return Comparison("inconclusive", tuple(diagnoses), reason=f"{failed.recording.name}: {failed.summary}")
+        progress("looking for other changes")
+        try:
+            pooled = pool_recordings(recordings, unite_candidates(diagnoses), simulation, settings)
+        except DataError as error:
+            return Comparison("inconclusive", tuple(diagnoses), reason=str(error))
+        seen = _look(pooled, make_table)
     return conclude(seen, diagnoses, tuple(_notes(recordings, baseline)), dates)
 
 
@@ -148,9 +148,12 @@ class Look:
     sound: SoundChanges
 
 
-def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> Look:
-    """What rigid links and friction show; DataError where no run is long enough."""
-    return _look(pool_plainly(recordings, simulation, settings), make_plain_table)
+def look_plainly(recordings: Sequence[Recording], simulation: Simulation, settings: Settings) -> Look | None:
+    """What rigid links and friction show; None where no run is long enough."""
+    try:
+        return _look(pool_plainly(recordings, simulation, settings), make_plain_table)
+    except DataError:
+        return None
 
 
 def _look(pooled: Pooled, table_of: Callable[[Pooled], ChangeTable]) -> Look:

@@ -21,6 +21,7 @@ from armlab.common.arrays import Array
 VARIANCE_RATIOS = 10.0 ** np.arange(-6.0, 6.1, 0.5)  # of a random part over the noise, that are tried
 FIRST_RATIO = 1e-4
 LIKELIHOOD_ROUNDS = 3
+LEAST_NOISE = 1e-5  # of a joint's torque: finer than any sensor, where a drive reports no torque
 INDEPENDENT_POWER = 1e-9  # of the largest eigenvalue of scaled columns: less is rounding
 LEAST_PRECISION = 1e-10  # of a column's information: keeps what no row determines finite
 
@@ -98,14 +99,17 @@ def _restricted_variances(rows: JointRows) -> tuple[float, tuple[float, ...]]:
     random = random - basis @ (basis.T @ random)
     gram, towards, power = random.T @ random, random.T @ left, float(left @ left)
     free = max(len(left) - basis.shape[1], 1)
+    least = free * max(LEAST_NOISE**2 * float(np.mean(rows.target**2)), 1e-300)
     sizes = [part.shape[1] for part in (*rows.random, rows.known)]
 
     def rest_and_spread(ratios: Sequence[float]) -> tuple[float, float]:
         root = np.sqrt(np.repeat(ratios, sizes))
-        factor = cho_factor(np.eye(len(gram)) + root[:, None] * gram * root, lower=True)
+        scaled_gram = root[:, None] * gram * root
+        rounding = np.finfo(float).eps * float(np.trace(scaled_gram))
+        factor = cho_factor((1 + rounding) * np.eye(len(gram)) + scaled_gram, lower=True)
         scaled = root * towards
         rest = power - float(scaled @ cho_solve(factor, scaled))
-        return max(rest, 1e-300), 2 * float(np.sum(np.log(np.diag(factor[0]))))
+        return max(rest, least), 2 * float(np.sum(np.log(np.diag(factor[0]))))
 
     def likelihood(ratios: Sequence[float]) -> float:
         rest, spread = rest_and_spread(ratios)

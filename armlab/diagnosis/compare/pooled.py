@@ -150,10 +150,14 @@ def pool_plainly(recordings: Sequence[Recording], simulation: Simulation, settin
         tuning.data,
         cutoff_hz=tuning.comparison.plain_cutoff_hz,
         min_cutoff_hz=tuning.comparison.plain_cutoff_hz,
-        min_segment_rows=tuning.comparison.plain_segment_rows,
+        min_segment_rows=2,
         min_moving_share=1.0,
+        held_out_blocks=2,
+        held_out_every=2,
     )
-    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0))
+    single = min(len(recordings[0].runs), len(recordings[-1].runs)) < 2
+    level = tuning.comparison.single_run_level if single else tuning.comparison.level
+    plain = replace(tuning, data=data, comparison=replace(tuning.comparison, drift_waves=0, level=level))
     return pool_recordings(recordings, (), simulation, replace(settings, tuning=plain))
 
 

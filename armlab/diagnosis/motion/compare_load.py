@@ -36,9 +36,11 @@ def compare_load(old: MotionRecording, new: MotionRecording) -> Comparison | Non
     try:
         scale = _newton_metres(old, runs[0])
         recordings = [_with_torque(each, own, old, scale) for each, own in zip((old, new), runs, strict=True)]
-        simulation = read_simulation(recordings[0], None)
-        seen = look_plainly(recordings, simulation, Settings())
     except DataError:
+        return None
+    simulation = read_simulation(recordings[0], None)
+    seen = look_plainly(recordings, simulation, Settings())
+    if seen is None:
         return None
     effects = {seen.table.groups[each.group].candidate.effect for each in seen.sound.named}
     if PAYLOAD_FACTS.id not in effects or TORQUE_GAIN_FACTS.id in effects:
