@@ -134,7 +134,7 @@ def identify(
     runs = recording.runs_to_identify()
     wrong = None if as_read else wrong_reading(recording)
     if wrong is not None:
-        raise InputError(f"{recording.name}: {wrong[0]} `as_read=True` identifies it all the same")
+        raise InputError(f"{recording.name}: {wrong.sentence} `as_read=True` identifies it all the same")
     identifier = Identifier(recording.arm, components, method, cutoff_hz=cutoff_hz, robot=robot_path(recording))
     try:
         model = identifier.fit(runs).model_

@@ -68,6 +68,7 @@ from armlab.effects.library import library
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.check import signs_of_wrong_reading
 from armlab.recordings.reading.answer import Answer, read_rightly
+from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
 from problem.base_parameters import base_parameters
 from problem.pseudo_inertia import are_bodies
@@ -94,19 +95,37 @@ def diagnose(
     read_after = time.perf_counter() - started
     if setup is not None:
         recording = setup.recording
-        reason = setup.reason_inconclusive(settings.tuning.reading)
-        if reason is not None:
-            simulation = read_simulation(recording, baseline)
-            found = Diagnosis(recording, simulation, "inconclusive", reason, signs=signs, setup=setup)
-            return replace(found, setup_seconds=read_after)
+        signs += tuple(each.finding for each in setup.doubts)
     if only_setup:
         return with_setup(replace(_reading_alone(recording, baseline, settings, setup), signs=signs), setup, read_after)
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
         return with_setup(replace(design, signs=signs), setup, read_after)
     numbered = state_numbers(recording, find_names(design, seed, progress), progress)
+    numbered = _only_if_explained(numbered, setup, settings.tuning.reading)
     found = replace(numbered, signs=signs, seconds=time.perf_counter() - started)
     return with_setup(found, setup, read_after)
+
+
+def _only_if_explained(found: Diagnosis, setup: Answer | None, tuning: ReadingTuning) -> Diagnosis:
+    """The diagnosis, or an inconclusive one where neither a reading nor physics explains the torque."""
+    observed = found.observed
+    if observed is None or found.simulation.kind == "simulated":
+        return found
+    held_out = np.concatenate([observed.torque[each.start : each.stop] for each in observed.of_role("validate")])
+    left = np.array([each.after for each in found.fit]) / np.maximum(np.std(held_out, axis=0), SMALLEST_TORQUE)
+    share = float(np.exp(np.mean(np.log(np.maximum(left, SMALLEST_SHARE)))))
+    if share <= tuning.max_unexplained:
+        return found
+    tried = f", however it is read ({setup.looks} readings were tried)" if setup is not None and setup.looks > 1 else ""
+    reason = (
+        f"Links, friction and all other physics leave {share:.0%} of the recorded torque{tried}: another robot, or "
+        "torque that is none? Move one joint alone and see which columns change."
+    )
+    return Diagnosis(found.recording, found.simulation, "inconclusive", reason, observed)
+
+
+SMALLEST_TORQUE, SMALLEST_SHARE = 1e-12, 1e-6  # N m; of the torque
 
 
 def _reading_alone(
@@ -132,9 +151,12 @@ TOO_SHORT_TO_READ = (
 def find_setup(
     recording: Recording, baseline: Baseline | None, settings: Settings, progress: Progress
 ) -> Answer | None:
-    """How the recording and the robot file are to be read; None for a recording that cannot be used anyhow."""
+    """How the recording and the robot file are to be read.
+
+    None for a recording that cannot be used anyhow, and where the links of the robot file play no part.
+    """
     simulation = read_simulation(recording, baseline)
-    if reason_unusable(recording, settings.tuning.soundness) is not None:
+    if simulation.kind == "simulated" or reason_unusable(recording, settings.tuning.soundness) is not None:
         return None
     progress("reading the recording rightly")
     return read_rightly(recording, simulation.inertial, settings.tuning.reading)
@@ -142,11 +164,10 @@ def find_setup(
 
 def with_setup(diagnosis: Diagnosis, setup: Answer | None, seconds: float) -> Diagnosis:
     """The diagnosis of a recording read rightly, with the mistakes of its reading."""
-    if setup is None or not setup.sentence:
+    if setup is None or not setup.findings:
         return replace(diagnosis, setup=setup, setup_seconds=seconds)
-    status = "mismatch" if setup.findings else diagnosis.status
     summary = f"{setup.sentence} {diagnosis.summary}"
-    return replace(diagnosis, status=status, summary=summary, setup=setup, setup_seconds=seconds)
+    return replace(diagnosis, status="mismatch", summary=summary, setup=setup, setup_seconds=seconds)
 
 
 def prepare(

@@ -132,6 +132,14 @@ class FindingEntry(Entry):
     next_experiment: str | None = None
 
 
+class DoubtEntry(Entry):
+    """A reading mistake that is not named and that the data do not exclude. measurement: what decides."""
+
+    effect: EffectName
+    joints: tuple[JointNumber, ...]
+    measurement: str
+
+
 class UnexplainedEntry(Entry):
     """Structure of a joint that no effect explains. depends_on: variables such as `position_1`."""
 
@@ -226,7 +234,7 @@ class VerdictFile(Entry):
     """The content of `verdict.json` (schema verdict/1).
 
     status: `none` where the simulation explains the recording down to the noise; the reason of `inconclusive` stands in
-    the summary. story: groups of findings, largest first.
+    the summary. story: groups of findings, largest first. doubts: ways to read the recording otherwise.
     """
 
     schema_: Literal["verdict/1"] = Field(alias="schema")
@@ -238,6 +246,7 @@ class VerdictFile(Entry):
     unexplained: tuple[UnexplainedEntry, ...]
     friction: tuple[FrictionEntry, ...] | None = None
     left: tuple[LeftEntry, ...] | None = None
+    doubts: tuple[DoubtEntry, ...] = ()
     fit: tuple[FitEntry, ...]
 
 

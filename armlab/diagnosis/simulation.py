@@ -108,10 +108,10 @@ def _as_law(candidate: Candidate, effect: FittedEffect, arm: Arm) -> Array:
 
 def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulation:
     """The simulation of a recording; InputError where the wanted baseline is not there."""
-    kind: Baseline = baseline or ("nominal" if _has_nominal(recording) else "refit")
+    kind: Baseline = baseline or _usual_baseline(recording)
     if kind == "nominal" and not _has_nominal(recording):
         raise InputError(f"--baseline nominal: {recording.arm.name} has no `links` and {recording.name} no simulation")
-    if kind == "simulated" and any(run.simulated_torque is None for run in recording.runs):
+    if kind == "simulated" and not _has_simulated_torque(recording):
         raise InputError(f"--baseline simulated: not every run of {recording.name} has columns of simulated_torque")
     arm = recording.arm
     if recording.simulation is None:
@@ -124,6 +124,17 @@ def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulati
         raise InputError(f"{recording.simulation} has {joints}: it is a model of another arm")
     inertial = model.inertial if model.inertial is not None else model.structure.full(model.base_values)
     return Simulation(kind, arm, inertial, model)
+
+
+def _usual_baseline(recording: Recording) -> Baseline:
+    """What a recording is compared with by itself: the torque that was simulated beside it, else its simulation."""
+    if _has_simulated_torque(recording):
+        return "simulated"
+    return "nominal" if _has_nominal(recording) else "refit"
+
+
+def _has_simulated_torque(recording: Recording) -> bool:
+    return all(run.simulated_torque is not None for run in recording.runs)
 
 
 def _has_nominal(recording: Recording) -> bool:
@@ -146,16 +157,11 @@ def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None
 
 
 def reason_misread(observed: Observed, simulation: Simulation, tuning: SoundnessTuning) -> str | None:
-    """Torque in a wrong unit or of the wrong sign, or the robot of another arm: where all joints say so together."""
+    """Torque in a wrong unit or of the wrong sign, where all joints say so together."""
     if simulation.kind == "refit" or simulation.inertial is None:
         return None
     gains, shares = _torque_gains(observed, simulation)
     told = shares > tuning.min_explained_share
-    if shares.max() < tuning.no_explained_share:
-        return (
-            "The simulation explains next to nothing of any joint's torque: the robot file of another arm, or torque "
-            "columns that are none?"
-        )
     factor = float(np.median(gains[told])) if told.any() else 1.0
     if factor < 0:
         return "The measured torque has the opposite sign of the simulated one: turn its sign in `transmission`."

@@ -99,11 +99,6 @@ class SoundnessTuning:
         unit="of the torque's scatter",
         meaning="a simulation that explains less on a joint tells nothing of its unit",
     )
-    no_explained_share: float = tuned(
-        0.02,
-        unit="of the torque's scatter",
-        meaning="a simulation that explains less on every joint is of another arm",
-    )
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from armlab.common.files import write_texts
 from armlab.diagnosis.formats import (
     VERDICT_SCHEMA,
     ClassMember,
+    DoubtEntry,
     FindingEntry,
     FitEntry,
     FrictionEntry,
@@ -37,7 +38,7 @@ from armlab.effects.library import effect_named
 from armlab.effects.parameters import ParameterValue
 from armlab.identification.model_file import model_text
 from armlab.recordings.differentiate import Signals
-from armlab.recordings.reading.answer import SetupFinding
+from armlab.recordings.reading.answer import Doubt, SetupFinding
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
 from armlab.recordings.recording import Recording
 
@@ -99,8 +100,13 @@ def make_verdict(diagnosis: Diagnosis) -> VerdictFile:
             for each in told.friction
         ),
         left=tuple(LeftEntry(**asdict(each)) for each in told.left),
+        doubts=tuple(_doubt_entry(each) for each in (diagnosis.setup.doubts if diagnosis.setup else ())),
         fit=tuple(_fit_entry(each) for each in diagnosis.fit),
     )
+
+
+def _doubt_entry(each: Doubt) -> DoubtEntry:
+    return DoubtEntry(effect=each.effect, joints=each.joints, measurement=each.measurement)
 
 
 def _located_entry(each: Located) -> LocatedEntry:

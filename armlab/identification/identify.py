@@ -192,27 +192,25 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
     }
 
 
-def wrong_reading(recording: Recording) -> tuple[str, Answer] | None:
-    """What is wrong with the reading of a recording, and the answer; None where nothing is."""
-    tuning, inertial = ReadingTuning(), recording.arm.parameters if recording.arm.links is not None else None
-    answer = read_rightly(recording, inertial, tuning)
-    if answer.findings:
-        return answer.sentence, answer
-    return (str(answer.reason_inconclusive(tuning)), answer) if answer.open else None
+def wrong_reading(recording: Recording) -> Answer | None:
+    """What is wrong with the reading of a recording; None where nothing is."""
+    answer = read_rightly(
+        recording, recording.arm.parameters if recording.arm.links is not None else None, ReadingTuning()
+    )
+    return answer if answer.findings else None
 
 
 def _refuse_wrong_reading(recording: Recording, out: Path) -> None:
     """Raises InputError for a recording that is read wrongly, once the corrected one is written."""
-    found = wrong_reading(recording)
-    if found is None:
+    answer = wrong_reading(recording)
+    if answer is None:
         return
-    sentence, answer = found
     hint = "give --as-read to identify it all the same"
     if answer.reading is not None:
         corrected = out / CORRECTED_FOLDER
         write_texts(corrected_texts(recording.folder, answer.reading, corrected), corrected)
         hint = f"{corrected} holds it as it should be, {hint}"
-    raise InputError(f"{recording.folder}: {sentence} {hint[0].upper()}{hint[1:]}")
+    raise InputError(f"{recording.folder}: {answer.sentence} {hint[0].upper()}{hint[1:]}")
 
 
 def _build_identifier(recording: Recording, options: IdentifyOptions) -> tuple[Identifier, list[str]]:

@@ -282,10 +282,7 @@ def _check_geometry(recording: Recording) -> tuple[Finding, ...]:
 
 def _check_reading(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> tuple[Finding, ...]:
     answer: Answer = read_rightly(recording, inertial, tuning)
-    reason = answer.reason_inconclusive(tuning)
-    if reason is not None:
-        return (Finding("setup", "warning", reason),)
-    findings = [Finding("setup", "warning", answer.sentence)] if answer.doubted else []
+    findings = [each.finding for each in answer.doubts]
     for each in answer.findings:
         rivals = "".join(f"; or {rival.text}" for rival in each.rivals)
         worst = joint_in_words(recording.arm, each.worst_joint)

@@ -7,6 +7,7 @@ The cut-off is therefore at most ten times the bandwidth of the motion, a rule o
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.fft import dst
 
 from armlab.common.arrays import Array
 from armlab.recordings.filters import LowPass
@@ -14,7 +15,7 @@ from armlab.recordings.filters import LowPass
 CANDIDATE_COUNT = 60
 MIN_CUTOFF_PERIODS = 10  # periods of the lowest candidate within the run
 MAX_CUTOFF_SHARE = 0.4  # of the sampling rate
-MOTION_POWER_SHARE = 0.99  # of the velocity, below the bandwidth of the motion
+MOTION_POWER_SHARE = 0.99  # of the velocity, or of the travel, below the bandwidth of the motion
 MAX_BANDWIDTH_MULTIPLE = 10  # of that bandwidth
 ROWS_PER_CUTOFF = 4  # rows kept in a period of the cut-off: what the filter leaves holds no more
 NOISE_BAND_START = 0.3  # of the sampling rate: above it a well sampled motion has nothing but noise
@@ -59,6 +60,19 @@ def choose_cutoff(position: Array, rate_hz: float, low_pass: type[LowPass]) -> C
     motion_hz = bandwidth(frequency, spectrum - noise, rate_hz)
     best = min(float(candidates[np.argmin(risk)]), max(MAX_BANDWIDTH_MULTIPLE * motion_hz, float(candidates[0])))
     return CutoffChoice(best, motion_hz, candidates, risk, frequency, spectrum, noise)
+
+
+def travel_bandwidth(position: Array, rate_hz: float) -> float:
+    """The frequency below which the travel of the joints together has nearly all its power, Hz.
+
+    position: (samples, joints). Unlike the velocity, the position of a coarse encoder has little noise. The line
+    between the ends of the run is taken away, so that a sine series has no jump there.
+    """
+    along = np.linspace(0, 1, len(position))[:, None]
+    travel = position - (1 - along) * position[0] - along * position[-1]
+    power = np.cumsum(np.sum(dst(travel, type=1, axis=0) ** 2, axis=1))
+    order = int(np.searchsorted(power, MOTION_POWER_SHARE * power[-1])) + 1
+    return order * rate_hz / (2 * (len(position) + 1))
 
 
 def bandwidth(frequency: Array, spectrum: Array, rate_hz: float) -> float:

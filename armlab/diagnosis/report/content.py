@@ -317,7 +317,7 @@ def origin_of(diagnosis: Diagnosis, command: str) -> Origin:
         ["compared with", compared_in_words(simulation) + (f" ({name})" if simulation.kind == "nominal" else "")],
         *(["run", f"{run.name}: {run.role}, {run.samples} samples at {run.rate_hz:.5g} Hz"] for run in recording.runs),
         *(["repaired", f"{run.name}: {each.text}"] for run in recording.runs for each in run.repairs),
-        *(["warning", each.text] for each in diagnosis.signs),
+        *([each.severity, each.text] for each in diagnosis.signs),
         ["armlab", version("armlab")],
     ]
     settings = [[key.replace("_", " "), str(value)] for key, value in diagnosis.settings.items()]

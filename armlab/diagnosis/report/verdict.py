@@ -91,10 +91,11 @@ def verdict_lines(diagnosis: Diagnosis, verbose: bool = False) -> Iterator[str]:
     first, second = verdict_sentences(diagnosis)
     arm, told = diagnosis.simulation.arm, tell(diagnosis)
     yield from wrap(f"{diagnosis.status.upper()}: {first} {second}", LINE_WIDTH)
-    warnings = [f"  {line}" for sign in diagnosis.signs for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2)]
+    signs = [each for each in diagnosis.signs if each.severity != "note"]
+    warnings = [f"  {line}" for sign in signs for line in wrap(f"warning: {sign.text}", LINE_WIDTH - 2)]
     yield from warnings if verbose or len(warnings) <= MAX_WARNINGS else warnings[: MAX_WARNINGS - 1]
     if not verbose and len(warnings) > MAX_WARNINGS:
-        yield f"  more warnings: --verbose, or the page ({count_of(len(diagnosis.signs), 'warning')})"
+        yield f"  more warnings: --verbose, or the page ({count_of(len(signs), 'warning')})"
     setup = diagnosis.setup.findings if diagnosis.setup else ()
     for number, mistake in enumerate(setup, 1):
         yield from _setup_lines(number, mistake, arm)

@@ -7,13 +7,13 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.recordings.reading.corrected import correct_recording
 from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.judge import Gain, Judge
+from armlab.recordings.reading.judge import Judge
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
 from armlab.recordings.reading.search import Found, find_mistakes
 from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement
-from armlab.recordings.recording import Recording
+from armlab.recordings.recording import Finding, Recording
 from problem.arm import Arm
 from problem.joint_words import joint_in_words, joints_in_words, links_in_words
 from problem.pseudo_inertia import are_bodies
@@ -52,6 +52,11 @@ class SetupFinding:
     next_experiment: str | None
 
     @property
+    def of_class(self) -> float:
+        """Probability of the name and of its rivals together."""
+        return self.probability + sum(each.probability for each in self.rivals)
+
+    @property
     def description(self) -> str:
         """What is wrong, in a clause."""
         return describe(self.mistake, self.arm)
@@ -66,39 +71,44 @@ class SetupFinding:
         )
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """A mistake that is not named and that these data do not exclude. measurement: what decides."""
+
+    effect: str
+    joints: tuple[int, ...]
+    text: str
+    measurement: str
+
+    @property
+    def finding(self) -> Finding:
+        """The same as a note about the recording."""
+        joint = self.joints[0] if len(self.joints) == 1 else None
+        return Finding("doubt", "note", f"not excluded: {self.text}; to tell, {self.measurement}", joint)
+
+
 @dataclass(frozen=True, eq=False)
 class Answer:
     """How a recording is to be read.
 
     findings: in the order in which they were found, none where it is read rightly. recording: as it should be read.
-    share: held-out error of all joints as it is read, of the torque's scatter; near the simulation's links where there
-    are findings. undecided: joints whose zero the data do not tell by quarters of a turn, where a zero is a finding.
-    open: mistakes of which too many fit alike to correct one. beside_open: mistakes that are certain, beside them.
-    doubted: mistakes that pass all tests, but leave too much of the torque to be corrected. tried: what was tried where
-    the recording fits badly. looks: how many readings were compared, 0 where it is too short. share_after: of the
-    recording as it should be read, or of the reading that is doubted.
+    share: held-out error of all joints as it is read, of the torque's scatter. share_after: of the recording as it
+    should be read. undecided: joints whose zero the data do not tell by quarters of a turn, where a zero is a finding.
+    doubts: what is not named and not excluded. looks: how many readings were compared, 0 where it is too short.
     """
 
     findings: tuple[SetupFinding, ...]
     recording: Recording
     reading: Reading | None
     share: float = 0.0
-    undecided: tuple[int, ...] = ()
-    open: tuple[SetupFinding, ...] = ()
-    beside_open: tuple[SetupFinding, ...] = ()
-    doubted: tuple[str, ...] = ()
-    tried: tuple[str, ...] = ()
-    looks: int = 0
     share_after: float = 0.0
+    undecided: tuple[int, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
+    looks: int = 0
 
     @property
     def sentence(self) -> str:
-        """The findings, or what is doubted, in a sentence; empty where there is neither."""
-        if self.doubted:
-            return (
-                f"The recording may be read wrongly: {'; '.join(self.doubted)}. Read so, links and usual friction "
-                f"leave {self.share_after:.0%} of the torque, not {self.share:.0%}: too much to correct it."
-            )
+        """The findings in a sentence; empty where there is none."""
         if not self.findings:
             return ""
         mistakes = "; ".join(each.description for each in self.findings)
@@ -108,34 +118,6 @@ class Answer:
             f"The recording is read wrongly: {mistakes}. Read rightly, links and usual friction fit with an error of "
             f"{100 * self.share_after:.1f} % of the torque, not {100 * self.share:.1f} %.{open_zeros}"
         )
-
-    def reason_inconclusive(self, tuning: ReadingTuning) -> str | None:
-        """Why nothing can be said of the physics: readings that fit alike, or none that fits."""
-        if self.open:
-            questions = ". And: ".join(
-                "; or ".join([each.description, *(rival.text for rival in each.rivals)]) for each in self.open
-            )
-            certain = "".join(f" This is certain: {each.description}." for each in self.beside_open)
-            steps = list(dict.fromkeys(_measurement_for(each) for each in self.open))
-            return (
-                f"The recording is read wrongly, and these data do not tell how: {questions}.{certain} "
-                f"To decide, {'; '.join(steps)}."
-            )
-        least = min(self.share, self.share_after) if self.doubted else self.share
-        if not self.findings and least > tuning.max_unexplained:
-            nearest = (
-                f", however it is read (tried {self.looks} readings, nearest: {'; '.join(self.tried)})"
-                if self.tried
-                else ""
-            )
-            left = f"Rigid links with friction leave {least:.0%} of the recorded torque{nearest}"
-            return f"{left}: another robot, or torque that is none? Move one joint alone and see which columns change."
-        return None
-
-
-def _measurement_for(finding: SetupFinding) -> str:
-    """What decides between a mistake and its rivals."""
-    return finding.next_experiment or measurement(finding.mistake.effect, finding.mistake.joint, finding.arm)
 
 
 def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> Answer:
@@ -150,56 +132,50 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     judge = Judge(Fitter(channels, tuning), recording)
     start = judge.trial(read_as_is(recording, inertial))
     found = find_mistakes(judge, start)
-    share = overall_error(judge, start.reading, near=False)
-    if found.best is found.start:
-        tried = tuple(describe(mistake, recording.arm) for each in found.tried for mistake in each.reading.mistakes)
-        return Answer((), recording, None, share, tried=tried, looks=found.looks)
-    after = overall_error(judge, found.best.reading, near=True)
-    if after > tuning.max_read_error:
-        own = (each for each in found.best.reading.mistakes if each.effect != SPRING)
-        doubted = tuple(describe(each, recording.arm) for each in own)
-        free = overall_error(judge, found.best.reading, near=False)
-        return Answer((), recording, None, share, doubted=doubted, tried=doubted, looks=found.looks, share_after=free)
-    findings = tuple(
-        _finding(judge, found, place) for place, each in enumerate(found.best.reading.mistakes) if each.effect != SPRING
-    )
-    if not findings:  # springs alone: the recording is read rightly
-        return Answer((), recording, None, overall_error(judge, found.best.reading, near=False), looks=found.looks)
-    open_ones = tuple(each for each in findings if len(each.rivals) >= tuning.max_class)
-    if open_ones:
-        beside = tuple(each for each in findings if each not in open_ones)
-        return Answer((), recording, None, share, open=open_ones, beside_open=beside, looks=found.looks)
+    share = judge.overall_error(start)
+    doubts = tuple(_doubt(each.reading.mistakes[-1], recording.arm) for each in found.doubts)
+    mistakes = found.best.reading.mistakes
+    findings = tuple(_finding(judge, found, place) for place, each in enumerate(mistakes) if each.effect != SPRING)
+    if any(len(each.rivals) >= tuning.max_class or each.of_class < LEAST_TOLD for each in findings):
+        doubts += tuple(_doubt(each.mistake, recording.arm) for each in findings)
+        return Answer((), recording, None, share, share, doubts=doubts, looks=found.looks)
+    after = judge.overall_error(found.best)
+    if not findings:  # or springs alone: the recording is read rightly
+        return Answer((), recording, None, after, after, doubts=doubts, looks=found.looks)
     zeros = found.undecided if any(each.mistake.effect == "encoder_offset" for each in findings) else ()
     corrected = correct_recording(recording, found.best.reading)
-    before = overall_error(judge, start.reading, near=True)
-    return Answer(findings, corrected, found.best.reading, before, zeros, looks=found.looks, share_after=after)
+    return Answer(findings, corrected, found.best.reading, share, after, zeros, doubts, found.looks)
 
 
-def overall_error(judge: Judge, reading: Reading, near: bool) -> float:
-    """Held-out error, geometric mean over the joints, of the torque's scatter. near: links near the simulation's."""
-    errors, _ = judge.errors(reading, near)
-    return float(np.exp(np.mean(np.log(np.maximum(errors, 1e-6)))))
+def _doubt(mistake: Mistake, arm: Arm) -> Doubt:
+    joints = mistake.joints or (() if mistake.joint is None else (mistake.joint,))
+    return Doubt(mistake.effect, joints, describe(mistake, arm), measurement(mistake.effect, mistake.joint, arm))
 
 
+LEAST_TOLD = 0.5  # probability below which nothing is stated (the contract of verdicts)
 SMALLEST_SHARE = 1e-9  # of a joint that stands still
 
 
 def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
     """The mistake at a place, judged against the reading that leaves it in."""
     without, best = found.without[place], found.best
-    mistake = best.reading.mistakes[place]
-    (before, rms_before), (after, rms_after) = (judge.errors(each.reading, near=True) for each in (without, best))
-    before, after = np.maximum(before, SMALLEST_SHARE), np.maximum(after, SMALLEST_SHARE)
+    mistake, reading = best.reading.mistakes[place], best.reading
+    before, after = (np.maximum(judge.errors(each.reading)[0].errors, SMALLEST_SHARE) for each in (without, best))
+    rms_before, rms_after = (
+        share * np.std(judge.fitter.channels.read_torque(each.reading), axis=0)
+        for share, each in ((before, without), (after, best))
+    )
     worst = int(np.argmax(np.log(before) - np.log(after)))
     if mistake.joint is not None and mistake.effect != "link_data_error":
         worst = mistake.joint - 1 if after[mistake.joint - 1] < before[mistake.joint - 1] else worst
-    gain, arm = Gain.between(without, best), best.reading.arm
+    gain, arm = judge.gain(without, best), reading.arm
     rivals = [(each.reading.mistakes[-1], each.loss) for each in found.rivals[place]]
     weights = np.array([best.loss, *(loss for _, loss in rivals)])
     chances = np.exp(-judge.fitter.channels.blocks * (weights - weights.min()))
-    by_links = best.near is not None and not is_told_by_geometry(gain, judge.tuning)
+    by_links = best.near is not None and not judge.is_told_by_geometry(without, best, mistake)
+    sigmas = gain.near.total_sigmas if by_links else gain.sigmas
     chances = np.append(chances, chances.max() * judge.tuning.other_links_chance if by_links else 0.0)
-    chances = chances / chances.sum() * (1 - lapse(gain, found.margins[place], judge.tuning))
+    chances = chances / chances.sum() * (1 - lapse(sigmas, found.margins[place], judge.tuning))
     listed = [
         Rival(each.effect, each.joint, each.joints, describe(each, arm), float(chance))
         for (each, _), chance in zip(rivals, chances[1:-1], strict=True)
@@ -220,23 +196,18 @@ def _finding(judge: Judge, found: Found, place: int) -> SetupFinding:
         float(rms_after[worst]),
         float(before[worst]),
         float(after[worst]),
-        gain.near_sigmas,
+        gain.near.total_sigmas,
         float(chances[0]),
         tuple(listed),
         "; ".join(list(measure)[:2]) if listed else None,
     )
 
 
-def lapse(gain: Gain, margin: float, tuning: ReadingTuning) -> float:
+def lapse(sigmas: float, margin: float, tuning: ReadingTuning) -> float:
     """The probability that none of the names is right, k / (k + (s (1 + g))^2).
 
-    s: standard errors by which the loss falls, in the view where it falls less surely, 1 at least. margin: g, those by
-    which the next best reading with another mistake in its place is worse, accepted or not.
+    s: sigmas by which the loss falls, in the view where it falls less surely of those that tell, 1 at least. margin: g,
+    those by which the next best reading with another mistake in its place is worse, accepted or not.
     """
-    strength = max(min(gain.near_sigmas, gain.free_sigmas), 1.0) * (1 + margin)
+    strength = max(sigmas, 1.0) * (1 + margin)
     return tuning.lapse_odds / (tuning.lapse_odds + strength**2)
-
-
-def is_told_by_geometry(gain: Gain, tuning: ReadingTuning) -> bool:
-    """Whether no other links would explain what was recorded as well."""
-    return gain.free >= tuning.min_free_gain and gain.free_sigmas >= tuning.min_sigmas

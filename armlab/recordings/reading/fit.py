@@ -54,12 +54,10 @@ class Columns:
     stated: Array
 
 
-def make_columns(arm: Arm, motion: Motion, fold: NDArray[np.intp], sign_width: float) -> Columns:
-    """The columns of a motion (rows, joints); fold: (rows,) of each row."""
+def make_columns(arm: Arm, motion: Motion, sign: Array, fold: NDArray[np.intp]) -> Columns:
+    """The columns of a motion (rows, joints). sign: (rows, joints) of the velocity; fold: (rows,) of each row."""
     joints = len(arm)
     rigid = observation_matrix(arm, motion).reshape(motion.samples, joints, 10 * joints)
-    speed = np.abs(motion.velocity).max(axis=0)
-    sign = np.tanh(motion.velocity / (sign_width * np.where(speed > 0, speed, 1.0)))
     own = np.stack([motion.velocity, sign, motion.acceleration, np.ones_like(sign), motion.position], axis=2)
     grams = np.zeros((FOLDS, joints, 10 * joints + JOINT_COLUMNS, 10 * joints + JOINT_COLUMNS))
     for number in range(FOLDS):
@@ -94,27 +92,16 @@ def _prior(arm: Arm) -> Prior:
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """Held-out errors of a reading. shares: (blocks, joints), mean squares over the scatter of the joint's torque.
+    """Held-out errors of a reading. errors: (joints,), rms over the scatter of the joint's torque.
 
     values: (folds, 10 * joints) of the links, own: (folds, joints, 5) of the joints. distance: of the links from those
     of the simulation, minus the logarithm of their prior over the number of independent rows.
     """
 
-    shares: Array
+    errors: Array
     values: Array
     own: Array
     distance: float
-
-    def errors(self) -> Array:
-        """RMS error over scatter of each joint, (joints,)."""
-        return np.array(np.sqrt(np.mean(self.shares, axis=0)), dtype=np.float64)
-
-    def losses(self, smallest: float) -> Array:
-        """Logarithms of the errors of each block and joint, (blocks, joints), flat below the smallest error.
-
-        The distance of the links is shared out among the joints.
-        """
-        return np.asarray(0.5 * np.log(self.shares + smallest**2) + self.distance / self.shares.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +132,8 @@ class Fitter:
             if len(self._columns) > 24:
                 self._columns.pop(next(iter(self._columns)))
             motion = self.channels.read_motion(reading)
-            self._columns[key] = make_columns(reading.arm, motion, self.fold, self.tuning.sign_width)
+            sign = self.channels.sign_of_velocity(reading, self.tuning.sign_width)
+            self._columns[key] = make_columns(reading.arm, motion, sign, self.fold)
         return self._columns[key]
 
     def prior(self, reading: Reading, torque: Array) -> Prior:
@@ -164,59 +152,72 @@ class Fitter:
     def scores(self, reading: Reading, widths: Sequence[float], physical: bool = False) -> list[Score]:
         """Held-out errors with links of each width about the simulation.
 
-        The last link may carry a load: it is free in any case.
+        The last link may carry a load: it is free in any case. physical: links that bodies can have.
         """
-        columns = self.columns(reading)
-        torque = self.channels.read_torque(reading) - columns.stated
-        scatter = np.std(torque, axis=0)
-        weight = np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
+        columns, torque, weight = self._target(reading)
         prior = self.prior(reading, torque)
-        springless = [joint for joint in range(reading.joints) if joint not in reading.springs]
-        normal = [self._normal_equations(columns, torque, weight, 1 - number, springless) for number in range(FOLDS)]
-        count = np.bincount(self.channels.block, minlength=self.channels.blocks)
+        absent = [
+            10 * reading.joints + JOINT_COLUMNS * joint + SPRING
+            for joint in range(reading.joints)
+            if joint not in reading.springs
+        ]
+        products = [_products(columns, torque, self.fold == number) for number in range(FOLDS)]
+        power = [np.sum(torque[self.fold == number] ** 2, axis=0) for number in range(FOLDS)]
+        normal = [self._normal_equations(columns, products, weight, 1 - number, absent) for number in range(FOLDS)]
         out = []
         for width in widths:
             each = np.full(reading.joints, width)
             each[-1] = max(width, self.tuning.free_width)
-            shares, distance = np.zeros((self.channels.blocks, reading.joints)), 0.0
-            fitted = []
+            squares, distance, fitted = np.zeros(reading.joints), 0.0, []
             for number, (gram, product) in enumerate(normal):
                 task = _Task(gram, product, prior, each**-2.0, reading.joints)
                 links, own = task.physical() if physical else task.gaussian()
-                rows = self.fold == number
-                found = columns.rigid[rows] @ links + np.einsum("rjk,jk->rj", columns.own[rows], own)
-                np.add.at(shares, self.channels.block[rows], ((torque[rows] - found) * weight) ** 2)
+                squares += _squares(columns.grams[number], products[number], power[number], links, own)
                 distance += task.distance(links, physical) / (
                     self.channels.blocks * self.tuning.independent_rows * FOLDS
                 )
                 fitted.append((links, own))
             values, owns = (np.stack(parts) for parts in zip(*fitted, strict=True))
-            out.append(Score(shares / count[:, None], values, owns, distance))
+            errors = np.sqrt(np.maximum(squares, 0.0) / len(torque)) * weight
+            out.append(Score(errors, values, owns, distance))
         return out
 
-    def _normal_equations(
-        self, columns: Columns, torque: Array, weight: Array, fold: int, springless: Sequence[int]
-    ) -> tuple[Array, Array]:
-        """Gram matrix and product with the torque, in nats, of the rows of a fold.
+    def _target(self, reading: Reading) -> tuple[Columns, Array, Array]:
+        """Columns, the torque (rows, joints) that they have to explain, and one over its scatter (joints,)."""
+        columns = self.columns(reading)
+        torque = self.channels.read_torque(reading) - columns.stated
+        scatter = np.std(torque, axis=0)
+        return columns, torque, np.where(scatter > 0, 1 / np.where(scatter > 0, scatter, 1.0), 0.0)
 
-        springless: joints (from 0) that have no spring.
-        """
-        joints, rows = torque.shape[1], self.fold == fold
+    def shares(self, reading: Reading, score: Score) -> Array:
+        """Mean squares of the held-out errors over the scatter of the joint's torque, (blocks, joints)."""
+        columns, torque, weight = self._target(reading)
+        out = np.zeros((self.channels.blocks, reading.joints))
+        for number in range(FOLDS):
+            rows = self.fold == number
+            found = columns.rigid[rows] @ score.values[number]
+            found = found + np.einsum("rjk,jk->rj", columns.own[rows], score.own[number])
+            np.add.at(out, self.channels.block[rows], ((torque[rows] - found) * weight) ** 2)
+        return out / np.bincount(self.channels.block, minlength=self.channels.blocks)[:, None]
+
+    def _normal_equations(
+        self, columns: Columns, products: Sequence[Array], weight: Array, fold: int, absent: Sequence[int]
+    ) -> tuple[Array, Array]:
+        """Gram matrix and product with the torque, in nats, of the rows of a fold. absent: columns left out."""
+        joints, rows = len(weight), self.fold == fold
         blocks = len(np.unique(self.channels.block[rows]))
         scale = blocks * self.tuning.independent_rows / (max(rows.sum(), 1) * self.tuning.model_error**2) * weight**2
         links, size = 10 * joints, (10 + JOINT_COLUMNS) * joints
         gram, product = np.zeros((size, size)), np.zeros(size)
-        grams, target = columns.grams[fold], torque[rows]
+        grams = columns.grams[fold]
         gram[:links, :links] = np.tensordot(scale, grams[:, :links, :links], axes=1)
-        product[:links] = np.einsum("rjp,rj->p", columns.rigid[rows], target * scale, optimize=True)
-        own = scale[:, None] * np.einsum("rjk,rj->jk", columns.own[rows], target)
+        product[:links] = scale @ products[fold][:, :links]
+        product[links:] = (scale[:, None] * products[fold][:, links:]).ravel()
         for joint in range(joints):
             places = slice(links + JOINT_COLUMNS * joint, links + JOINT_COLUMNS * (joint + 1))
             gram[:links, places] = scale[joint] * grams[joint, :links, links:]
             gram[places, :links] = gram[:links, places].T
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
-            product[places] = own[joint]
-        absent = [links + JOINT_COLUMNS * joint + SPRING for joint in springless]
         gram[absent], gram[:, absent], product[absent] = 0.0, 0.0, 0.0
         return gram, product
 
@@ -263,6 +264,19 @@ class Fitter:
             gain = float(model @ measured) / power if power > 0 else 0.0
             out.append((gain, gain**2 * power / total if total > 0 else 0.0))
         return out
+
+
+def _products(columns: Columns, torque: Array, rows: NDArray[np.bool_]) -> Array:
+    """Products with the torque of each joint, (joints, 10 * joints + 5), in the order of the Gram matrices."""
+    rigid = np.einsum("rjp,rj->jp", columns.rigid[rows], torque[rows])
+    own = np.einsum("rjk,rj->jk", columns.own[rows], torque[rows])
+    return np.concatenate([rigid, own], axis=1)
+
+
+def _squares(grams: Array, products: Array, power: Array, links: Array, own: Array) -> Array:
+    """Sums of squared errors of each joint, (joints,): power - 2 product' x + x' gram x, x = links and own columns."""
+    both = np.concatenate([np.broadcast_to(links, (len(own), len(links))), own], axis=1)
+    return np.asarray(power + np.sum(both * (np.einsum("jpq,jq->jp", grams, both) - 2 * products), axis=1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,18 +1,20 @@
-"""The judge of readings: held-out losses of two views, and when a mistake may be named.
+"""The judge of readings: held-out errors of two views, and when a mistake may be named.
 
-A reading counts by the sum over joints of the mean logarithm of its held-out errors, with links near those of the
-simulation, and with links that the data decide.
+Many readings are looked at; the errors of the best ones are compared joint by joint and block by block. A mistake is
+the last explanation of a large error: taken back, it has to explain most of what some joint leaves, and no joint may be
+explained worse. What a real arm leaves of its own is often explained by a third, and hardly ever by a half.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from armlab.common.arrays import Array
-from armlab.recordings.reading.fit import Fitter
-from armlab.recordings.reading.mistakes import POSITION, TORQUE
-from armlab.recordings.reading.reading import Reading
+from armlab.recordings.reading.fit import Fitter, Score
+from armlab.recordings.reading.mistakes import POSITION, TORQUE, improbability, is_of_one_joint
+from armlab.recordings.reading.reading import Mistake, Reading
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
 from problem.regressor import rigid_body_torque
@@ -20,7 +22,7 @@ from problem.regressor import rigid_body_torque
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A reading with its held-out losses (blocks, joints): near the simulation's links (None without), free."""
+    """A reading with logarithms of its held-out errors (joints,): near the simulation's links (None without), free."""
 
     reading: Reading
     near: Array | None
@@ -28,13 +30,72 @@ class Trial:
 
     @property
     def loss(self) -> float:
-        """Sum over joints of the mean loss, of the stricter view."""
-        return float(np.mean(np.sum(self.free if self.near is None else self.near, axis=1)))
+        """Sum over joints, of the stricter view."""
+        return float(np.sum(self.free if self.near is None else self.near))
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Held-out errors of a reading, over the scatter of the joints' torque; of links that bodies can have, and of any.
+
+    errors: (joints,), rms. losses: (blocks, joints), logarithms of the errors of each block.
+    """
+
+    errors: Array
+    losses: Array
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """How far errors fall from one reading to another. falls: (joints,), logarithms; sigmas: (joints,) of them.
+
+    total_sigmas: of the sum over the joints, between blocks of time.
+    """
+
+    falls: Array
+    sigmas: Array
+    total_sigmas: float
+
+    @classmethod
+    def between(cls, before: Errors, after: Errors, smallest: float) -> "View":
+        """From one reading to another of the same blocks; errors below the smallest one count as that."""
+        falls = np.log(np.maximum(before.errors, smallest)) - np.log(np.maximum(after.errors, smallest))
+        blocks = before.losses - after.losses
+        return cls(falls, _sigmas(blocks), float(_sigmas(np.sum(blocks, axis=1, keepdims=True))[0]))
 
     @property
-    def free_loss(self) -> float:
-        """The same with free links."""
-        return float(np.mean(np.sum(self.free, axis=1)))
+    def best(self) -> int:
+        """The joint (from 0) whose error falls most."""
+        return int(np.argmax(self.falls))
+
+    @property
+    def gain(self) -> float:
+        """Sum over the joints, nats."""
+        return float(np.sum(self.falls))
+
+    def rises(self, tuning: ReadingTuning) -> bool:
+        """Whether some joint is explained worse, beyond chance."""
+        surely = (self.falls < -np.log(tuning.small_rise)) & (self.sigmas < -tuning.rise_sigmas)
+        return bool(np.any(surely | (self.falls < -np.log(tuning.large_rise))))
+
+
+def _sigmas(blocks: Array) -> Array:
+    """Mean over the blocks (blocks, columns), in standard errors of it."""
+    error = np.std(blocks, axis=0, ddof=1) / np.sqrt(len(blocks))
+    return np.asarray(np.mean(blocks, axis=0) / np.maximum(error, 1e-9))
+
+
+@dataclass(frozen=True, eq=False)
+class Gain:
+    """How far errors fall from one reading to another, in both views; the same twice without a simulation."""
+
+    near: View
+    free: View
+
+    @property
+    def sigmas(self) -> float:
+        """Standard errors by which all joints together fall, in the view where they fall less surely."""
+        return min(self.near.total_sigmas, self.free.total_sigmas)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,17 +105,7 @@ class Judge:
     fitter: Fitter
     recording: Recording
     looks: list[int] = field(default_factory=lambda: [0])
-
-    def errors(self, reading: Reading, near: bool) -> tuple[Array, Array]:
-        """Held-out errors of the joints (joints,) over their torque's scatter, and in N m (N).
-
-        near: with links near those of the simulation, where there is one; else with free links.
-        """
-        width = self.tuning.free_width if reading.inertial is not None else self.tuning.unknown_width
-        if near and reading.inertial is not None:
-            width = self.tuning.near_width
-        errors = self.fitter.scores(reading, (width,))[0].errors()
-        return errors, errors * np.std(self.fitter.channels.read_torque(reading), axis=0)
+    _errors: dict[int, tuple[Reading, Errors, Errors]] = field(default_factory=dict)
 
     @cached_property
     def clock_is_right(self) -> bool:
@@ -66,17 +117,139 @@ class Judge:
         """The numbers of this stage."""
         return self.fitter.tuning
 
-    def trial(self, reading: Reading, physical: bool = False) -> Trial:
-        """The losses of a reading."""
+    def trial(self, reading: Reading) -> Trial:
+        """The errors of a reading with links near those of the simulation, and free."""
         self.looks[0] += 1
+        scores = self.fitter.scores(reading, self._widths(reading))
+        beyond = self._impossible(reading)
+        losses = [
+            np.log(np.maximum(each.errors, self.tuning.smallest_error)) + each.distance / reading.joints + beyond
+            for each in scores
+        ]
+        return Trial(reading, losses[0] if len(losses) > 1 else None, losses[-1])
+
+    def _widths(self, reading: Reading) -> tuple[float, ...]:
         tuning = self.tuning
-        known = reading.inertial is not None
-        widths = (tuning.near_width, tuning.free_width) if known else (tuning.unknown_width,)
-        beyond = self.fitter.beyond_limits(reading) * tuning.limit_loss / reading.joints
-        beyond = beyond + self.fitter.too_fast(reading) * tuning.speed_loss / reading.joints
-        scores = self.fitter.scores(reading, widths, physical)
-        losses = [each.losses(tuning.smallest_error) + beyond for each in scores]
-        return Trial(reading, losses[0] if known else None, losses[-1])
+        return (tuning.unknown_width,) if reading.inertial is None else (tuning.near_width, tuning.free_width)
+
+    def _impossible(self, reading: Reading) -> float:
+        """Loss of a joint of a reading that breaks limits of position, or is faster than joints are, nats."""
+        broken = self.fitter.beyond_limits(reading) * self.tuning.limit_loss
+        return (broken + self.fitter.too_fast(reading) * self.tuning.speed_loss) / reading.joints
+
+    def errors(self, reading: Reading) -> tuple[Errors, Errors]:
+        """Held-out errors near the links of the simulation, and with free ones: the same twice without a simulation."""
+        if id(reading) not in self._errors:
+            widths = self._widths(reading)
+            fits = zip(self.fitter.scores(reading, widths), self.fitter.scores(reading, widths, True), strict=True)
+            out = [self._best_fit(reading, each) for each in fits]
+            self._errors[id(reading)] = (reading, out[0], out[-1])
+        return self._errors[id(reading)][1:]
+
+    def _best_fit(self, reading: Reading, fits: Sequence[Score]) -> Errors:
+        """Of each joint the fit that predicts it better: a reading that is wrong does so by both."""
+        shares = [self.fitter.shares(reading, each) for each in fits]
+        better = np.argmin([each.errors for each in fits], axis=0)
+        errors = np.min([each.errors for each in fits], axis=0)
+        chosen = np.where(better, shares[1], shares[0])
+        losses = 0.5 * np.log(chosen + self.tuning.smallest_error**2) + self._impossible(reading)
+        return Errors(errors, np.asarray(losses))
+
+    def gain(self, before: Trial, after: Trial) -> Gain:
+        """How far errors fall from one reading to another."""
+        smallest = self.tuning.smallest_error
+        pairs = zip(self.errors(before.reading), self.errors(after.reading), strict=True)
+        return Gain(*(View.between(first, second, smallest) for first, second in pairs))
+
+    def is_usual(self, trial: Trial) -> bool:
+        """Whether no joint leaves more than joints of real arms do."""
+        return all(float(each.errors.max()) <= self.tuning.usual_error for each in self.errors(trial.reading))
+
+    def usual_joints(self, trial: Trial) -> frozenset[int]:
+        """Joints (from 1) that leave so little that their torque alone is not read wrongly."""
+        views = trial.free if trial.near is None else np.maximum(trial.near, trial.free)
+        return frozenset((np.flatnonzero(np.exp(views) <= self.tuning.usual_error) + 1).tolist())
+
+    def is_accepted(self, before: Trial, after: Trial, mistake: Mistake | None = None) -> bool:
+        """Whether a reading explains so much more that a mistake may be named, its last one if left out."""
+        mistake = mistake or after.reading.mistakes[-1]
+        return self._passes(before, after, mistake, self._least_fall(mistake, after.reading))
+
+    def is_doubt(self, before: Trial, after: Trial) -> bool:
+        """Whether a reading that may not be named explains something surely, and no joint worse."""
+        mistake = after.reading.mistakes[-1]
+        return self._passes(before, after, mistake, DOUBT_SHARE * self._least_fall(mistake, after.reading))
+
+    def may_begin(self, before: Trial, after: Trial) -> bool:
+        """Whether a mistake explains so much that another one is looked for beside it, though joints are worse."""
+        mistake = after.reading.mistakes[-1]
+        return self._passes(before, after, mistake, self._least_fall(mistake, after.reading), may_rise=True)
+
+    def improbability(self, reading: Reading) -> float:
+        """Of the last mistake of a reading, nats a block: what it has to explain better than the commonest one."""
+        return improbability(reading.mistakes[-1], reading.joints) / self.fitter.channels.blocks
+
+    def _least_fall(self, mistake: Mistake, reading: Reading) -> float:
+        beyond = improbability(mistake, reading.joints) / self.fitter.channels.blocks
+        tuning = self.tuning
+        factor = tuning.least_factor if is_of_one_joint(mistake) else tuning.least_total_factor
+        return float(np.log(factor)) + beyond
+
+    def overall_error(self, trial: Trial) -> float:
+        """Held-out error near the simulation's links, geometric mean over the joints, of the torque's scatter."""
+        near, _ = self.errors(trial.reading)
+        return float(np.exp(np.mean(np.log(np.maximum(near.errors, self.tuning.smallest_error)))))
+
+    def may_explain(self, before: Trial, after: Trial, least: float | None = None) -> bool:
+        """Whether by the quick fits all joints together, or one, fall nearly so far, and the loss falls.
+
+        least: nats; those of a mistake that is named if left out.
+        """
+        least = np.log(self.tuning.least_total_factor) if least is None else least
+        falls = [before.free - after.free]
+        if before.near is not None and after.near is not None:
+            falls.append(before.near - after.near)
+        most = max(max(float(np.max(each)), float(np.sum(each))) for each in falls)
+        return after.loss < before.loss and most >= QUICK_SHARE * least
+
+    def is_told_by_geometry(self, before: Trial, after: Trial, mistake: Mistake) -> bool:
+        """Whether no other links would explain what was recorded as well."""
+        free = self.errors(after.reading)[1]
+        return self._tells(self.gain(before, after).free, free, mistake, self._least_fall(mistake, after.reading))
+
+    def _passes(self, before: Trial, after: Trial, mistake: Mistake, least: float, may_rise: bool = False) -> bool:
+        """Whether errors fall so far, surely, and no joint is explained worse in either view.
+
+        By geometry: free links show it. By the links of the simulation: near them the reading is about as good as any
+        links make it.
+        """
+        if not self.may_explain(before, after, least):
+            return False
+        gain = self.gain(before, after)
+        if not may_rise and (gain.near.rises(self.tuning) or gain.free.rises(self.tuning)):
+            return False
+        near, free = self.errors(after.reading)
+        if self._tells(gain.free, free, mistake, least):
+            return True
+        by_links = max(least, float(np.log(self.tuning.least_factor)) + self.improbability(after.reading))
+        if before.near is None or not self._tells(gain.near, near, mistake, by_links):
+            return False
+        first, _ = self.errors(before.reading)
+        floor = self.tuning.smallest_error
+        gap, left = (
+            float(np.sum(np.log(np.maximum(each.errors, floor) / np.maximum(free.errors, floor))))
+            for each in (first, near)
+        )
+        return left < self.tuning.max_open_gap * gap
+
+    def _tells(self, view: View, after: Errors, mistake: Mistake, least: float) -> bool:
+        """Whether all joints together fall so far, and the best one alone for a mistake that is told by one joint."""
+        best, tuning = view.best, self.tuning
+        if view.total_sigmas < tuning.min_sigmas and view.sigmas[best] < tuning.min_sigmas:
+            return False
+        if is_of_one_joint(mistake) and (view.falls[best] < least or view.sigmas[best] < tuning.min_sigmas):
+            return False
+        return bool(view.gain >= least and after.errors[best] <= tuning.max_left)
 
     def is_size_plausible(self, parent: Reading, reading: Reading) -> bool:
         """Whether a last mistake that scales makes sizes more alike, as a wrong unit does.
@@ -123,6 +296,8 @@ class Judge:
 
 
 SMALLEST = 1e-300
+DOUBT_SHARE = 0.5  # of the evidence for a name: what cannot be excluded
+QUICK_SHARE = 0.75  # of a fall with links that bodies can have, which links without that bound show
 
 
 def _confirms_clock(run: Run, likeness: float) -> bool:
@@ -134,52 +309,3 @@ def _confirms_clock(run: Run, likeness: float) -> bool:
     alike = product / np.sqrt(np.maximum(power * np.sum(run.velocity**2, axis=0), 1e-300))
     moving = power > 0
     return bool(np.all(alike[moving] > likeness) and np.all(np.abs(gain[moving] - 1) < 1 - likeness))
-
-
-@dataclass(frozen=True, eq=False)
-class Gain:
-    """How far held-out losses fall from one trial to another: nats over all joints, and how many standard errors."""
-
-    near: float
-    near_sigmas: float
-    free: float
-    free_sigmas: float
-
-    @classmethod
-    def between(cls, before: Trial, after: Trial) -> "Gain":
-        """From one trial to another of the same blocks."""
-        free = _mean_and_sigmas(before.free - after.free)
-        if before.near is None or after.near is None:
-            return cls(*free, *free)
-        return cls(*_mean_and_sigmas(before.near - after.near), *free)
-
-
-def _mean_and_sigmas(fall: Array) -> tuple[float, float]:
-    """Mean over the blocks (blocks, joints), and its ratio to the standard error."""
-    blocks = np.sum(fall, axis=1)
-    error = float(np.std(blocks, ddof=1)) / np.sqrt(len(blocks))
-    mean = float(np.mean(blocks))
-    return mean, mean / max(error, 1e-9)
-
-
-def is_accepted(judge: Judge, before: Trial, after: Trial) -> bool:
-    """Whether the errors fall so far and so surely that a mistake may be named.
-
-    By geometry: no links explain what was recorded as well. By the links of the simulation: near them the reading is
-    about as good as any links make it, and as it stands it is much worse. Without a simulation links that bodies can
-    have decide where free ones leave it open.
-    """
-    gain, tuning = Gain.between(before, after), judge.tuning
-    if gain.near < tuning.min_gain:
-        return False
-    if gain.near_sigmas < tuning.min_sigmas:
-        if before.near is not None:
-            return False
-        bodies = Gain.between(judge.trial(before.reading, True), judge.trial(after.reading, True))
-        return bodies.free > tuning.min_gain and bodies.free_sigmas > tuning.min_body_sigmas
-    if gain.free >= tuning.min_free_gain and gain.free_sigmas >= tuning.min_sigmas:
-        return True
-    if before.near is None or gain.near < tuning.min_link_gain or gain.free < -tuning.max_free_loss:
-        return False
-    best = min(before.free_loss, after.free_loss)
-    return after.loss - best < tuning.max_open_gap * (before.loss - best)

@@ -227,12 +227,52 @@ def joint_names(arm: Arm) -> tuple[str, ...]:
     return tuple(joint.name for joint in arm.joints)
 
 
-RARE = ("link_data_error", "inertia_reference", "channel_order", "clock_error", "channel_skew")
+# threads in which a mistake of this kind was found and confirmed (docs/reading.md), and how many readings of it are
+# tried: of the whole arm, for each joint, and for each pair of joints
+THREADS_AND_READINGS = {
+    "torque_sign": (3, 1, 1, 0),
+    "joint_direction": (5, 0, 2, 0),
+    "channel_swap": (4, 0, 0, 3),
+    "channel_order": (6, 12, 0, 0),
+    "encoder_offset": (6, 0, len(ZERO_STEPS), 0),
+    "unit_error": (17, 6, 6, 0),
+    "gear_ratio": (5, 0, 2 * len(GEAR_RATIOS), 0),
+    "base_tilt": (6, 14, 0, 0),
+    "gravity_compensated_torque": (7, 1, 0, 0),
+    "dh_convention": (3, 1, 0, 0),
+    "inertia_reference": (3, 3, 0, 0),
+    "link_data_error": (11, 5, 5, 0),
+    "clock_error": (5, 13, 0, 0),
+    "time_delay": (2, 20, 0, 0),
+    "channel_skew": (3, 0, 20, 0),
+    SPRING: (1, 0, 1, 0),
+}
+# what has a joint to choose and gives it another motion: the best joint alone is the evidence
+OF_ONE_JOINT = ("joint_direction", "channel_swap", "channel_order", "encoder_offset", "gear_ratio")
 
 
-def is_rare(mistake: Mistake) -> bool:
-    """Whether a mistake comes after the others where they fit alike: it is rarer, or has more to choose."""
-    return mistake.effect in RARE
+def improbability(mistake: Mistake, joints: int) -> float:
+    """Nats by which a reading is less probable than one of the commonest kind, were that the only one of its kind.
+
+    A kind is as common as the threads in which it was found; its readings share that.
+    """
+    threads, arm, each, pair = THREADS_AND_READINGS[mistake.effect]
+    readings = arm + each * joints + pair * joints * (joints - 1) // 2
+    commonest = max(count for count, *_ in THREADS_AND_READINGS.values())
+    return float(np.log(readings * commonest / threads))
+
+
+def is_of_one_joint(mistake: Mistake) -> bool:
+    """Whether a mistake is told by one joint, which is chosen among all, and not by all joints together."""
+    single = mistake.joint is not None and mistake.effect in ("torque_sign", "unit_error")
+    return single or mistake.effect in OF_ONE_JOINT
+
+
+def torque_joints(mistake: Mistake) -> frozenset[int]:
+    """Joints (from 1) whose torque alone a mistake changes; 0 stands for all else, which it changes, too."""
+    if mistake.effect == "torque_sign" or mistake.form == TORQUE:
+        return frozenset(mistake.joints or (mistake.joint or 0,))
+    return frozenset({0})
 
 
 def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Reading:

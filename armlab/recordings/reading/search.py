@@ -5,13 +5,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from armlab.common.arrays import Array
 from armlab.recordings.reading import mistakes as table
-from armlab.recordings.reading.judge import Gain, Judge, Trial, is_accepted
+from armlab.recordings.reading.judge import Judge, Trial
 from armlab.recordings.reading.reading import Mistake, Reading
-from armlab.recordings.reading.singles import search_singles, with_springs
+from armlab.recordings.reading.singles import search_singles
 from armlab.recordings.reading.tuning import ReadingTuning
 
 
@@ -20,7 +18,7 @@ class Found:
     """What a search found. start: as it is read; best: read rightly, with its mistakes. without: read with all of them
     but one. rivals: of each mistake, other mistakes in its place that fit alike. margins: standard errors by which the
     next best reading with another one in its place is worse, 0 at least. undecided: joints (from 1) whose zeros
-    the data do not tell by quarters of a turn. tried: the best readings that were not accepted.
+    the data do not tell by quarters of a turn. doubts: readings that may not be named and cannot be excluded.
     """
 
     start: Trial
@@ -29,44 +27,44 @@ class Found:
     rivals: tuple[tuple[Trial, ...], ...] = ()
     margins: tuple[float, ...] = ()
     undecided: tuple[int, ...] = ()
-    tried: tuple[Trial, ...] = ()
+    doubts: tuple[Trial, ...] = ()
     looks: int = 0
 
 
 def find_mistakes(judge: Judge, start: Trial) -> Found:
-    """The mistakes of a reading, at most as many as the tuning allows."""
+    """The mistakes of a reading, at most as many as the tuning allows; none where all joints leave what is usual."""
     tuning = judge.tuning
-    least = reading_floor(start, tuning)
-    if start.loss - least < tuning.min_gain:
+    if judge.is_usual(start):
         return Found(start, start, looks=judge.looks[0])
     singles = search_singles(judge, start)
     best, beside = _extend(judge, start, singles)
-    limit = start.loss - tuning.min_refined_gain
-    if best is not start:
-        limit = min(limit, singles[0].loss + tuning.near_best)
-    for first in _distinct(singles, tuning.beam):
-        if first.loss > limit or first.reading.mistakes == best.reading.mistakes[:1]:
-            continue
-        if not _may_begin_pair(start, first, tuning):
-            continue
-        other, more = _extend(judge, first, search_singles(judge, first))
-        if other is not first and _is_better(other, best, tuning) and is_accepted(judge, start, other):
-            best, beside = other, more
+    if not judge.is_usual(best):
+        gross = judge.overall_error(start) > tuning.gross_error
+        for first in _distinct(singles, tuning.beam):
+            is_taken = first.reading.mistakes == best.reading.mistakes[:1]
+            if is_taken or not (judge.may_begin(start, first) or (gross and judge.may_explain(start, first))):
+                continue
+            other, more = _extend(judge, first, search_singles(judge, first))
+            if other is not first and _is_better(other, best, tuning) and judge.is_accepted(start, other):
+                best, beside = other, more
     if best is start:
-        return Found(start, start, tried=tuple(singles[: tuning.beam]), looks=judge.looks[0])
+        doubts = (each for each in _distinct(singles, tuning.beam) if judge.is_doubt(start, each))
+        return Found(start, start, doubts=tuple(doubts), looks=judge.looks[0])
     extended, best = best, _merge_at_joints(judge, start, best)
     without, lists = _in_each_place(judge, start, best, singles)
     for _ in range(tuning.max_mistakes):
         better = _better_in_place(judge, without, lists, best)
         if better is None:
             break
+        if better is start:
+            return Found(start, start, looks=judge.looks[0])
         best = better
         without, lists = _in_each_place(judge, start, best, singles)
     if best is not extended:
         beside = search_singles(judge, best)
     rivals = tuple(_rivals(judge, without[place], best, place, each) for place, each in enumerate(lists))
-    margins = tuple(_margin(best, place, each) for place, each in enumerate(lists))
-    return Found(start, best, without, rivals, margins, _undecided(beside, best, tuning), looks=judge.looks[0])
+    margins = tuple(_margin(judge, best, place, each) for place, each in enumerate(lists))
+    return Found(start, best, without, rivals, margins, _undecided(judge, beside, best), looks=judge.looks[0])
 
 
 def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
@@ -75,38 +73,10 @@ def _is_better(other: Trial, best: Trial, tuning: ReadingTuning) -> bool:
     return other.loss < best.loss - tuning.min_gain or (is_simpler and other.loss <= best.loss + tuning.rival_gain)
 
 
-def reading_floor(trial: Trial, tuning: ReadingTuning) -> float:
-    """The least loss that any reading can have."""
-    return math.log(tuning.smallest_error) * trial.reading.joints
-
-
-def _bad_joints(losses: Array, tuning: ReadingTuning) -> NDArray[np.bool_]:
-    """Which joints may hide a further mistake, of losses (blocks, joints)."""
-    return np.asarray(np.mean(losses, axis=0) > math.log(tuning.good_error))
-
-
-def _may_begin_pair(start: Trial, first: Trial, tuning: ReadingTuning) -> bool:
-    """Whether a second mistake is looked for beside one that may not be named alone.
-
-    It lowers the error of a bad joint, or it is sure in both views; else the reading explains the arm as it is.
-    """
-    gain = Gain.between(start, first)
-    sure = min(gain.near_sigmas, gain.free_sigmas) >= tuning.min_sigmas
-    return sure or _gain_at_bad(start, first, tuning) >= tuning.min_refined_gain
-
-
-def _gain_at_bad(before: Trial, after: Trial, tuning: ReadingTuning) -> float:
-    """How far the losses of bad joints fall, nats, in the view where they fall further."""
-    views = [(before.free, after.free)]
-    if before.near is not None and after.near is not None:
-        views.append((before.near, after.near))
-    return max(float(np.sum(np.mean(old - new, axis=0)[_bad_joints(old, tuning)])) for old, new in views)
-
-
 def _extend(judge: Judge, trial: Trial, singles: list[Trial]) -> tuple[Trial, list[Trial]]:
     """Takes the best accepted mistake, one after the other; the last list of single mistakes beside it."""
     while len(trial.reading.mistakes) < judge.tuning.max_mistakes:
-        accepted = next((each for each in singles if is_accepted(judge, trial, each)), None)
+        accepted = next((each for each in singles if judge.is_accepted(trial, each)), None)
         if accepted is None:
             break
         trial = accepted
@@ -130,8 +100,7 @@ def _in_each_place(
     singles: mistakes on top of the start.
     """
     without = _without_each(judge, start, best)
-    alone = [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
-    return without, [with_springs(judge, *each) for each in zip(without, alone, strict=True)]
+    return without, [singles] if len(without) == 1 else [search_singles(judge, each) for each in without]
 
 
 def _without_each(judge: Judge, start: Trial, best: Trial) -> tuple[Trial, ...]:
@@ -165,11 +134,12 @@ def _place(mistake: Mistake) -> str:
 
 def _better_in_place(judge: Judge, without: tuple[Trial, ...], lists: list[list[Trial]], best: Trial) -> Trial | None:
     """A reading that is better without a mistake, or with another in its place; a first step may have been wrong."""
-    for parent, singles in zip(without, lists, strict=True):
-        if parent.loss < best.loss:
+    for parent, singles, mistake in zip(without, lists, best.reading.mistakes, strict=True):
+        if not judge.is_accepted(parent, best, mistake):
             return parent
-        other = next((each for each in singles[: judge.tuning.beam] if is_accepted(judge, parent, each)), None)
-        if other is not None and other.loss < best.loss - judge.tuning.rival_gain:
+        nearest = (each for each in singles[: judge.tuning.beam] if each.loss < best.loss - judge.tuning.rival_gain)
+        other = next((each for each in nearest if judge.is_accepted(parent, each)), None)
+        if other is not None:
             return other
     return None
 
@@ -179,19 +149,23 @@ def _rivals(judge: Judge, without: Trial, best: Trial, place: int, singles: list
     tuning = judge.tuning
     out = {_name(best.reading.mistakes[place]): best}
     for each in singles:
-        name, gain = _name(each.reading.mistakes[-1]), Gain.between(each, best)
-        alike = gain.near < tuning.rival_gain or gain.near_sigmas < tuning.rival_sigmas
-        if gain.near <= tuning.max_rival_gain and alike and name not in out and is_accepted(judge, without, each):
+        name = _name(each.reading.mistakes[-1])
+        if each.loss - best.loss > tuning.max_rival_gain or name in out:
+            continue
+        view = judge.gain(each, best).near
+        if (view.gain < tuning.rival_gain or view.total_sigmas < tuning.rival_sigmas) and judge.is_accepted(
+            without, each
+        ):
             out[name] = each
     return tuple(out.values())[1:]
 
 
-def _margin(best: Trial, place: int, singles: list[Trial]) -> float:
+def _margin(judge: Judge, best: Trial, place: int, singles: list[Trial]) -> float:
     """Standard errors by which the next best reading with another mistake at one place is worse, accepted or not."""
     own = _name(best.reading.mistakes[place])
     others = [each for each in singles if _name(each.reading.mistakes[-1]) != own]
     second = min(others, key=lambda each: each.loss, default=None)
-    return math.inf if second is None else max(float(Gain.between(second, best).near_sigmas), 0.0)
+    return math.inf if second is None else max(judge.gain(second, best).near.total_sigmas, 0.0)
 
 
 def _name(mistake: Mistake) -> tuple[str, str]:
@@ -199,14 +173,15 @@ def _name(mistake: Mistake) -> tuple[str, str]:
     return mistake.label, mistake.form
 
 
-def _undecided(singles: list[Trial], best: Trial, tuning: ReadingTuning) -> tuple[int, ...]:
+def _undecided(judge: Judge, singles: list[Trial], best: Trial) -> tuple[int, ...]:
     """Joints whose zero may as well be a multiple of 90 degrees off."""
     out = set()
     for each in singles:
         mistake = each.reading.mistakes[-1]
-        if mistake.effect != "encoder_offset" or Gain.between(each, best).near >= tuning.rival_gain:
+        if mistake.effect != "encoder_offset" or each.loss - best.loss >= judge.tuning.max_rival_gain:
             continue
-        if abs(abs(mistake.value("offset")) % (np.pi / 2)) < 1e-9:
+        is_quarter = abs(abs(mistake.value("offset")) % (np.pi / 2)) < 1e-9
+        if is_quarter and judge.gain(each, best).near.gain < judge.tuning.rival_gain:
             out.add(mistake.joint or 0)
     return tuple(sorted(out))
 

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.recordings.differentiate import differentiate
+from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, ROWS_PER_CUTOFF, travel_bandwidth
+from armlab.recordings.differentiate import differentiate, resample_evenly
+from armlab.recordings.filters import Filter
 from armlab.recordings.reading.reading import Reading
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
@@ -18,17 +20,20 @@ class Channels:
     """Recorded channels, filtered, before any reading.
 
     motion: (rows, channels) of the positions. stamps: (rows,), s. run: (rows,), the number of the run. torques: of each
-    run all stamps (samples,) and torques (samples, channels). block: (rows,), the number of the block of time.
-    margin_s: how far torque can be shifted in time.
+    run all stamps (samples,) and torques (samples, channels). velocities: of each run, all samples (samples, channels),
+    with the filter and the samples that became rows. block: (rows,), the number of the block of time. margin_s: how far
+    torque can be shifted in time.
     """
 
     motion: Motion
     stamps: Array
     run: NDArray[np.intp]
     torques: tuple[tuple[Array, Array], ...]
+    velocities: tuple[tuple[Array, Filter, NDArray[np.intp]], ...]
     block: NDArray[np.intp]
     margin_s: float
     _shifted: dict[float, Array] = field(default_factory=dict)
+    _signs: dict[bytes, Array] = field(default_factory=dict)
 
     @property
     def rows(self) -> int:
@@ -51,6 +56,32 @@ class Channels:
                     out[own, channel] = np.interp(self.stamps[own] + shift_s, known, signal)
             self._shifted[key] = out
         return self._shifted[key]
+
+    def sign_of_velocity(self, reading: Reading, width: float) -> Array:
+        """Signs of the velocities of the joints, (rows, joints), behind the low-pass that the torque passed.
+
+        width: of its top speed, where a joint's sign is taken for full.
+        """
+        out = np.empty((self.rows, reading.joints))
+        for joint, row in enumerate(reading.position):
+            direction = np.zeros(self.motion.position.shape[1])
+            direction[list(reading.position_order)] = row
+            out[:, joint] = self._sign_along(direction / (np.abs(direction).max() or 1.0), width)
+        return out
+
+    def _sign_along(self, direction: Array, width: float) -> Array:
+        """The same of a sum of channels; opposite directions share one computation."""
+        side = 1.0 if direction[np.argmax(np.abs(direction))] > 0 else -1.0
+        key = (side * direction).tobytes()
+        if key not in self._signs:
+            speeds = [velocity @ (side * direction) for velocity, _, _ in self.velocities]
+            top = max(float(np.abs(each).max()) for each in speeds) or 1.0
+            parts = [
+                low_pass.smooth(np.tanh(speed / (width * top))[:, None])[rows, 0]
+                for speed, (_, low_pass, rows) in zip(speeds, self.velocities, strict=True)
+            ]
+            self._signs[key] = np.concatenate(parts)
+        return side * self._signs[key]
 
     def read_motion(self, reading: Reading) -> Motion:
         """Motion of the joints, (rows, joints)."""
@@ -81,11 +112,14 @@ def thin_channels(recording: Recording, tuning: ReadingTuning) -> Channels | Non
         return None
     margin = min(tuning.max_delay_s, *(tuning.max_delay_share * _length(run) for run in runs))
     whole_s = sum(_length(run) for run in runs)
-    step_s = whole_s / tuning.max_rows
-    motions, stamps, numbers, torques, blocks = [], [], [], [], []
+    evens = [resample_evenly(run) for run in runs]
+    cutoffs = [_cutoff_hz(run) for run in evens]
+    told = ROWS_PER_CUTOFF * sum(cutoff * _length(run) for cutoff, run in zip(cutoffs, evens, strict=True))
+    step_s = whole_s / np.clip(told, tuning.blocks * tuning.min_rows, tuning.max_rows)
+    motions, stamps, numbers, torques, velocities, blocks = [], [], [], [], [], []
     first = 0
-    for number, run in enumerate(runs):
-        signals = differentiate(run)
+    for number, (run, cutoff) in enumerate(zip(evens, cutoffs, strict=True)):
+        signals = differentiate(run, cutoff_hz=cutoff)
         time = signals.run.time
         inside = signals.filter.rows
         low, high = time[inside][0] + margin, time[inside][-1] - margin
@@ -95,17 +129,33 @@ def thin_channels(recording: Recording, tuning: ReadingTuning) -> Channels | Non
         motions.append(Motion(raw, motion.velocity[rows] @ undo, motion.acceleration[rows] @ undo))
         stamps.append(time[rows])
         numbers.append(np.full(len(rows), number))
+        velocities.append((motion.velocity @ undo, signals.filter, rows))
         torques.append((time, signals.filter.smooth(signals.run.torque) @ undo_torque))
         count = int(np.clip(round(tuning.blocks * _length(run) / whole_s), 1, len(rows)))
         blocks.append(first + np.arange(len(rows)) * count // len(rows))
         first += count
     motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))
     return Channels(
-        motion, np.concatenate(stamps), np.concatenate(numbers), tuple(torques), np.concatenate(blocks), margin
+        motion,
+        np.concatenate(stamps),
+        np.concatenate(numbers),
+        tuple(torques),
+        tuple(velocities),
+        np.concatenate(blocks),
+        margin,
     )
 
 
 _MOTION = ("position", "velocity", "acceleration")
+
+
+def _cutoff_hz(run: Run) -> float:
+    """Of a mistake in the reading all of the motion tells: harmonics of it suffice, and torque above them is noise."""
+    wanted = max(HARMONICS_KEPT * travel_bandwidth(run.position, run.rate_hz), MIN_CUTOFF_PERIODS / _length(run))
+    return min(wanted, MAX_CUTOFF_SHARE * run.rate_hz)
+
+
+HARMONICS_KEPT = 5  # of the bandwidth of the motion: what friction at reversals needs
 
 
 def _length(run: Run) -> float:

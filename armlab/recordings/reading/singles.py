@@ -8,35 +8,34 @@ from scipy.optimize import minimize, minimize_scalar
 
 from armlab.common.arrays import Array
 from armlab.recordings.reading import mistakes as table
-from armlab.recordings.reading.judge import Gain, Judge, Trial
+from armlab.recordings.reading.judge import Judge, Trial
 from armlab.recordings.reading.mistakes import joint_names
 from armlab.recordings.reading.reading import Reading
 
 
 def search_singles(judge: Judge, start: Trial) -> list[Trial]:
-    """Every mistake alone on top of a reading, refined, the best first."""
+    """Every mistake alone on top of a reading, refined, and springs of its joints beside them, the best first."""
     reading = start.reading
     absurd = judge.fitter.implausible(reading)
+    quiet = judge.usual_joints(start)
     found = [
         judge.trial(each)
         for each in _exact(judge, reading)
-        if judge.is_size_plausible(reading, each) and judge.fitter.implausible(each) <= absurd
+        if not table.torque_joints(each.mistakes[-1]) <= quiet
+        and judge.is_size_plausible(reading, each)
+        and judge.fitter.implausible(each) <= absurd
     ]
     found += _zeros(judge, start)
     found += _gravities(judge, start)
     found += _delays(judge, start)
     found += _clocks(judge, start)
     found += _gears(judge, start)
+    found += [judge.trial(each) for each in table.springs(reading)]
     return sorted(found, key=partial(_rank, judge))
 
 
-def with_springs(judge: Judge, start: Trial, singles: list[Trial]) -> list[Trial]:
-    """Mistakes on top of a reading, and springs of its joints in their place, the best first."""
-    return sorted([*singles, *(judge.trial(each) for each in table.springs(start.reading))], key=partial(_rank, judge))
-
-
 def _rank(judge: Judge, trial: Trial) -> float:
-    return trial.loss + judge.tuning.rare_loss * table.is_rare(trial.reading.mistakes[-1])
+    return trial.loss + judge.improbability(trial.reading)
 
 
 def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
@@ -116,8 +115,8 @@ def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float
     off = abs(_half_turn(angle - np.rad2deg(turned.reading.mistakes[-1].value("offset"))))
     if off < judge.tuning.quarter_tolerance_deg:
         return True
-    gain = Gain.between(turned, refined)
-    doubtful = gain.near < judge.tuning.min_quarter_gain or gain.near_sigmas < judge.tuning.min_sigmas
+    view = judge.gain(turned, refined).near
+    doubtful = view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.min_sigmas
     return off < judge.tuning.quarter_reach_deg and doubtful
 
 
@@ -150,8 +149,8 @@ def _is_level(judge: Judge, coarse: list[Trial], refined: Trial) -> bool:
     for each in coarse:
         axis = np.array(each.reading.arm.gravity)
         if np.count_nonzero(axis) == 1 and angle_between(own, axis) < judge.tuning.level_reach_deg:
-            gain = Gain.between(each, refined)
-            return gain.near < judge.tuning.min_quarter_gain or gain.near_sigmas < judge.tuning.min_sigmas
+            view = judge.gain(each, refined).near
+            return view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.min_sigmas
     return False
 
 
@@ -168,7 +167,8 @@ def _delays(judge: Judge, start: Trial) -> list[Trial]:
         return []
     shifts = np.geomspace(least, margin, judge.tuning.delay_steps)
     out = []
-    for joint in (None, *(range(start.reading.joints) if start.reading.joints > 1 else ())):
+    others = [joint for joint in range(start.reading.joints) if joint + 1 not in judge.usual_joints(start)]
+    for joint in (None, *(others if start.reading.joints > 1 else ())):
 
         def make(seconds: float, joint: int | None = joint) -> Reading:
             return table.late_torque(start.reading, joint, seconds)

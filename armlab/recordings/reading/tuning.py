@@ -9,7 +9,8 @@ from armlab.common.tuning import tuned
 class ReadingTuning:
     """How readings of the recording and of the robot file are compared, and when a mistake is named."""
 
-    max_rows: int = tuned(700, unit="rows", meaning="instants of all runs that are fitted", least=50)
+    max_rows: int = tuned(350, unit="rows", meaning="instants of all runs that are fitted", least=50)
+    min_rows: int = tuned(16, unit="rows a block", meaning="instants that are fitted at least", least=2)
     blocks: int = tuned(
         20, unit="blocks", meaning="blocks of time of all runs, of which every second is held out", least=4
     )
@@ -22,7 +23,7 @@ class ReadingTuning:
         1e8, meaning="condition number above which a transmission cannot be undone", least=1.0
     )
     smallest_error: float = tuned(
-        0.03,
+        0.01,
         unit="of the torque's scatter",
         meaning="errors below it are no reason to read a recording otherwise: noise, links and friction leave as much",
     )
@@ -73,7 +74,7 @@ class ReadingTuning:
     min_delay_s: float = tuned(
         0.02, unit="s", meaning="torque that is less late is physics", source="the contract of findings", least=1e-4
     )
-    delay_steps: int = tuned(10, unit="values", meaning="delays that are tried each way", least=2)
+    delay_steps: int = tuned(7, unit="values", meaning="delays that are tried each way", least=2)
     max_clock_factor: float = tuned(2.5, meaning="clocks that are tried run so many times too fast or slow", least=1.01)
     min_clock_factor: float = tuned(1.05, meaning="a clock that is less wrong is not looked for", least=1.001)
     clock_steps: int = tuned(13, unit="values", meaning="clocks that are tried", least=3)
@@ -88,26 +89,32 @@ class ReadingTuning:
         source="development: recordings without a mistake reach 0.1 (simulated) and 0.4 (a friction damper with play)",
     )
     min_sigmas: float = tuned(3.5, unit="standard errors", meaning="the same, between blocks of time")
-    min_body_sigmas: float = tuned(
-        2.8,
-        unit="standard errors",
-        meaning="the same for links that bodies can have, of a robot file without links",
-        source="set after a look at the UR10, which reaches 1.7 read rightly",
+    usual_error: float = tuned(
+        0.05,
+        unit="of the torque's scatter",
+        meaning="no other reading is looked for where links and usual friction leave less of every joint",
     )
-    min_free_gain: float = tuned(
-        0.3, unit="nats", meaning="the same with free links, for a mistake that no links explain"
+    gross_error: float = tuned(
+        0.4,
+        unit="of the torque's scatter",
+        meaning="of all joints, from which on two mistakes are looked for of which none explains much alone",
     )
-    min_link_gain: float = tuned(
-        0.6, unit="nats", meaning="fall near the links of the simulation, for a mistake that other links would explain"
+    least_factor: float = tuned(
+        2.0, meaning="by which the error of some joint falls with a mistake taken back, for a mistake that is named"
     )
-    max_free_loss: float = tuned(0.1, unit="nats", meaning="how much worse free links may fit beside such a mistake")
+    least_total_factor: float = tuned(
+        1.5, meaning="by which the errors of all joints together fall, for a mistake that has no joint to choose"
+    )
+    small_rise: float = tuned(1.05, meaning="by which the error of no other joint may rise surely")
+    large_rise: float = tuned(1.5, meaning="by which the error of no other joint may rise, surely or not")
+    rise_sigmas: float = tuned(2.5, unit="standard errors", meaning="what makes a rise sure")
+    max_left: float = tuned(
+        0.5, unit="of the torque's scatter", meaning="what the joint that shows a mistake leaves without it at most"
+    )
     max_open_gap: float = tuned(
         0.25,
         unit="of the gap",
         meaning="what such a mistake leaves of the gap between the links of the simulation and free ones",
-    )
-    good_error: float = tuned(
-        0.3, unit="of the torque's scatter", meaning="a joint with a larger error may hide a further mistake"
     )
     beam: int = tuned(4, unit="readings", meaning="single mistakes that a second one is looked for beside", least=1)
     max_mistakes: int = tuned(3, unit="mistakes", meaning="most mistakes of a recording", least=1)
@@ -132,7 +139,6 @@ class ReadingTuning:
     min_slope_likeness: float = tuned(
         0.9, meaning="correlation and slope from which on a recorded velocity confirms the clock", most=0.999
     )
-    near_best: float = tuned(2.0, unit="nats", meaning="single mistakes so near to the best one are pursued as well")
     quarter_reach_deg: float = tuned(
         30.0,
         unit="deg",
@@ -166,13 +172,6 @@ class ReadingTuning:
     )
     least_standstill_share: float = tuned(
         0.2, meaning="a joint that holds less of its gravity torque at standstill is read wrongly"
-    )
-    rare_loss: float = tuned(0.03, unit="nats", meaning="what a rare mistake has to fit better than a common one")
-    max_read_error: float = tuned(
-        0.22,
-        unit="of the torque's scatter",
-        meaning="what a corrected recording leaves at most, geometric mean over joints; else no correction is made",
-        source="public arms read rightly leave 0.05 to 0.15; a robot file of another arm 0.3 at its best reading",
     )
     level_reach_deg: float = tuned(
         10.0,
