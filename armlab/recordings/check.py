@@ -56,7 +56,15 @@ def signs_of_wrong_reading(recording: Recording) -> tuple[Finding, ...]:
         found += [*run.findings, *check_channels(run, recording.arm)]
     links = recording.arm.parameters if recording.arm.links is not None else None
     found += compare_standstill(recording, links, ReadingTuning())
-    kinds = ("joint_names", "rate", "beyond_limits", "velocity_mismatch", "standstill")
+    kinds = (
+        "joint_names",
+        "rate",
+        "beyond_limits",
+        "velocity_mismatch",
+        "standstill",
+        "encoder_period",
+        "unsigned_current",
+    )
     first = {(each.kind, each.joint): each for each in reversed(found) if each.kind in kinds}
     return tuple(reversed(first.values()))
 

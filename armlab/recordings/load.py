@@ -23,6 +23,7 @@ from armlab.recordings.repair import (
     leave_out,
     sort_rows,
     split_at_gaps,
+    read_direction_bit,
     unwrap_encoders,
 )
 from armlab.recordings.stamps import drop_repeated_rows, repair_stamps
@@ -98,7 +99,10 @@ def repair_run(
     """The run without bad rows, repaired and on the joint side; several if its clock steps back or pauses."""
     run = leave_out(fill_optional_signals(drop_duplicate_rows(sort_rows(run))), entry.exclude)
     angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in units.items()}
-    sound = (unwrap_encoders(repair_stamps(drop_repeated_rows(part)), angles) for part in split_at_gaps(run))
+    sound = (
+        unwrap_encoders(repair_stamps(drop_repeated_rows(part)), angles)
+        for part in split_at_gaps(read_direction_bit(run))
+    )
     joints = (to_joint_side(part, transmission) for part in sound)
     return tuple(check_rate(part, file.sample_rate_hz) for part in joints)
 

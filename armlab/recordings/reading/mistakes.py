@@ -8,6 +8,7 @@
 | unit_error, gear_ratio | factors between usual units, and ratios of gears |
 | base_tilt, gravity_compensated_torque | gravity along the axes and diagonals, then refined; no gravity |
 | dh_convention, inertia_reference, link_data_error | other meanings of the numbers of the robot file |
+| axis_coupling | a column that counts the sum or the difference of two joints in a row, with and without its torque |
 | clock_error, time_delay, channel_skew | factors of time and shifts of torque, then refined |
 
 Springs of joints stand beside them. They are physics, but a wrong reading may fit an arm that has one better.
@@ -65,6 +66,32 @@ def exchanges(reading: Reading, names: tuple[str, ...]) -> Iterator[Reading]:
             for form in (POSITION, TORQUE, BOTH):
                 mistake = Mistake("channel_order", joints=tuple(each + 1 for each in order), form=form)
                 yield reading.reorder(order, form).with_mistake(mistake)
+
+
+def couplings(reading: Reading) -> Iterator[Reading]:
+    """Columns that count a joint and the one before it together: motors that sit on the base, wrists, pendants.
+
+    raw_b = q_b + s q_a, where the motor drives both: tau_a = T_a + s T_b (both do the same work).
+    """
+    for joint in range(1, reading.joints):
+        for sign in (1.0, -1.0):
+            for form in (POSITION, BOTH):
+                yield axis_coupling(reading, joint, sign, form)
+
+
+def axis_coupling(reading: Reading, joint: int, sign: float, form: str) -> Reading:
+    """The reading of a column that counts a joint (from 0) plus `sign` times the one before it."""
+    position, torque = reading.position.copy(), reading.torque.copy()
+    position[joint] -= sign * position[joint - 1]
+    if form == BOTH:
+        torque[joint - 1] += sign * torque[joint]
+    parameters = (
+        ("factor", sign, ""),
+        ("position", tuple(position.ravel().tolist()), ""),
+        ("torque", tuple(torque.ravel().tolist()), ""),
+    )
+    mistake = Mistake("axis_coupling", joints=(joint, joint + 1), form=form, parameters=parameters)
+    return replace(reading, position=position, torque=torque).with_mistake(mistake)
 
 
 def unit_error(reading: Reading, joint: int | None, form: str, factor: float) -> Reading:
@@ -234,6 +261,7 @@ THREADS_AND_READINGS = {
     "joint_direction": (5, 0, 2, 0),
     "channel_swap": (4, 0, 0, 3),
     "channel_order": (6, 12, 0, 0),
+    "axis_coupling": (9, 0, 4, 0),
     "encoder_offset": (6, 0, len(ZERO_STEPS), 0),
     "unit_error": (17, 6, 6, 0),
     "gear_ratio": (5, 0, 2 * len(GEAR_RATIOS), 0),
@@ -248,7 +276,7 @@ THREADS_AND_READINGS = {
     SPRING: (1, 0, 1, 0),
 }
 # what has a joint to choose and gives it another motion: the best joint alone is the evidence
-OF_ONE_JOINT = ("joint_direction", "channel_swap", "channel_order", "encoder_offset", "gear_ratio")
+OF_ONE_JOINT = ("joint_direction", "axis_coupling", "channel_swap", "channel_order", "encoder_offset", "gear_ratio")
 
 
 def improbability(mistake: Mistake, joints: int) -> float:
@@ -285,6 +313,8 @@ def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Readi
         return spring(reading, joint or 0)
     if mistake.effect == "encoder_offset":
         return encoder_offset(reading, joint or 0, mistake.value("offset"))
+    if mistake.effect == "axis_coupling":
+        return axis_coupling(reading, mistake.joints[1] - 1, mistake.value("factor"), mistake.form)
     if mistake.effect == "unit_error":
         return unit_error(reading, joint, mistake.form, mistake.value("factor"))
     if mistake.effect == "gear_ratio":

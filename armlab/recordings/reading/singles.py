@@ -41,6 +41,7 @@ def _rank(judge: Judge, trial: Trial) -> float:
 def _exact(judge: Judge, reading: Reading) -> Iterable[Reading]:
     yield from table.signs(reading)
     yield from table.exchanges(reading, joint_names(reading.arm))
+    yield from table.couplings(reading)
     for each in table.units(reading):
         if not (judge.clock_is_right and each.clock != reading.clock):
             yield each

@@ -12,6 +12,8 @@ NAMES = {
     "joint_direction": "a joint that counts the other way round",
     "channel_swap": "exchanged columns",
     "channel_order": "columns in another order",
+    "axis_coupling": "a column that counts two joints",
+    "unsigned_current": "a current without its sign",
     "unit_error": "another unit",
     "gear_ratio": "recorded on the other side of a gear",
     "encoder_offset": "a wrong zero",
@@ -34,6 +36,8 @@ MEASUREMENTS = {
     "position has to grow",
     "channel_swap": "move one joint alone: the column that changes is its own",
     "channel_order": "move one joint alone: the column that changes is its own",
+    "axis_coupling": "move one joint alone: the columns that change are those that count it",
+    "unsigned_current": "log the current with its sign, or its direction bit",
     "unit_error": "turn a joint by a known angle, or hold a known load, and compare with the numbers of the file",
     "gear_ratio": "turn {joint} by a known angle and compare with its position",
     "encoder_offset": "drive {joint} to the zero of the drawing and read its position",
@@ -69,6 +73,13 @@ def describe(mistake: Mistake, arm: Arm) -> str:
     }
     if mistake.effect in texts:
         return texts[mistake.effect]
+    if mistake.effect == "unsigned_current":
+        return "the recorded current has no sign: it is a magnitude"
+    if mistake.effect == "axis_coupling":
+        first, second = (joint_in_words(arm, each) for each in mistake.joints)
+        how = "plus" if mistake.value("factor") > 0 else "less"
+        also = ", and its torque acts on both" if form != "position" else ""
+        return f"the position column of {second} counts {second} {how} {first}{also}"
     value = float(np.sum(next(iter(numbers.values()), 0.0)))
     if mistake.effect == "base_tilt":
         gravity = ", ".join(f"{each:.2f}" for each in np.atleast_1d(np.array(numbers["gravity"])))
