@@ -96,7 +96,7 @@ def diagnose(
     if setup is not None:
         recording = setup.recording
         signs += tuple(each.finding for each in setup.doubts)
-    if only_setup:
+    if only_setup or (setup is not None and setup.is_lost):
         return with_setup(replace(_reading_alone(recording, baseline, settings, setup), signs=signs), setup, read_after)
     design = prepare(recording, baseline, settings, progress)
     if isinstance(design, Diagnosis):
@@ -134,7 +134,7 @@ def _reading_alone(
     """What is said where physics is not asked. setup: how the recording is to be read, if that was asked."""
     simulation = read_simulation(recording, baseline)
     reason = reason_unusable(recording, settings.tuning.soundness)
-    if reason is None and setup is not None and setup.looks == 0:
+    if reason is None and setup is not None and setup.looks == 0 and not setup.is_lost:
         reason = TOO_SHORT_TO_READ
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason)

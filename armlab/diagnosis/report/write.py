@@ -157,7 +157,7 @@ def diagnose_recording(
         yield "no table of joints: nothing was found"
     if moved is not None:
         yield moved
-    if diagnosis.setup is not None and diagnosis.setup.findings:
+    if diagnosis.setup is not None and diagnosis.setup.reading is not None:
         yield f"corrected: {out / CORRECTED_FOLDER} holds the recording and the robot as they should be"
     if diagnosis.seconds:
         asked = f", {diagnosis.setup_seconds:.1f} s of it how it is to be read" if diagnosis.setup else ""

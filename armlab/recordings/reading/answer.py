@@ -11,6 +11,7 @@ from armlab.recordings.reading.judge import Judge
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
 from armlab.recordings.reading.search import Found, find_mistakes
 from armlab.recordings.reading.signals import thin_channels
+from armlab.recordings.reading.signs import has_no_sign
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement
 from armlab.recordings.recording import Finding, Recording
@@ -64,6 +65,8 @@ class SetupFinding:
     @property
     def text(self) -> str:
         """What is wrong, and the evidence."""
+        if self.mistake.effect == UNSIGNED:
+            return self.description
         worst = joint_in_words(self.arm, self.worst_joint)
         return (
             f"{self.description} (read so, links and usual friction fit {worst} with an error of "
@@ -107,11 +110,18 @@ class Answer:
     looks: int = 0
 
     @property
+    def is_lost(self) -> bool:
+        """Whether there is a mistake that nothing takes back: physics cannot be told from what was recorded."""
+        return any(each.mistake.effect == UNSIGNED for each in self.findings)
+
+    @property
     def sentence(self) -> str:
         """The findings in a sentence; empty where there is none."""
         if not self.findings:
             return ""
         mistakes = "; ".join(each.description for each in self.findings)
+        if self.is_lost:
+            return f"The recording is read wrongly: {mistakes}. Links and friction cannot be told from it."
         zeros = joints_in_words(self.recording.arm, self.undecided) if self.undecided else ""
         open_zeros = f" These data do not tell the zero of {zeros} by quarters of a turn." if zeros else ""
         return (
@@ -125,6 +135,8 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
 
     inertial: (10 * joints,) of the links of the simulation, None without one. Base parameters alone are no links.
     """
+    if has_no_sign(recording):
+        return Answer((_unsigned(recording),), recording, None)
     inertial = inertial if inertial is not None and are_bodies(inertial) else None
     channels = thin_channels(recording, tuning)
     if channels is None:
@@ -147,11 +159,20 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     return Answer(findings, corrected, found.best.reading, share, after, zeros, doubts, found.looks)
 
 
+def _unsigned(recording: Recording) -> SetupFinding:
+    """The finding that a current has no sign. Its errors are the torque itself: nothing is fitted to it."""
+    size = float(np.sqrt(np.mean(np.concatenate([run.torque[:, 0] for run in recording.runs]) ** 2)))
+    mistake = Mistake(UNSIGNED, form="magnitude")
+    measure = measurement(UNSIGNED, None, recording.arm)
+    return SetupFinding(mistake, recording.arm, 1, size, size, 1.0, 1.0, np.inf, 1.0, (), measure)
+
+
 def _doubt(mistake: Mistake, arm: Arm) -> Doubt:
     joints = mistake.joints or (() if mistake.joint is None else (mistake.joint,))
     return Doubt(mistake.effect, joints, describe(mistake, arm), measurement(mistake.effect, mistake.joint, arm))
 
 
+UNSIGNED = "unsigned_current"
 LEAST_TOLD = 0.5  # probability below which nothing is stated (the contract of verdicts)
 SMALLEST_SHARE = 1e-9  # of a joint that stands still
 

@@ -32,6 +32,24 @@ def compare_joint_names(columns: Sequence[str], arm: Arm, signal: str) -> tuple[
     return tuple(out)
 
 
+def has_no_sign(recording: Recording) -> bool:
+    """Whether all torques are sizes without a sign: none is ever negative, and each comes down to zero again and again.
+
+    A joint that only carries a load has torque of one sign; a joint that moves to and fro against friction has not.
+    """
+    torques = np.concatenate([run.torque for run in recording.runs])
+    peak = np.abs(torques).max(axis=0)
+    if not peak.all() or torques.min() < 0:
+        return False
+    low = torques < LOW_SHARE * peak
+    touches = np.sum(low[1:] & ~low[:-1], axis=0)
+    return bool(np.all(touches >= MIN_TOUCHES))
+
+
+LOW_SHARE = 0.05  # of the largest torque: what counts as zero
+MIN_TOUCHES = 4  # times that a torque comes down to zero
+
+
 def compare_standstill(recording: Recording, inertial: Array | None, tuning: ReadingTuning) -> tuple[Finding, ...]:
     """Warnings where the torque at standstill is not that which the links of the simulation need against gravity."""
     if inertial is None:
