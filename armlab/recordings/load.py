@@ -21,9 +21,9 @@ from armlab.recordings.repair import (
     drop_duplicate_rows,
     fill_optional_signals,
     leave_out,
+    read_direction_bit,
     sort_rows,
     split_at_gaps,
-    read_direction_bit,
     unwrap_encoders,
 )
 from armlab.recordings.stamps import drop_repeated_rows, repair_stamps
