@@ -8,6 +8,7 @@ from click.testing import CliRunner
 
 from armlab.cli.main import main
 from armlab.common.errors import InputError
+from armlab.diagnosis import ablation
 from armlab.diagnosis.ablation import ALL_ON, GUARDS_AFTER_SEARCH, GUARDS_IN_SEARCH, diagnose_without_each
 from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.result import Diagnosis
@@ -31,16 +32,43 @@ def _told(found: Diagnosis) -> list[tuple[str, int | None, str]]:
     return [(each.effect, each.joint, each.equation) for each in found.claims]
 
 
-def test_stages_that_a_guard_or_a_number_has_no_part_in_need_not_be_done_again() -> None:
+LATE, EARLY = "pruning.least_gain=1e9", "data.rows_per_cutoff=3"  # used after the search, and before it
+
+
+def test_each_guard_is_off_once_and_no_stage_before_its_own_is_done_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    stages = {
+        "prepare": lambda *_: "design",
+        "fit_background": lambda *_: ("background",),
+        "_with_settings": lambda each, settings: (*each, settings),
+        "search_effects": lambda each, _: (*each, "search"),
+        "conclude": lambda recording, each, _: each,
+        "diagnose": lambda recording, settings: ("all", settings),
+    }
+    for name, stage in stages.items():
+        monkeypatch.setattr(ablation, name, stage)
+    still = cases.recording(lambda motion, time: 0 * motion.velocity, seconds=1.0)
+    found = dict(diagnose_without_each(still, (LATE, EARLY)))
+    assert list(found) == [ALL_ON, *GUARDS, LATE, EARLY]
+    assert found.pop(ALL_ON) == ("background", "search")
+    changed = {change: vary(Settings(), *parse_change(change)) for change in (LATE, EARLY)}
+    for name, done in found.items():
+        off = changed[name] if name in changed else Settings(guards=guards_without([name]))
+        if name in (*GUARDS_AFTER_SEARCH, LATE):
+            assert done == ("background", "search", off), name
+        elif name in GUARDS_IN_SEARCH:
+            assert done == ("background", off, "search"), name
+        else:
+            assert done == ("all", off), name
+
+
+def test_stages_that_a_guard_or_a_number_has_no_part_in_need_not_be_done_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    guards = (GUARDS_AFTER_SEARCH[2], GUARDS_IN_SEARCH[0])
+    monkeypatch.setattr(ablation, "GUARDS", guards)
     recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
-    late, early = "pruning.least_gain=1e9", "data.rows_per_cutoff=3"  # used after the search, and before it
-    found = dict(diagnose_without_each(recording, (late, early)))
-    assert list(found) == [ALL_ON, *GUARDS, late, early]
-    for change in (late, early):
-        alone = diagnose(recording, settings=vary(Settings(), *parse_change(change)))
-        assert _told(found[change]) == _told(alone), change
+    found = dict(diagnose_without_each(recording, (LATE,)))
+    assert _told(found[LATE]) == _told(diagnose(recording, settings=vary(Settings(), *parse_change(LATE))))
     assert _told(found[ALL_ON]) == _told(diagnose(recording))
-    for guard in (GUARDS_AFTER_SEARCH[2], GUARDS_IN_SEARCH[0]):
+    for guard in guards:
         alone = diagnose(recording, settings=Settings(guards=guards_without([guard])))
         assert _told(found[guard]) == _told(alone), guard
 
