@@ -689,7 +689,7 @@ def test_bad_input_is_inconclusive_with_a_reason_in_one_line(tmp_path: Path, dam
 
 def test_an_integral_that_acts_on_more_velocity_than_kp_holds_is_refused(tmp_path: Path) -> None:
     controller = {"type": "pd", "kp": [8.0, 8.0], "kd": [0.0, 0.0], "ki": [1.0, 1.0], "ki_speed": [0.5, 8.0]}
-    folder = write_recording(tmp_path / "cascade", {}, seconds=SECONDS, controller=controller)
+    folder = write_recording(tmp_path / "cascade", {}, seconds=4.0, controller=controller)
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(tmp_path / "out")])
     assert result.exit_code != 0
     assert "controller.ki_speed" in result.output
@@ -772,7 +772,7 @@ def test_a_joint_that_does_not_carry_the_tool_says_nothing_of_a_mass_there(soft:
 
 
 def test_a_delay_that_no_joint_has_of_its_own_is_one_number_of_all(tmp_path: Path) -> None:
-    recording = load_motion_recording(write_recording(tmp_path / "late", {"delay": 0.006}, seconds=20.0))
+    recording = load_motion_recording(write_recording(tmp_path / "late", {"delay": 0.006}, seconds=10.0))
     runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
     start = simulation.nominal.values.copy()
     start[:, COMMON_DELAY.place] = 0.006
@@ -791,7 +791,7 @@ def test_a_delay_that_no_joint_has_of_its_own_is_one_number_of_all(tmp_path: Pat
 
 
 def test_a_delay_of_all_commands_is_named_at_each_joint_of_coarse_encoders(tmp_path: Path) -> None:
-    folder = write_recording(tmp_path / "late", {"delay": 0.006}, seconds=20.0)
+    folder = write_recording(tmp_path / "late", {"delay": 0.006}, seconds=10.0)
     coarse = 2 * np.pi / 256
     for file in folder.glob("run-*.csv"):
         table = pd.read_csv(file)
@@ -821,8 +821,8 @@ def test_an_arm_text_has_the_numbers_that_it_is_given() -> None:
 
 
 def test_a_comparison_names_the_gain_that_was_raised_and_nothing_else(tmp_path: Path) -> None:
-    old = write_recording(tmp_path / "old", TRUTH, seconds=10.0)
-    new = write_recording(tmp_path / "new", {**TRUTH, "kp": 16.0}, seconds=10.0)
+    old = write_recording(tmp_path / "old", TRUTH, seconds=6.0)
+    new = write_recording(tmp_path / "new", {**TRUTH, "kp": 16.0}, seconds=6.0)
     comparison = compare_motion(load_motion_recording(old), load_motion_recording(new))
     assert {(each.parameter.key, each.joint) for each in comparison.changed} == {("kp", 1), ("kp", 2)}
     for each in comparison.changed:
