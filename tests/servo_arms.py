@@ -34,7 +34,7 @@ ARM = """<mujoco model="two-joint">
 </mujoco>
 """
 NOMINAL = {"damping": 0.1, "frictionloss": 0.02, "armature": 0.01, "kp": 60, "kv": 0.3, "limit": 3.0}
-COUNT = 2 * np.pi / 4096
+COUNTS = 4096  # of an encoder, a turn
 RATE_HZ = 50.0
 
 
@@ -61,8 +61,9 @@ def simulate(
     offset: float = 0.0,
     dead_band: float = 0.0,
     read_late: float = 0.0,
+    counts: int = COUNTS,
 ) -> np.ndarray:
-    """Positions (samples, 2) that encoders of 4096 counts read; the command is held between samples and late.
+    """Positions (samples, 2) that encoders read; the command is held between samples and late.
 
     read_late: of the second joint after the first one, s.
     """
@@ -81,10 +82,13 @@ def simulate(
         wanted = stream[number] + offset - data.qpos
         data.ctrl[:] = data.qpos + np.sign(wanted) * np.maximum(np.abs(wanted) - dead_band / 2, 0)
         mujoco.mj_step(model, data)
-    return np.round(np.array(read) / COUNT) * COUNT
+    step = 2 * np.pi / counts
+    return np.round(np.array(read) / step) * step
 
 
-def write_recording(folder: Path, truth: dict[str, float] | None = None, seconds: float = 40.0, **changes: Any) -> Path:
+def write_recording(
+    folder: Path, truth: dict[str, float] | None = None, seconds: float = 40.0, counts: int = COUNTS, **changes: Any
+) -> Path:
     """A recording of the arm with other numbers; its simulation is the nominal MJCF. changes: keys of its YAML."""
     numbers = dict(truth or {})
     drive = {name: numbers.pop(name, 0.0) for name in ("delay", "offset", "dead_band", "read_late")}
@@ -93,7 +97,7 @@ def write_recording(folder: Path, truth: dict[str, float] | None = None, seconds
     runs = []
     for seed, role in ((1, "identify"), (2, "identify"), (3, "validate")):
         command = commands(seed, seconds)
-        position = simulate(arm_text(**numbers), command, **drive)
+        position = simulate(arm_text(**numbers), command, **drive, counts=counts)
         table = np.column_stack([np.arange(len(command)) / RATE_HZ, command, position])
         names = ["t", "c1", "c2", "q1", "q2"]
         pd.DataFrame(table, columns=names).to_csv(folder / f"run-{seed}.csv", index=False)

@@ -15,7 +15,6 @@ from armlab.identification.model_file import read_model, write_model
 from problem.motion import Motion
 
 Law = Callable[[Array], Array]
-PLAIN = np.array([[2.0, 0.0, 1.0], [1.5, 0.0, 0.8]])  # Coulomb level, viscous coefficient of joints 1 and 3
 
 
 def step(speed: Array) -> Array:
@@ -23,23 +22,24 @@ def step(speed: Array) -> Array:
     return np.asarray(0.6 + 0.9 * (1 + np.tanh((speed - 1.2) / 0.2)))
 
 
-def with_friction(law: Law) -> cases.Hidden:
-    """Coulomb and viscous friction at joints 1 and 3, and a law of speed at joint 2."""
+def with_friction(*laws: Law) -> cases.Hidden:
+    """Each joint with friction by a law of its speed."""
 
     def torque(motion: Motion, time: Array) -> Array:
         speed = np.abs(motion.velocity)
         within_sample = np.abs(motion.acceleration) / (2 * cases.RATE_HZ)
         direction = motion.velocity / np.maximum(speed, within_sample)  # its mean over the sample's interval
-        out = direction * (PLAIN[0] + PLAIN[1] * speed)
-        out[:, 1] = direction[:, 1] * law(speed[:, 1])
-        return np.asarray(out)
+        return np.asarray(direction * np.stack([law(own) for law, own in zip(laws, speed.T, strict=True)], axis=1))
 
     return torque
 
 
+STEP_AT_JOINT_2 = with_friction(lambda speed: 2.0 + 1.5 * speed, step, lambda speed: 1.0 + 0.8 * speed)
+
+
 @pytest.fixture(scope="module")
 def step_found() -> Diagnosis:
-    return diagnose(cases.recording(with_friction(step), seconds=20.0))
+    return diagnose(cases.recording(STEP_AT_JOINT_2))
 
 
 def test_friction_that_steps_between_plateaus_is_a_curve_through_both(step_found: Diagnosis) -> None:
@@ -55,7 +55,7 @@ def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_c
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("armlab.diagnosis.diagnose.find_friction_curves", lambda pruned: pruned)
-    found = diagnose(cases.recording(with_friction(step), seconds=20.0))
+    found = diagnose(cases.recording(STEP_AT_JOINT_2))
     (claim,) = (each for each in found.claims if each.joint == 2)
     assert claim.effect == "friction_curve"
     assert claim.evidence.rms_after < claim.evidence.rms_before / 3
@@ -69,17 +69,21 @@ def test_the_model_of_a_curve_predicts_the_same_after_a_round_trip(step_found: D
     np.testing.assert_allclose(again.predict(run), model.predict(run), atol=1e-9)
 
 
+FORMULAS: dict[str, Law] = {
+    "Coulomb and viscous": lambda speed: 1.5 + speed,
+    "power": lambda speed: 1 + speed**1.7,
+    "root": lambda speed: 1.5 * speed**0.4,
+    "Stribeck": lambda speed: 1 + 0.8 * np.exp(-((speed / 0.1) ** 2)) + 0.5 * speed,
+    "rational Stribeck": lambda speed: 1 + 0.8 / (1 + (speed / 0.1) ** 2) + 0.5 * speed,
+    "Eyring": lambda speed: 0.5 + 0.6 * np.arcsinh(speed / 0.1),
+}
+
+
 @pytest.mark.parametrize(
-    "law",
-    [
-        pytest.param(lambda speed: 1.5 + speed, id="Coulomb and viscous"),
-        pytest.param(lambda speed: 1 + speed**1.7, id="power"),
-        pytest.param(lambda speed: 1.5 * speed**0.4, id="root"),
-        pytest.param(lambda speed: 1 + 0.8 * np.exp(-((speed / 0.1) ** 2)) + 0.5 * speed, id="Stribeck"),
-        pytest.param(lambda speed: 1 + 0.8 / (1 + (speed / 0.1) ** 2) + 0.5 * speed, id="rational Stribeck"),
-        pytest.param(lambda speed: 0.5 + 0.6 * np.arcsinh(speed / 0.1), id="Eyring"),
-    ],
+    "names", [("Stribeck", "Coulomb and viscous", "power"), ("root", "Eyring", "rational Stribeck")], ids=", ".join
 )
-def test_friction_that_a_formula_fits_is_never_a_curve(law: Law) -> None:
-    found = diagnose(cases.recording(with_friction(law), seconds=20.0))
-    assert "friction_curve" not in {claim.effect for claim in found.claims}
+def test_friction_that_a_formula_fits_is_never_a_curve(names: tuple[str, ...]) -> None:
+    """Three joints, each with a formula of its own."""
+    found = diagnose(cases.recording(with_friction(*(FORMULAS[name] for name in names))))
+    assert [(each.effect, each.joint) for each in found.claims if each.effect == "friction_curve"] == []
+    assert {each.joint for each in found.claims} == {1, 2, 3}

@@ -52,6 +52,7 @@ from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
 SECONDS = 20.0
+COARSE = 1024  # counts of an encoder: replays of finer ones take shorter steps, and several times as long
 TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1}
 
 
@@ -161,7 +162,8 @@ def test_intervals_are_narrow_and_near_the_truth(diagnosis: MotionDiagnosis) -> 
 
 
 def test_a_simulation_that_is_right_has_nothing_missing(tmp_path: Path) -> None:
-    result = diagnose_motion(load_motion_recording(write_recording(tmp_path / "right", {}, seconds=SECONDS)))
+    folder = write_recording(tmp_path / "right", {}, seconds=SECONDS, counts=COARSE)
+    result = diagnose_motion(load_motion_recording(folder))
     assert (result.status, result.findings) == ("none", ())
     assert result.servos is not None
     np.testing.assert_array_equal(result.servos.values, result.simulation.nominal.values)
@@ -643,7 +645,8 @@ def test_verdict_model_simulation_and_page_are_written(diagnosis: MotionDiagnosi
 
 def test_joints_are_counted_as_in_the_robot_whatever_the_order_of_the_columns(tmp_path: Path) -> None:
     columns = {"time": "t", "reference_position": ["c2", "c1"], "position": ["q2", "q1"]}
-    folder = write_recording(tmp_path / "other", seconds=SECONDS, joints=["elbow", "shoulder"], columns=columns)
+    order = {"joints": ["elbow", "shoulder"], "columns": columns}
+    folder = write_recording(tmp_path / "other", seconds=SECONDS, counts=COARSE, **order)
     text = (folder / "arm.xml").read_text()
     (folder / "arm.xml").write_text(text.replace('<position name="elbow"', '<position name="elbow" kp="30"'))
     result = diagnose_motion(load_motion_recording(folder))
@@ -772,7 +775,8 @@ def test_a_joint_that_does_not_carry_the_tool_says_nothing_of_a_mass_there(soft:
 
 
 def test_a_delay_that_no_joint_has_of_its_own_is_one_number_of_all(tmp_path: Path) -> None:
-    recording = load_motion_recording(write_recording(tmp_path / "late", {"delay": 0.006}, seconds=10.0))
+    folder = write_recording(tmp_path / "late", {"delay": 0.006}, seconds=10.0, counts=COARSE)
+    recording = load_motion_recording(folder)
     runs, simulation = recording.with_role("identify"), read_servo_simulation(recording)
     start = simulation.nominal.values.copy()
     start[:, COMMON_DELAY.place] = 0.006
