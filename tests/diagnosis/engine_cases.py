@@ -43,7 +43,7 @@ def run(hidden: Hidden, seed: int, role: Role, seconds: float, inertial: Array |
     return Run(f"run-{seed}.csv", role, time, motion.position, torque + noise)
 
 
-def recording(hidden: Hidden = nothing, seconds: float = 10.0, inertial: Array | None = None) -> Recording:
+def recording(hidden: Hidden = nothing, seconds: float = 6.0, inertial: Array | None = None) -> Recording:
     """Two runs that identify and one that validates; inertial: of the real arm, the nominal one if left out."""
     arm = load_arm("irb120-arm")
     roles: tuple[Role, ...] = ("identify", "identify", "validate")

@@ -84,7 +84,7 @@ def test_a_scale_that_differs_by_sign_is_a_wrong_gain_and_a_square_that_looks_li
     by_sign = diagnose(cases.recording(read_wrongly(lambda torque: 0.03 * np.abs(torque))))
     assert [(each.effect, each.joint, each.members) for each in by_sign.claims] == [("torque_gain_error", 2, ())]
     assert lacking(by_sign) == 0
-    square = diagnose(cases.recording(read_wrongly(lambda torque: 0.001 * torque**2 + 0.01 * torque)))
+    square = diagnose(cases.recording(read_wrongly(lambda torque: 0.001 * torque**2 + 0.01 * torque), seconds=10.0))
     assert lacking(square) > 10
     assert [each.effect for each in square.claims] == ["unknown"]
 
@@ -165,11 +165,11 @@ def test_what_is_too_small_for_a_name_is_no_claim_where_links_may_be_off() -> No
         torque[:, 1] = SLIGHT * motion.velocity[:, 2]
         return torque
 
-    assert not diagnose(cases.recording(slight)).claims
+    assert not diagnose(cases.recording(slight, seconds=10.0)).claims
 
 
 def test_structure_outside_the_library_is_called_unknown_with_what_it_depends_on() -> None:
-    found = diagnose(cases.recording(product_of_positions, seconds=20.0))
+    found = diagnose(cases.recording(product_of_positions, seconds=12.0))
     unknown = [claim for claim in found.claims if claim.effect == "unknown"]
     assert [claim.joint for claim in unknown] == [2]
     assert set(found.unexplained[0].depends_on) & {"position_1", "position_3"}

@@ -55,7 +55,7 @@ def test_what_is_unknown_and_follows_the_own_velocity_of_a_joint_is_a_friction_c
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("armlab.diagnosis.diagnose.find_friction_curves", lambda pruned: pruned)
-    found = diagnose(cases.recording(STEP_AT_JOINT_2))
+    found = diagnose(cases.recording(STEP_AT_JOINT_2, seconds=10.0))
     (claim,) = (each for each in found.claims if each.joint == 2)
     assert claim.effect == "friction_curve"
     assert claim.evidence.rms_after < claim.evidence.rms_before / 3

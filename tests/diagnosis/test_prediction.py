@@ -142,7 +142,7 @@ def first_model(recording: Recording, guards: Guards | None = None, baseline: Ba
 
 
 def test_coloured_noise_is_whitened() -> None:
-    noisy = cases.recording(coloured_noise)
+    noisy = cases.recording(coloured_noise, seconds=10.0)
     assert all(len(taps) > 1 for taps in fit_coloured_noise(first_model(noisy)).taps)
     off = fit_coloured_noise(first_model(noisy, replace(Guards(), prewhitening=False)))
     assert all(len(taps) == 1 for taps in off.taps)

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,14 @@ from armlab.recordings.load import load_recording
 Make = Callable[[Path], Path]
 
 
+def two_runs() -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Runs of six seconds, which are enough for a verdict."""
+    return frame(0, 6), frame(1, 6)
+
+
 def changed(change: Callable[[pd.DataFrame], pd.DataFrame], **settings: object) -> Make:
     """A recording of two runs, both changed in the same way."""
-    return lambda folder: recording_in(folder, change(frame(0)), change(frame(1)), **settings)
+    return lambda folder: recording_in(folder, *map(change, two_runs()), **settings)
 
 
 def scaled(factor: float) -> Make:
@@ -39,7 +45,7 @@ def spoiled(run: pd.DataFrame, share: float, value: float) -> pd.DataFrame:
 
 def another_arm(folder: Path) -> Path:
     """The robot file has the links of an arm ten times as large and hung from the ceiling."""
-    made = recording_in(folder, frame(0), frame(1), robot="robot.yaml")
+    made = recording_in(folder, *two_runs(), robot="robot.yaml")
     content = yaml.safe_load((Path(__file__).parents[2] / "problem" / "robots" / "irb120-arm.yaml").read_text())
     content |= {"name": "another", "gravity": [0.0, 9.81, 0.0]}
     for joint in content["joints"]:
@@ -53,7 +59,7 @@ def with_text(change: Callable[[str], str], file: str = "run-0.csv") -> Make:
     """A recording of which a file is changed as text: the first run, or another one."""
 
     def make(folder: Path) -> Path:
-        made = recording_in(folder, frame(0), frame(1))
+        made = recording_in(folder, *two_runs())
         path = made / file
         path.write_text(change(path.read_text()))
         return made
@@ -63,7 +69,7 @@ def with_text(change: Callable[[str], str], file: str = "run-0.csv") -> Make:
 
 REFUSED = {
     "no folder": (lambda folder: folder, "no recording.yaml"),
-    "no run file": (lambda folder: _without(recording_in(folder, frame(0), frame(1)), "run-0.csv"), "run-0.csv"),
+    "no run file": (lambda folder: _without(recording_in(folder, *two_runs()), "run-0.csv"), "run-0.csv"),
     "a column is missing": (changed(lambda run: run.drop(columns="tau2")), "no column 'tau2'"),
     "most torques are no numbers": (changed(lambda run: spoiled(run, 0.5, np.nan)), "too many to repair"),
     "most torques are absurd": (changed(lambda run: spoiled(run, 0.5, 1e251)), "too many to repair"),
@@ -94,7 +100,7 @@ USED = {
     "a few bad cells": changed(lambda run: spoiled(run, 0.01, np.nan)),
     "a broken last row": with_text(lambda text: text[: text.rstrip("\n").rindex(",") - 3]),
     "a row twice": with_text(lambda text: "".join(_twice(text.splitlines(keepends=True)))),
-    "no run that validates": lambda folder: recording_in(folder, frame(0), frame(1), validate=False),
+    "no run that validates": lambda folder: recording_in(folder, *two_runs(), validate=False),
 }
 
 
@@ -156,25 +162,39 @@ def test_what_allows_no_verdict_is_inconclusive_and_says_why(name: str, tmp_path
     assert word in (tmp_path / "out" / "report.html").read_text()
 
 
+@pytest.fixture(scope="module")
+def used_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[int, str, Path]]:
+    """Exit code, error and folder of the diagnosis of a recording of USED, which is made once for all tests."""
+
+    @cache
+    def diagnosed(name: str) -> tuple[int, str, Path]:
+        folder = tmp_path_factory.mktemp("used")
+        code, _, error = run(USED[name](folder / "recording"), folder / "out")
+        return code, error, folder / "out"
+
+    return diagnosed
+
+
 @pytest.mark.parametrize("name", USED)
-def test_what_can_be_repaired_or_worked_around_gives_a_verdict(name: str, tmp_path: Path) -> None:
-    code, _, error = run(USED[name](tmp_path / "recording"), tmp_path / "out")
+def test_what_can_be_repaired_or_worked_around_gives_a_verdict(
+    name: str, used_once: Callable[[str], tuple[int, str, Path]]
+) -> None:
+    code, error, out = used_once(name)
     assert (code, error) == (0, "")
-    found = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    found = json.loads((out / "verdict.json").read_text())
     assert found["status"] == "mismatch"
     wrong = [each for each in found["findings"] if each["joint"] == 1 and "friction" in each["effect"]]
     assert bool(wrong) == (name != "a joint that never moves")
 
 
-def test_held_out_blocks_and_repairs_stand_in_the_report(tmp_path: Path) -> None:
-    run(USED["a row twice"](tmp_path / "a"), tmp_path / "out")
-    assert "rows repeat the row before" in (tmp_path / "out" / "report.html").read_text()
-    run(USED["no run that validates"](tmp_path / "b"), tmp_path / "blocks")
-    assert "every third of six blocks of time was held out" in (tmp_path / "blocks" / "report.html").read_text()
+def test_held_out_blocks_and_repairs_stand_in_the_report(used_once: Callable[[str], tuple[int, str, Path]]) -> None:
+    repaired, blocks = (used_once(name)[2] / "report.html" for name in ("a row twice", "no run that validates"))
+    assert "rows repeat the row before" in repaired.read_text()
+    assert "every third of six blocks of time was held out" in blocks.read_text()
 
 
 def test_the_folder_of_the_simulation_itself_is_not_written_over(tmp_path: Path) -> None:
-    made = recording_in(tmp_path / "recording", frame(0), frame(1), simulation="model.yaml")
+    made = recording_in(tmp_path / "recording", *two_runs(), simulation="model.yaml")
     (made / "model.yaml").write_text("schema: model/1\n")
     code, _, error = run(made, made)
     assert code == 2
@@ -183,7 +203,7 @@ def test_the_folder_of_the_simulation_itself_is_not_written_over(tmp_path: Path)
 
 
 def test_an_output_folder_that_is_a_file_is_refused_before_any_work(tmp_path: Path) -> None:
-    made = recording_in(tmp_path / "recording", frame(0), frame(1))
+    made = recording_in(tmp_path / "recording", *two_runs())
     (tmp_path / "out").write_text("mine")
     code, _, error = run(made, tmp_path / "out")
     assert code == 2
@@ -193,7 +213,7 @@ def test_an_output_folder_that_is_a_file_is_refused_before_any_work(tmp_path: Pa
 
 
 def test_a_baseline_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    made = recording_in(tmp_path / "recording", frame(0), frame(1))
+    made = recording_in(tmp_path / "recording", *two_runs())
     code, _, error = run(made, tmp_path / "out", "--baseline", "simulated")
     assert code == 2
     assert "simulated_torque" in error
