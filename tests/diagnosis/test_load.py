@@ -1,5 +1,8 @@
 """The load of an arm beside its robot file, with all that the diagnosis names."""
 
+import hashlib
+import pickle
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,13 +11,32 @@ from public_copies import needs_copies
 from refusals import refusal
 
 from armlab.common.documents import Document
-from armlab.diagnosis.diagnose import diagnose
+from armlab.diagnosis.design import DesignMatrix
+from armlab.diagnosis.diagnose import NamedEffects, diagnose, find_names
+from armlab.diagnosis.fitted_model import Progress
 from armlab.diagnosis.load import nominal_payload_lines
 from armlab.identification.payload import PayloadSetting, Place
 from armlab.recordings.load import load_recording
 from armlab.recordings.public import fetch_recording
 
 TRUTH = {"m": 1.5, "mcx": 0.075, "mcz": 0.12, "Ixx": 0.0136, "Iyy": 0.01735, "Izz": 0.00775, "Ixz": -0.006}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def names_found_once() -> Iterator[None]:
+    """The names of a recording are found once: each load, and a diagnosis, begins with them."""
+    known: dict[str, NamedEffects] = {}
+
+    def find_once(design: DesignMatrix, seed: int, progress: Progress) -> NamedEffects:
+        key = hashlib.sha256(pickle.dumps((design, seed))).hexdigest()
+        if key not in known:
+            known[key] = find_names(design, seed, progress)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        for user in ("load", "diagnose"):
+            patch.setattr(f"armlab.diagnosis.{user}.find_names", find_once)
+        yield
 
 
 @pytest.fixture(scope="module")
