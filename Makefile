@@ -6,7 +6,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test lint structure table3-time diagnosis-time profile speed regression fuzz hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test suite lint structure table3-time diagnosis-time profile speed regression fuzz hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -102,8 +102,12 @@ pictures: .venv/dev ## the pictures of README and tutorials: docs/pictures/
 
 # --- checks
 
-test: .venv/dev lint regression ## every test, one thread of linear algebra a worker
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -n auto
+test: .venv/dev ## style, types and import contracts, the regression check and every test, all at the same time
+	$(MAKE) --no-print-directory --jobs=3 lint regression suite
+
+# A worker takes the half of another one's tests when it has none: tests that share a fixture stay together.
+suite: .venv/dev ## every test alone, a worker and a thread of linear algebra a core
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/pytest -n logical --dist worksteal
 
 lint: .venv/dev ## style, types and import contracts
 	$(BIN)/ruff check .
