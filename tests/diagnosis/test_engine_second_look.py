@@ -14,7 +14,7 @@ from armlab.recordings.load import load_recording
 
 @pytest.mark.parametrize("sampled", [False, True])
 def test_nothing_is_missing_of_the_model_that_a_diagnosis_found(tmp_path: Path, sampled: bool) -> None:
-    runs = [frame(seed, 10, mass=0.6, sampled=sampled, load=POSSIBLE_PAYLOAD) for seed in range(2)]
+    runs = [frame(seed, 6, mass=0.6, sampled=sampled, load=POSSIBLE_PAYLOAD) for seed in range(2)]
     folder = recording_in(tmp_path / "first", *runs)
     list(diagnose_recording(folder, tmp_path / "out", None, 0))
     _with_upright_base(tmp_path / "out" / "model.yaml")

@@ -64,7 +64,7 @@ def test_each_guard_is_off_once_and_no_stage_before_its_own_is_done_again(monkey
 def test_stages_that_a_guard_or_a_number_has_no_part_in_need_not_be_done_again(monkeypatch: pytest.MonkeyPatch) -> None:
     guards = (GUARDS_AFTER_SEARCH[2], GUARDS_IN_SEARCH[0])
     monkeypatch.setattr(ablation, "GUARDS", guards)
-    recording = cases.recording(lambda motion, time: 0.05 * motion.velocity**3, seconds=6.0)
+    recording = cases.recording(lambda motion, time: motion.velocity**3 * [0, 0, 0.5], seconds=3.0)
     found = dict(diagnose_without_each(recording, (LATE,)))
     assert _told(found[LATE]) == _told(diagnose(recording, settings=vary(Settings(), *parse_change(LATE))))
     assert _told(found[ALL_ON]) == _told(diagnose(recording))

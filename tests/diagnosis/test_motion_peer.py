@@ -22,7 +22,7 @@ TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1, "delay": 0.0
 
 @pytest.fixture(scope="module")
 def diagnosis(tmp_path_factory: pytest.TempPathFactory) -> MotionDiagnosis:
-    folder = write_recording(tmp_path_factory.mktemp("peer") / "servo", TRUTH, seconds=12.0)
+    folder = write_recording(tmp_path_factory.mktemp("peer") / "servo", TRUTH, seconds=12.0, counts=1024)
     return diagnose_motion(load_motion_recording(folder))
 
 

@@ -15,7 +15,7 @@ from armlab.recordings.recording import Recording
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    return load_recording(recording_in(tmp_path_factory.mktemp("own") / "arm", frame(0, 8), frame(1, 8)))
+    return load_recording(recording_in(tmp_path_factory.mktemp("own") / "arm", frame(0, 6), frame(1, 6)))
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_odd_and_even_seconds_share_no_row(recording: Recording) -> None:
     even, odd = (every_other_second(recording, first, 1.0) for first in (0, 1))
     stamps = [{(run.file, float(time)) for run in each.runs for time in run.time} for each in (even, odd)]
     assert not stamps[0] & stamps[1]
-    assert len(even.runs) == len(odd.runs) == 8
+    assert len(even.runs) == len(odd.runs) == 6
 
 
 def test_halves_and_single_runs_share_no_row(recording: Recording) -> None:
