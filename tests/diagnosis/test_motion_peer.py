@@ -1,5 +1,6 @@
 """mujoco.sysid beside armlab on a small recording: one task for both, one judge, and a section of the page."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +16,17 @@ from armlab.diagnosis.motion.peer import WINDOWS, PeerComparison, compare_with_s
 from armlab.diagnosis.motion.real import peer_section
 from armlab.diagnosis.motion.replay import joint_rms
 from armlab.diagnosis.motion.servo import place
+from armlab.diagnosis.motion.tuning import DEFAULT
 from armlab.recordings.motion import load_motion_recording
 
 TRUTH = {"kp": 8.0, "kv": 0.0, "damping": 0.5, "frictionloss": 0.1, "delay": 0.02}
+QUICK = replace(DEFAULT, coupling_choices=1, max_step_error=1e3)  # numbers are chosen once, and the step stays
 
 
 @pytest.fixture(scope="module")
 def diagnosis(tmp_path_factory: pytest.TempPathFactory) -> MotionDiagnosis:
-    folder = write_recording(tmp_path_factory.mktemp("peer") / "servo", TRUTH, seconds=12.0, counts=1024)
-    return diagnose_motion(load_motion_recording(folder))
+    folder = write_recording(tmp_path_factory.mktemp("peer") / "servo", TRUTH, seconds=12.0)
+    return diagnose_motion(load_motion_recording(folder), tuning=QUICK)
 
 
 @pytest.fixture(scope="module")
