@@ -54,7 +54,7 @@ ARM_FILE = Path(__file__).parents[2] / "problem" / "robots" / "irb120-arm.yaml"
 def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
     """A diagnosis with friction and a load, of a recording whose names want to be HTML."""
     folder = tmp_path_factory.mktemp("made") / HOSTILE
-    recording_in(folder, frame(0, 8, mass=0.4), frame(1, 8, mass=0.4), names=f"<b>{HOSTILE}", robot="robot.yaml")
+    recording_in(folder, frame(0, 6, mass=0.4), frame(1, 6, mass=0.4), names=f"<b>{HOSTILE}", robot="robot.yaml")
     robot = yaml.safe_load(ARM_FILE.read_text())
     robot["name"] = HOSTILE
     for number, joint in enumerate(robot["joints"]):

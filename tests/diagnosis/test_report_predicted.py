@@ -12,7 +12,7 @@ from armlab.recordings.load import load_recording
 
 
 def test_the_prediction_of_a_held_out_run_is_as_far_from_the_measurement_as_the_verdict_says(tmp_path: Path) -> None:
-    recording_in(tmp_path, frame(0, 8), frame(1, 8))
+    recording_in(tmp_path, frame(0, 6), frame(1, 6))
     found = diagnose(load_recording(tmp_path))
     texts = predicted_texts(found)
     (run,) = found.recording.with_role("validate")

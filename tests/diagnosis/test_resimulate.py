@@ -67,7 +67,7 @@ def test_links_without_a_positive_inertia_are_refused() -> None:
 
 
 def test_the_found_model_follows_the_measured_motion_where_the_given_one_leaves_it(tmp_path: Path) -> None:
-    folder = recording_in(tmp_path / "loaded", frame(0, 8, mass=0.5), frame(1, 8, mass=0.5))
+    folder = recording_in(tmp_path / "loaded", frame(0, 6, mass=0.5), frame(1, 6, mass=0.5))
     found = resimulate(diagnose(load_recording(folder)))
     assert found.run == "run-1.csv"
     assert found.time[-1] == pytest.approx(WINDOW_SECONDS, abs=0.05)

@@ -54,7 +54,7 @@ def _columns(messages: list[Any]) -> Iterator[tuple[str, Array]]:
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A verdict with its signals: two runs, of which one is held out."""
-    folder = recording_in(tmp_path_factory.mktemp("signals") / "rec", frame(0, 8), frame(1, 8))
+    folder = recording_in(tmp_path_factory.mktemp("signals") / "rec", frame(0, 6), frame(1, 6))
     out = folder.parent / "out"
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(out), "--mcap"])
     assert result.exit_code == 0, result.output
@@ -126,8 +126,8 @@ def test_a_recording_of_motion_only_has_commands_and_replayed_positions(tmp_path
 
 
 def test_a_recording_that_cannot_be_judged_has_its_recorded_signals(tmp_path: Path) -> None:
-    still = frame(0, 8).assign(q1=0.0, q2=0.0, q3=0.0)
-    folder, out = recording_in(tmp_path / "rec", still, frame(1, 8)), tmp_path / "out"
+    still = frame(0, 6).assign(q1=0.0, q2=0.0, q3=0.0)
+    folder, out = recording_in(tmp_path / "rec", still, frame(1, 6)), tmp_path / "out"
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(out), "--mcap"])
     assert result.exit_code == 0, result.output
     assert {"/run_0/recorded", "/run_1/recorded"} <= set(read_topics(out / "signals.mcap"))

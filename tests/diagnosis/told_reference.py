@@ -13,7 +13,7 @@ from armlab.recordings.load import load_recording
 
 def reference_in(folder: Path) -> Reference:
     """Identified with Coulomb and viscous friction from a recording that is written into a folder."""
-    recording = load_recording(recording_in(folder, frame(0), frame(1)))
+    recording = load_recording(recording_in(folder, frame(0, 6), frame(1, 6)))
     friction = (*every_joint(recording.arm, CoulombFriction), *every_joint(recording.arm, ViscousFriction))
     found = Identifier(recording.arm, friction, "physical", cutoff_hz=20.0).fit(recording.with_role("identify"))
     return Reference(recording, found.model_, "as told")
