@@ -45,7 +45,7 @@ LESS = (VISCOUS[0], VISCOUS[1] - 0.3, VISCOUS[2])
 
 @cache
 def recording(name: str, seed: int, viscous: tuple[float, ...] = VISCOUS, mass: float = 0.0) -> Recording:
-    runs = [frame(seed + each, 8, viscous, mass) for each in range(2)]
+    runs = [frame(seed + each, 6, viscous, mass) for each in range(2)]
     return load_recording(recording_in(Path(mkdtemp()) / name, *runs))
 
 
@@ -155,7 +155,7 @@ def test_a_drift_of_the_offset_within_runs_is_no_change_of_the_offset(tmp_path: 
     def drifting(seed: int) -> list[pd.DataFrame]:
         out = []
         for run in range(2):
-            table = frame(seed + run, 8)
+            table = frame(seed + run, 6)
             wave = np.random.default_rng(seed + run).normal(0, 1, 4)
             share = np.arange(len(table)) / len(table)
             table["tau2"] += 0.2 * sum(size * np.cos(np.pi * order * share) for order, size in enumerate(wave))
@@ -169,7 +169,7 @@ def test_a_drift_of_the_offset_within_runs_is_no_change_of_the_offset(tmp_path: 
 
 def test_all_friction_of_a_joint_is_told_as_one_level() -> None:
     (level,) = [each for each in comparison("warm").changes if each.parameter == ALL_FRICTION]
-    time = np.arange(1600) / 200
+    time = np.arange(1200) / 200
     speed = np.concatenate([motion_at(time, seed).velocity[:, 1] for seed in (0, 1, 10, 11)])
     mean = 1.5 * np.sign(speed) + (VISCOUS[1] - 0.15) * speed
     change = -0.3 * float(speed @ mean) / float(np.sqrt(len(mean) * (mean @ mean)))

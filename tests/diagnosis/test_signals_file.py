@@ -105,7 +105,7 @@ def test_blocks_that_are_held_out_of_one_run_are_told_apart(tmp_path: Path) -> N
 
 
 def test_a_recording_of_motion_only_has_commands_and_replayed_positions(tmp_path: Path) -> None:
-    folder, out = write_recording(tmp_path / "servo", {"kp": 8.0}, seconds=20.0), tmp_path / "out"
+    folder, out = write_recording(tmp_path / "servo", {"kp": 8.0}, seconds=8.0), tmp_path / "out"
     result = CliRunner().invoke(main, ["diagnose", str(folder), "--out", str(out), "--mcap", "--json"])
     assert result.exit_code == 0, result.output
     assert str(out / "signals.mcap") in json.loads(result.stdout)["files"]
