@@ -139,7 +139,7 @@ def draw_torque(facts: Effect, example: Example) -> bytes:
         _draw_in_time(panels[-1], scene, added)
         panels[0].set_ylabel(f"torque that it adds to joint {example.shown} (N m)")
 
-    return render_figure((7.6, 3.0), fill)["svg"]
+    return render_figure((7.6, 3.0), fill, ("svg",))["svg"]
 
 
 def _variable(scene: Scene, facts: Effect, example: Example) -> Array:
