@@ -1,14 +1,17 @@
 """The signs of physics: what an effect says against coefficients, and that doubt silences it."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from effect_scenes import candidate, scene
+from effect_scenes import candidate, scene, scene_of, waves
 
 from armlab.common.arrays import Array
+from armlab.effects.springs import LinearSpring
 from problem.pseudo_inertia import link_from_centre_of_mass
 from problem.regressor import rigid_body_torque
+from problem.robot_file import load_arm
 
 WRONG: list[tuple[str, str, int | None, list[float], str]] = [
     ("coulomb_friction", "", 1, [-1.0], "level"),
@@ -107,3 +110,11 @@ def test_doubt_of_a_stiffness_follows_from_that_of_the_compliance() -> None:
     assert doubts[0] is not None
     assert doubts[1] is None
     assert [first != second for first, second in pairwise(doubts)] == [True]
+
+
+def test_a_spring_at_a_joint_that_gravity_does_not_load_is_a_cable_whatever_rounding_says() -> None:
+    arm = replace(load_arm("irb120-arm"), gravity=(1e-12, 0.0, -9.81))  # as rounded angles of a robot file make it
+    time, motion = waves(len(arm), 0)
+    seen = scene_of(arm, motion, time)
+    for stiffness in (5.0, -5.0):
+        assert LinearSpring.at(arm, 1).first_name(np.array([stiffness, 0.3]), [seen]).effect == "cable_stiffness"
