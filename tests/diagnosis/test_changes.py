@@ -23,17 +23,21 @@ from told_recordings import ARM, VISCOUS, frame, motion_at, recording_in
 from armlab.cli.main import main
 from armlab.common.statistics import adjust_by_holm
 from armlab.diagnosis.compare import soundness
-from armlab.diagnosis.compare.comparison import Comparison, compare
+from armlab.diagnosis.compare.comparison import Comparison, compare, look_plainly
 from armlab.diagnosis.compare.friction_level import ALL_FRICTION
 from armlab.diagnosis.compare.numbers import Change, laws_of
-from armlab.diagnosis.compare.pooled import unite_candidates
+from armlab.diagnosis.compare.pooled import pool_plainly, unite_candidates
 from armlab.diagnosis.compare.report import comparison_lines, comparison_sentences, make_comparison_file
 from armlab.diagnosis.found_model import model_found
 from armlab.diagnosis.relations.variants import one_run
+from armlab.diagnosis.settings import Settings
+from armlab.diagnosis.simulation import read_simulation
+from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.effects.contract import Scene
 from armlab.effects.drive import TorqueGain, TorqueGainBySign
 from armlab.effects.friction import CoulombFriction, LevelsAndSlopes, Slopes, ViscousFriction
 from armlab.recordings.load import load_recording
+from armlab.recordings.plain_least_squares import compare_plain
 from armlab.recordings.public import fetch_recording
 from armlab.recordings.recording import Recording
 from problem.regressor import rigid_body_torque
@@ -138,6 +142,48 @@ def test_a_changed_load_is_a_payload() -> None:
     (load,) = comparison("loaded").named
     assert (load.effect, load.joint) == ("payload", 3)
     assert [(each.effect, each.joint) for each in load.rivals][-1] == ("inertial_parameter_error", 3)
+
+
+def test_what_plain_least_squares_sees_beyond_eight_standard_errors_is_never_the_same() -> None:
+    """And where nothing changed, it sees nothing there: else it would be no yardstick."""
+    old, simulation = recording("cold", 0), read_simulation(recording("cold", 0), None)
+    nulls = [recording("again", 10), recording("again-2", 80)]
+    more = [recording(f"friction-{size}", 82, (VISCOUS[0], size, VISCOUS[2])) for size in (0.2, 0.6, 1.5, 3.0)]
+    more += [recording(f"load-{mass}", 84, VISCOUS, mass) for mass in (0.25, 1.0, 3.0)]
+    beyond = 0
+    for new in (*nulls, *more):
+        plain = compare_plain(old.arm, old.runs, new.runs, ComparisonTuning().plain_cutoff_hz)
+        seen = look_plainly([old, new], simulation, Settings())
+        assert seen is not None
+        if new in nulls:
+            assert np.abs(plain.in_errors).max() < 8
+            assert not seen.sound.named
+        elif np.abs(plain.in_errors).max() > 8:
+            beyond += 1
+            assert seen.sound.named
+    assert beyond > 2
+
+
+def test_both_laws_of_friction_that_changed_are_one_cause_with_a_row_each() -> None:
+    """Coulomb friction grows by 0.5 N m, and viscous friction falls by 0.3 N m s/rad."""
+    old, less = recording("cold", 0), recording("warm", 10, LESS)
+    grown = []
+    for run in less.runs:
+        drag = 0.5 * np.tanh(np.gradient(run.position[:, 1], run.time) / 0.02)
+        grown.append(run.with_signals(run.time, {"torque": run.torque + np.outer(drag, [0, 1, 0])}))
+    (named,) = compare(old, replace(less, runs=tuple(grown))).named
+    assert named.joint == 2
+    sizes = {each.effect: each.interval for each in named.changes}
+    assert sizes.keys() == {"coulomb_friction", "viscous_friction"}
+    assert sizes["coulomb_friction"][0] < 0.5 < sizes["coulomb_friction"][1]
+    assert sizes["viscous_friction"][0] < -0.3 < sizes["viscous_friction"][1]
+
+
+def test_a_single_run_that_tells_nothing_of_its_scatter_needs_more_evidence() -> None:
+    old, new = recording("cold", 0), recording("again", 10)
+    simulation = read_simulation(old, None)
+    alone = pool_plainly([one_run(old, old.runs[0]), new], simulation, Settings())
+    assert alone.tuning.level < pool_plainly([old, new], simulation, Settings()).tuning.level
 
 
 def test_intervals_of_unchanged_parameters_hold_zero() -> None:

@@ -10,9 +10,16 @@ import yaml
 from numpy.testing import assert_allclose
 from recording_folders import ARM, folder_with, frame, motion_at
 
+from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.recordings.motion import MotionRecording
-from armlab.recordings.plain_least_squares import fit_plain, fit_plain_recording, runs_of_motion, split_runs
+from armlab.recordings.plain_least_squares import (
+    compare_plain,
+    fit_plain,
+    fit_plain_recording,
+    runs_of_motion,
+    split_runs,
+)
 from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
 from armlab.recordings.recording import MotionRun, Run, Transmission
 from armlab.recordings.recording_file import ControllerEntry
@@ -37,6 +44,30 @@ def test_friction_and_offset_are_found_and_little_is_left() -> None:
     assert_allclose([fit.value("viscous", joint) for joint in (1, 2, 3)], 0.5, atol=0.05)
     assert_allclose(fit.value("offset", 1), 0.3, atol=0.02)
     assert np.all(fit.percent[[0, 2]] < 0.1)  # joint 2 keeps what the filter rounds off the jumps of its torque
+
+
+def test_friction_that_grew_is_seen_beyond_eight_standard_errors_and_nothing_else_is() -> None:
+    noise = np.random.default_rng(0)
+    runs = [exact_run(seed=seed) for seed in range(6)]
+    noisy = [
+        run.with_signals(run.time, {"torque": run.torque + noise.normal(0, 0.5, run.torque.shape)}) for run in runs
+    ]
+    old, new = noisy[:3], noisy[3:]
+    drags = [0.5 * np.tanh(_speed(run) / 0.02) for run in new]
+    grown = [
+        run.with_signals(run.time, {"torque": run.torque + np.outer(drag, [0, 1, 0])})
+        for run, drag in zip(new, drags, strict=True)
+    ]
+    same, changed = (compare_plain(ARM, old, each, 10.0) for each in (new, grown))
+    assert np.abs(same.in_errors).max() < 8
+    place = changed.names.index("coulomb2")
+    assert np.argmax(np.abs(changed.in_errors)) == place
+    assert changed.in_errors[place] > 8
+    assert changed.new[place] - changed.old[place] == pytest.approx(0.5, abs=0.1)
+
+
+def _speed(run: Run) -> Array:
+    return np.gradient(run.position[:, 1], 0.005)
 
 
 def test_links_of_the_robot_file_are_not_used() -> None:

@@ -1,77 +1,133 @@
 """A changed load of a single joint between two recordings of motion only.
 
-The torque of such a recording is kp (command - position), so all that one reads from it is over kp. A gain that changed
-would have changed gravity, inertia and friction by one factor; a load changes gravity and leaves friction nearly alone.
-Both are weighed on the same table as the changes of a recording with torque. Where kp is not stated, the load that the
-robot file gives to the old recording sets the scale.
+The torque of such a recording is kp (command - position), so all that one reads from it is over kp. Another gain
+changes gravity and friction by one factor; another load changes gravity and leaves friction alone. With the factors of
+gravity l and of friction f, and their standard errors,
+
+    log odds of the load = ((f - l)^2 / (s_f^2 + s_l^2) - (f - 1)^2 / s_f^2) / 2
+
+Where kp is not stated, the load that the robot file gives to the old recording sets the scale.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from armlab.common.arrays import Array
 from armlab.common.errors import DataError
 from armlab.diagnosis.compare.comparison import Comparison, conclude, look_plainly
-from armlab.diagnosis.result import Diagnosis
+from armlab.diagnosis.compare.named import NamedChange
+from armlab.diagnosis.result import Diagnosis, Rival
 from armlab.diagnosis.settings import Settings
 from armlab.diagnosis.simulation import read_simulation
-from armlab.effects.drive import TORQUE_GAIN_FACTS
 from armlab.effects.links import PAYLOAD_FACTS
 from armlab.recordings.motion import MotionRecording
-from armlab.recordings.plain_least_squares import PlainFit, fit_plain, runs_of_motion
+from armlab.recordings.plain_least_squares import PlainChanges, compare_plain, prepare_rows, runs_of_motion
 from armlab.recordings.recording import Recording, Run
+from problem.arm import PARAMETER_NAMES, Arm
 from problem.base_parameters import base_parameters
 
-GRAVITY_NAMES = ("mcx", "mcy", "mcz")
+FIRST_MOMENTS = tuple(f"{name}1" for name in PARAMETER_NAMES[1:4])  # of the link, which gravity acts on
+GAIN_EFFECT = "controller_gain_error"
 
 
 def compare_load(old: MotionRecording, new: MotionRecording) -> Comparison | None:
-    """The comparison that explains the difference by another load; None where another cause explains it as well.
+    """The comparison where a load explains the difference better than a gain does; None where it does not.
 
-    It is asked of arms of one joint: the gains of several joints have no common scale.
+    Where a gain is out of the question, it may say that nothing changed. It is asked of arms of one joint: the gains of
+    several joints have no common scale.
     """
     if len(old.arm) != 1 or old.arm.links is None:
         return None
+    settings = Settings()
+    cutoff_hz = settings.tuning.comparison.plain_cutoff_hz
     runs = [runs_of_motion(each) for each in (old, new)]
     try:
-        scale = _newton_metres(old, runs[0])
-        recordings = [_with_torque(each, own, old, scale) for each, own in zip((old, new), runs, strict=True)]
+        plain = compare_plain(old.arm, runs[0], runs[1], cutoff_hz)
     except DataError:
         return None
-    simulation = read_simulation(recordings[0], None)
-    seen = look_plainly(recordings, simulation, Settings())
-    if seen is None:
+    log_odds = load_against_gain(plain, _usual_speed(runs[0], cutoff_hz))
+    if log_odds <= 0:
         return None
-    effects = {seen.table.groups[each.group].candidate.effect for each in seen.sound.named}
-    if PAYLOAD_FACTS.id not in effects or TORQUE_GAIN_FACTS.id in effects:
+    scale = 1.0 if _kp(old) is not None else newton_metres(old.arm, plain)
+    recordings = [_with_torque(each, own, old, scale) for each, own in zip((old, new), runs, strict=True)]
+    simulation = read_simulation(recordings[0], None)
+    seen = look_plainly(recordings, simulation, settings)
+    if seen is None:
         return None
     diagnoses = [Diagnosis(each, simulation, "inconclusive", "") for each in recordings]
     notes = () if _kp(old) else ("kp is not stated: the load of the robot file in the old recording sets the scale.",)
-    return conclude(seen, diagnoses, notes, ())
+    found = conclude(seen, diagnoses, notes, ())
+    if log_odds > settings.tuning.comparison.max_rival_deficit:
+        return found
+    if not any(each.effect == PAYLOAD_FACTS.id for each in found.named):
+        return None
+    return replace(found, named=tuple(_beside_gain(each, log_odds) for each in found.named))
+
+
+@dataclass(frozen=True)
+class _Factor:
+    """New over old, with its standard error."""
+
+    value: float
+    error: float
+
+
+def load_against_gain(plain: PlainChanges, speed: float) -> float:
+    """Log odds of another load against another gain. speed: at which friction is taken, rad/s (m/s)."""
+    place = {name: number for number, name in enumerate(plain.names)}
+    gravity = np.zeros(len(plain.names))
+    for name in FIRST_MOMENTS:
+        if name in place:
+            gravity[place[name]] = plain.old[place[name]]
+    friction = np.zeros(len(plain.names))
+    friction[[place["coulomb1"], place["viscous1"]]] = 1.0, speed
+    load, drag = (_factor(plain, each) for each in (gravity, friction))
+    if not (load.error > 0 and drag.error > 0):
+        return 0.0
+    of_gain = (drag.value - load.value) ** 2 / (load.error**2 + drag.error**2)
+    return float((of_gain - (drag.value - 1) ** 2 / drag.error**2) / 2)
+
+
+def _factor(plain: PlainChanges, direction: Array) -> _Factor:
+    """Of the parameters along a direction (columns,); its error is zero where the old recording has none."""
+    size = float(plain.old @ direction)
+    if size <= 0:
+        return _Factor(1.0, 0.0)
+    return _Factor(float(plain.new @ direction) / size, float(np.linalg.norm(plain.errors * direction)) / size)
+
+
+def newton_metres(arm: Arm, plain: PlainChanges) -> float:
+    """kp, by the first moments of the robot file over those of the old recording; 1 where they do not agree in sign."""
+    base = base_parameters(arm)
+    stated = dict(zip((base.names[each] for each in base.columns), base.values(arm.parameters), strict=True))
+    found = dict(zip(plain.names, plain.old, strict=True))
+    names = [each for each in FIRST_MOMENTS if each in stated and each in found]
+    power = sum(stated[each] ** 2 for each in names)
+    towards = sum(stated[each] * found[each] for each in names)
+    return float(power / towards) if power > 0 and towards > 0 else 1.0
+
+
+def _usual_speed(runs: Sequence[Run], cutoff_hz: float) -> float:
+    """The root mean square of the speed, rad/s (m/s)."""
+    return float(np.sqrt(np.mean(np.concatenate([prepare_rows(run, cutoff_hz).motion.velocity for run in runs]) ** 2)))
 
 
 def _kp(recording: MotionRecording) -> float | None:
     return None if recording.controller is None else recording.controller.kp[0]
 
 
-def _newton_metres(recording: MotionRecording, runs: Sequence[Run]) -> float:
-    """What the torque of `runs_of_motion` has to be multiplied by: 1 where kp is stated."""
-    if _kp(recording) is not None:
-        return 1.0
-    found = fit_plain(recording.arm, runs, Settings().tuning.comparison.plain_cutoff_hz)
-    base = base_parameters(recording.arm)
-    known = dict(zip((base.names[each] for each in base.columns), base.values(recording.arm.parameters), strict=True))
-    names = [each for each in found.names if each.rstrip("0123456789") in GRAVITY_NAMES and each in known]
-    stated, seen = np.array([[known[each], _value(found, each)] for each in names]).T.reshape(2, -1)
-    towards = float(stated @ seen)
-    return float(stated @ stated) / towards if towards > 0 else 1.0
-
-
-def _value(found: PlainFit, name: str) -> float:
-    return float(found.values[found.names.index(name)])
-
-
 def _with_torque(recording: MotionRecording, runs: Sequence[Run], old: MotionRecording, scale: float) -> Recording:
     """As a recording with torque, N m. old: whose robot is the simulation."""
     own = tuple(Run(**{**vars(each), "torque": scale * each.torque}) for each in runs)
     return Recording(recording.folder, recording.robot, old.arm, own, recording.transmission)
+
+
+def _beside_gain(named: NamedChange, log_odds: float) -> NamedChange:
+    """A changed load with the gain among its rivals."""
+    if named.effect != PAYLOAD_FACTS.id:
+        return named
+    rival = Rival(GAIN_EFFECT, named.joint, named.joints, False, log_odds)
+    likely = named.probability / (1 + named.probability * np.exp(-log_odds))
+    return replace(named, rivals=(*named.rivals, rival), probability=float(likely))
