@@ -128,8 +128,11 @@ def read_simulation(recording: Recording, baseline: Baseline | None) -> Simulati
 
 def _usual_baseline(recording: Recording) -> Baseline:
     """What a recording is compared with by itself: the torque that was simulated beside it, else its simulation."""
-    if _has_simulated_torque(recording):
-        return "simulated"
+    return "simulated" if _has_simulated_torque(recording) else model_baseline(recording)
+
+
+def model_baseline(recording: Recording) -> Baseline:
+    """The simulation of a recording where it has one, else its links fitted anew."""
     return "nominal" if _has_nominal(recording) else "refit"
 
 
@@ -147,9 +150,9 @@ def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None
     seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
     if seconds < tuning.min_duration_s:
         return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
-    travel = np.max([np.ptp(run.position, axis=0) for run in recording.runs], axis=0)
+    travel = np.max([np.ptp(run.position, axis=0) for run in runs], axis=0)
     if not np.any(travel > tuning.min_travel):
-        return "No joint moves in any run: there is nothing that the torques could be compared with."
+        return "No joint moves in any run that identifies: there is nothing that the torques could be compared with."
     silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
     if silent:
         return f"The torque of {joints_in_words(recording.arm, silent)} never changes: is the right column named?"

@@ -23,7 +23,7 @@ from armlab.diagnosis.diagnose import diagnose
 from armlab.diagnosis.formats import ComparisonStatus
 from armlab.diagnosis.result import Diagnosis
 from armlab.diagnosis.settings import Baseline, Settings
-from armlab.diagnosis.simulation import Simulation, read_simulation
+from armlab.diagnosis.simulation import Simulation, model_baseline, read_simulation
 from armlab.recordings.recording import Recording
 from problem.arm import Arm
 
@@ -109,9 +109,10 @@ def compare(
     if not dates:
         known_dates = tuple(recording_date(each) for each in (old, new, *more))
     recordings = (old, *(replace(each, arm=old.arm, simulation=old.simulation) for each in (new, *more)))
+    own = baseline or model_baseline(old)
     diagnoses: list[Diagnosis] = []
     for number in range(len(recordings)):
-        diagnoses.append(_diagnose_once(recordings, diagnoses, baseline, seed, _progress_of(number + 1, progress)))
+        diagnoses.append(_diagnose_once(recordings, diagnoses, own, seed, _progress_of(number + 1, progress)))
     return compare_diagnosed(recordings, diagnoses, baseline, known_dates, progress)
 
 
@@ -123,7 +124,7 @@ def compare_diagnosed(
     progress: Callable[[str], None] = lambda message: None,
 ) -> Comparison:
     """What changed between recordings of one robot of which each is diagnosed."""
-    simulation, settings = read_simulation(recordings[0], baseline), Settings()
+    simulation, settings = read_simulation(recordings[0], baseline or model_baseline(recordings[0])), Settings()
     progress("looking for changes of links and friction")
     seen = look_plainly(recordings, simulation, settings)
     if seen is None or not seen.sound.named:
@@ -200,7 +201,7 @@ def _find_trends(
 def _diagnose_once(
     recordings: Sequence[Recording],
     known: Sequence[Diagnosis],
-    baseline: Baseline | None,
+    baseline: Baseline,
     seed: int,
     progress: Callable[[str], None],
 ) -> Diagnosis:
