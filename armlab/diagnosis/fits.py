@@ -8,6 +8,7 @@ from armlab.common.arrays import Array
 from armlab.diagnosis.data import Observed, rows_in
 from armlab.diagnosis.prediction import filtered_residual, identification_runs, recorded_residual, with_smoothing_of
 from armlab.diagnosis.result import HeldOutErrors, JointFit
+from armlab.diagnosis.simulation import Simulation
 from armlab.diagnosis.tuning import Tuning
 from armlab.diagnosis.yardstick import Yardstick
 from armlab.identification.identifier import Identifier
@@ -20,6 +21,7 @@ def joint_fits(
     plain: Yardstick | None,
     floor: Array,
     observed: Observed,
+    simulation: Simulation,
     tuning: Tuning,
 ) -> tuple[JointFit, ...]:
     """The fits of all joints. refit: residual (rows, joints) of the refitted rigid arm; models: the one that is found,
@@ -31,9 +33,10 @@ def joint_fits(
     identified = with_smoothing_of(
         found, Identifier(found.arm, cutoff_hz=None if plain is None else plain.cutoff_hz).fit(runs).model_
     )
-    every, left = (found, alone, identified), None if plain is None else plain.residual(observed)
-    filtered = [refit, *(filtered_residual(each, observed) for each in every)]
-    recorded = [recorded_residual(each, observed) for each in (rigid, *every)]
+    every = ((found, simulation), (alone, simulation), (identified, None))
+    left = None if plain is None else plain.residual(observed)
+    filtered = [refit, *(filtered_residual(each, observed, beside) for each, beside in every)]
+    recorded = [recorded_residual(each, observed, beside) for each, beside in ((rigid, None), *every)]
     out = []
     for joint, noise in enumerate(floor.tolist()):
         rows = rows_in(observed.of_role("validate", joint), observed.rows)
