@@ -17,21 +17,22 @@ ROUNDING = 1e-4  # of a held-out error: a removal that changes less changes noth
 def stated_findings(claims: Sequence[Claim], joints: int) -> tuple[Claim, ...]:
     """The findings among claims: what may be stated, and is missed where it is taken away.
 
-    An effect of the whole robot has to be missed at more than one joint, and at none may the error fall without it.
-    joints: of the arm.
+    An effect of the whole robot that is missed at one joint at most is minor. joints: of the arm.
     """
-    return tuple(each for each in claims if statement_of(each).kind != "nothing" and _is_missed(each, joints))
+    stated = (each for each in claims if statement_of(each).kind != "nothing" and _is_missed(each))
+    return tuple(replace(each, minor=True) if _is_of_one_place(each, joints) else each for each in stated)
 
 
-def _is_missed(claim: Claim, joints: int) -> bool:
+def _is_missed(claim: Claim) -> bool:
+    return claim.removal is None or claim.removal.growth > ROUNDING
+
+
+def _is_of_one_place(claim: Claim, joints: int) -> bool:
+    """Whether an effect of the whole robot is missed at one joint at most, or the error of another falls without it."""
     removal = claim.removal
-    if removal is None:
-        return True
-    if removal.growth <= ROUNDING:
+    if removal is None or joints == 1 or effect_named(claim.effect).where != "robot":
         return False
-    if effect_named(claim.effect).where != "robot" or joints == 1:
-        return True
-    return len(removal.joints) > 1 and not removal.better
+    return len(removal.joints) <= 1 or bool(removal.better)
 
 
 def without_lesser_unknowns(claims: Sequence[Claim], parts: Sequence[Part]) -> tuple[Claim, ...]:
