@@ -82,13 +82,10 @@ class ReadingTuning:
     little_travel: float = tuned(
         0.1, unit="rad", meaning="a joint that travels less may be read behind its gear, and no reading makes it so"
     )
-    min_gain: float = tuned(
-        0.5,
-        unit="nats",
-        meaning="least fall of the logarithms of the errors, over all joints, for a mistake that is named",
-        source="development: recordings without a mistake reach 0.1 (simulated) and 0.4 (a friction damper with play)",
+    min_gain: float = tuned(0.5, unit="nats", meaning="what two mistakes have to explain beyond the best single one")
+    min_sigmas: float = tuned(
+        3.5, unit="standard errors", meaning="between blocks of time, by which errors fall for a mistake that is named"
     )
-    min_sigmas: float = tuned(3.5, unit="standard errors", meaning="the same, between blocks of time")
     usual_error: float = tuned(
         0.05,
         unit="of the torque's scatter",
