@@ -8,6 +8,7 @@ import engine_cases as cases
 import numpy as np
 import pytest
 
+from armlab.diagnosis.design import DesignMatrix
 from armlab.diagnosis.diagnose import diagnose, prepare
 from armlab.diagnosis.fitted_model import fit_background
 from armlab.diagnosis.formats import FindingEntry, FitEntry, LeftEntry, StoryEntry, VerdictFile
@@ -65,7 +66,8 @@ def test_a_contradiction_is_found(wrong: VerdictFile, expected: str) -> None:
 def test_what_is_taken_away_costs_what_a_fit_of_all_others_leaves() -> None:
     recording = cases.recording(lambda motion, time: 2.0 * np.sign(motion.velocity) + 3.0 * motion.velocity)
     design = prepare(recording, None, Settings(), lambda message: None)
-    model = fit_background(design, library(), 0, lambda message: None)  # type: ignore[arg-type]
+    assert isinstance(design, DesignMatrix)
+    model = fit_background(design, library(), 0, lambda message: None)
     groups = [each for each in model.state.groups if model.solver.groups[each].candidate.is_friction_of(2)]
     removal = removal_of(model, groups)
     rank = model.columns.base
@@ -79,7 +81,7 @@ def test_what_is_taken_away_costs_what_a_fit_of_all_others_leaves() -> None:
         values = np.zeros(model.moments.size)
         values[own] = np.linalg.lstsq(gram[np.ix_(own, own)], gram[own, -1])[0] / model.moments.lengths[own]
         residual = model.columns.matrices[1][:, -1] - model.columns.torque_at(1, values)
-        errors.append(float(np.sqrt(np.mean(residual[design.observed.rows_held_out(1)] ** 2))))  # type: ignore[union-attr]
+        errors.append(float(np.sqrt(np.mean(residual[design.observed.rows_held_out(1)] ** 2))))
     assert expected.joint == 1
     assert expected.growth == pytest.approx(errors[0] / errors[1] - 1, rel=0.02)
     assert not removal.is_minor
