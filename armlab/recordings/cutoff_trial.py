@@ -45,8 +45,8 @@ class CutoffTrial:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """Runs behind one cut-off. matrix, torque, block: of the rows that fit; judged_*: of the rows that judge, behind the
-    low-pass of the judge. block: (rows,).
+    """Runs behind one cut-off. matrix, torque, block: of the rows that fit; judged_*: of those that judge, behind the
+    low-pass of the judge.
     """
 
     matrix: Array
