@@ -84,7 +84,7 @@ def test_gain_friction_and_delay_are_named_with_their_numbers(diagnosis: MotionD
 def test_a_finding_is_told_in_the_units_of_a_reader(diagnosis: MotionDiagnosis) -> None:
     lines = list(motion_lines(diagnosis, verbose=True))
     delay = next(each for each in diagnosis.findings if each.effect == "command_delay")
-    assert any(f"command delay, {1e3 * delay.value:.4g} ms (" in line for line in lines)
+    assert any(f"command delay, {1e3 * delay.value:.3g} ms (" in line for line in lines)
     assert any("controller gain kp, " in line for line in lines)
     told = [line for line in lines if line.startswith("  ") and ("Coulomb" in line or "delay" in line)]
     assert told

@@ -63,13 +63,13 @@ from armlab.diagnosis.report.words import (
     rival_in_words,
 )
 from armlab.diagnosis.settings import Baseline
+from armlab.diagnosis.told.statement import FRICTION
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.diagnosis.verdict_files import check_output_folder
 from armlab.effects.library import effect_named
 from armlab.effects.words import place_in_words
 from armlab.recordings.load import load_recording
 from problem.arm import Arm
-from problem.joint_words import joint_in_words
 
 MAX_NAMED_CHANGES = 3
 SEEN_EFFECTS = ("coulomb_friction", "viscous_friction", "payload", "torque_gain_error", "encoder_offset", "time_delay")
@@ -86,25 +86,25 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
         return f"{names} cannot be compared.", comparison.reason
     if comparison.status == "same":
         return f"Nothing changed between {names} that the recordings show.", seen
-    arm = comparison.arm
-    places = list(dict.fromkeys(_place_phrase(arm, each) for each in comparison.named))
-    phrases = [change_phrase(arm, each) for each in comparison.named[:MAX_NAMED_CHANGES]]
+    phrases = [_leading_phrase(comparison, each) for each in comparison.named[:MAX_NAMED_CHANGES]]
     rest = len(comparison.named) - len(phrases)
     more = f", and {rest} more" if rest else ""
-    numbers = f"{join_words(phrases)}{more}."
-    whole = " ".join(_whole_friction(comparison))
-    second = f"{whole} {numbers[0].upper()}{numbers[1:]} No other change is sure. {seen}"
-    return f"Between {names} this changed: {join_words(places)}.", " ".join(second.split())
+    return f"Between {names} this changed: {join_words(phrases)}{more}.", f"No other change is sure. {seen}".strip()
 
 
-def _whole_friction(comparison: Comparison) -> Iterator[str]:
-    """All friction of each joint of which single laws changed."""
-    factors = {each.joint for each in comparison.named if each.form == ONE_FACTOR}
-    for each in comparison.changes:
-        if each.joint is None or each.ratio is None or each.parameter != ALL_FRICTION:
-            continue
-        if each.joint not in factors:
-            yield f"All friction of {joint_in_words(comparison.arm, each.joint)} together: {_percents(each.ratio)}."
+def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
+    """A change with the number that is surest; of friction all laws of the joint together, where they are known."""
+    where = _place_phrase(comparison.arm, named)
+    whole = [
+        each.ratio
+        for each in comparison.changes
+        if each.parameter == ALL_FRICTION and each.joint == named.joint and effect_named(named.effect).cause == FRICTION
+    ]
+    if whole and whole[0] is not None and named.form != ONE_FACTOR:
+        return f"{where} (all friction there {_percents(whole[0])})"
+    if not named.changes:
+        return f"{where}: {named.equation}"
+    return f"{where} ({_amount(min(named.changes, key=lambda each: each.p_value))})"
 
 
 def change_phrase(arm: Arm, named: NamedChange) -> str:
@@ -144,9 +144,9 @@ def _signed(percent: float) -> str:
 def detectable_sentence(comparison: Comparison) -> str:
     """The smallest changes that would have been named, of the usual kinds: the middle one of the joints.
 
-    Of a level that would have to change by more than itself these recordings tell nothing.
+    `twofold` for a level that would have to change by more than itself.
     """
-    parts, untold = [], []
+    parts = []
     for effect in SEEN_EFFECTS:
         rows = [each for each in comparison.changes if each.effect == effect and not each.changed]
         names = [each.parameter for each in rows]
@@ -156,19 +156,12 @@ def detectable_sentence(comparison: Comparison) -> str:
             continue
         middle = sizes[len(sizes) // 2][1]
         share = detectable_share(middle)
-        if share is not None and share > 1:
-            untold.append(effect_in_words(effect))
-            continue
         size = f"{format_number(middle.detectable, 2)} {format_unit(middle.unit)}"
-        parts.append(f"{effect_in_words(effect)} {size if share is None else f'{format_number(100 * share, 2)} %'}")
-    sentences = []
-    if parts:
-        sentences.append(
-            f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
-        )
-    if untold:
-        sentences.append(f"A doubled level of {join_words(untold)} would not have been seen.")
-    return " ".join(sentences)
+        size = size if share is None else f"{format_number(100 * share, 2)} %"
+        parts.append(f"{effect_in_words(effect)} {'twofold' if share is not None and share > 1 else size}")
+    if not parts:
+        return ""
+    return f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
 
 
 def detectable_share(change: Change) -> float | None:

@@ -28,6 +28,7 @@ NUMBER_WORDS = {
     "limit_slope": " (falls with speed)",
     "static_excess": " (more at rest)",
 }
+MADE_BY = " of the replay error that can be explained is made by"
 SHOWN_RISE = 1.02  # of a replay error: a smaller one is none
 MAX_FIGURES = 2  # of the second sentence
 
@@ -47,7 +48,7 @@ def summary_of(diagnosis: MotionDiagnosis) -> str:
     left = MAX_WORDS - len(first.split()) - len(last.split())
     shown = list[str]()
     for each in sorted(told, key=lambda each: -each.share)[:MAX_FIGURES]:
-        phrase = f"{finding_with_numbers(each.finding)} at {_places(diagnosis.simulation.arm, [each.finding])}"
+        phrase = _figure_at_place(diagnosis.simulation.arm, each.finding)
         if len("; ".join([*shown, phrase]).split()) > left:
             break
         shown.append(phrase)
@@ -69,7 +70,7 @@ def _where(diagnosis: MotionDiagnosis, told: Sequence[ToldNumber]) -> str:
         places = join_words(list(dict.fromkeys(_places(arm, [one.finding]) for one in own)))
         places = places if "tool" in places else _places(arm, [one.finding for one in own])
         share = f"{max(min(round(100 * each.share), 99 if len(causes) > 1 else 100), 1)} %"
-        part = f"{share}{' of the replay error that goes comes' if not shown else ''} from {name}{doubt} at {places}"
+        part = f"{share}{MADE_BY if not shown else ' by'} {name}{doubt} at {places}"
         if shown and len(", ".join([*shown, part]).split()) > MAX_FIRST_WORDS:
             break
         shown.append(part)
@@ -103,7 +104,7 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     if any(each.replay_before is None for each in diagnosis.errors):
         worst = max(diagnosis.errors, key=lambda each: each.replay_after / max(each.spread, 1e-300))
         left = f"{1e3 * worst.replay_after:.3g} mrad, {100 * worst.replay_after / max(worst.spread, 1e-300):.0f} %"
-        return f"With what was found {joint_in_words(arm, worst.joint)} is replayed with {left} of its motion."
+        return f"With what was found the replay error of {joint_in_words(arm, worst.joint)} is {left} of its motion."
     if diagnosis.status == "none":
         worst = max(diagnosis.errors, key=lambda each: each.replay_after)
         return f"Its largest replay error is {1e3 * worst.replay_after:.3g} mrad ({joint_in_words(arm, worst.joint)})."
@@ -111,7 +112,7 @@ def _replay_sentence(diagnosis: MotionDiagnosis) -> str:
     before, after = 1e3 * (best.replay_before or 0.0), 1e3 * best.replay_after
     falls = "falls" if after < before else "does not fall:"
     return (
-        f"On held-out runs the replay error of {joint_in_words(arm, best.joint)} {falls} from {before:.3g} to "
+        f"On held-out runs the replay error of {joint_in_words(arm, best.joint)} {falls} from {before:.3g} mrad to "
         f"{after:.3g} mrad, {100 * best.replay_after / max(best.spread, 1e-300):.0f} % of its motion."
     )
 
@@ -173,15 +174,32 @@ def _finding_phrase(arm: Arm, told: ToldNumber) -> str:
 
 def finding_with_numbers(finding: ServoFinding) -> str:
     """The name of a finding, its number with the interval, and that of the simulation."""
-    low, high = finding.interval
+    value, known = _figures(finding)
+    return f"{_number_name(finding)}, {value}{f'; the simulation has {known}' if known else ''}"
+
+
+def _figure_at_place(arm: Arm, finding: ServoFinding) -> str:
+    """The same as part of a sentence: what is where how large, and what the simulation has there."""
+    value, known = _figures(finding)
+    where = f"{_number_name(finding)} at {_places(arm, [finding])}"
+    return f"{where} is {value}{f', where the simulation has {known}' if known else ''}"
+
+
+def _number_name(finding: ServoFinding) -> str:
+    return f"{finding_name(finding)}{NUMBER_WORDS.get(finding.name, '')}"
+
+
+def _figures(finding: ServoFinding) -> tuple[str, str]:
+    """The number of a finding with its interval, and that of the simulation; nothing where it is not known."""
     factor, unit = (1e3, "ms") if finding.parameter.unit == "s" else (1.0, format_unit(finding.parameter.unit))
+    low, high = finding.interval
     if finding.parameter.key == "payload" and finding.value < 0:
-        return f"{finding_name(finding)}, {-finding.value:.4g} {unit} ({-high:.4g} to {-low:.4g})"
-    value = f"{factor * finding.value:.4g} {unit}".rstrip()
-    given = "none" if finding.nominal >= INFINITE_LIMIT else f"{factor * finding.nominal:.4g}"
-    known = "" if math.isnan(finding.nominal) else f"; the simulation has {given}"
-    name = f"{finding_name(finding)}{NUMBER_WORDS.get(finding.name, '')}"
-    return f"{name}, {value} ({factor * low:.4g} to {factor * high:.4g}){known}"
+        return f"{-finding.value:.3g} {unit} ({-high:.3g} to {-low:.3g})", ""
+    value = f"{factor * finding.value:.3g} {unit}".rstrip() + f" ({factor * low:.3g} to {factor * high:.3g})"
+    if math.isnan(finding.nominal):
+        return value, ""
+    has_none = finding.nominal >= INFINITE_LIMIT or finding.nominal == 0
+    return value, "none" if has_none else f"{factor * finding.nominal:.3g} {unit}".rstrip()
 
 
 def current_phrase(arm: Arm, current: CurrentWitness) -> str:
