@@ -64,6 +64,7 @@ from armlab.diagnosis.report.words import (
 )
 from armlab.diagnosis.settings import Baseline
 from armlab.diagnosis.told.statement import FRICTION
+from armlab.diagnosis.told.summary import MAX_WORDS
 from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.diagnosis.verdict_files import check_output_folder
 from armlab.effects.library import effect_named
@@ -72,6 +73,7 @@ from armlab.recordings.load import load_recording
 from problem.arm import Arm
 
 MAX_NAMED_CHANGES = 3
+NOTHING_ELSE = "No other change is sure."
 SEEN_EFFECTS = ("coulomb_friction", "viscous_friction", "payload", "torque_gain_error", "encoder_offset", "time_delay")
 
 
@@ -89,7 +91,9 @@ def comparison_sentences(comparison: Comparison) -> tuple[str, str]:
     phrases = [_leading_phrase(comparison, each) for each in comparison.named[:MAX_NAMED_CHANGES]]
     rest = len(comparison.named) - len(phrases)
     more = f", and {rest} more" if rest else ""
-    return f"Between {names} this changed: {join_words(phrases)}{more}.", f"No other change is sure. {seen}".strip()
+    first = f"Between {names} this changed: {join_words(phrases)}{more}."
+    left = MAX_WORDS - len(f"{first} {NOTHING_ELSE}".split())
+    return first, f"{NOTHING_ELSE} {detectable_sentence(comparison, left)}".strip()
 
 
 def _leading_phrase(comparison: Comparison, named: NamedChange) -> str:
@@ -141,10 +145,10 @@ def _signed(percent: float) -> str:
     return f"{'+' if percent > 0 else ''}{format_number(percent, 2)}"
 
 
-def detectable_sentence(comparison: Comparison) -> str:
+def detectable_sentence(comparison: Comparison, words: int = MAX_WORDS) -> str:
     """The smallest changes that would have been named, of the usual kinds: the middle one of the joints.
 
-    `twofold` for a level that would have to change by more than itself.
+    `twofold` for a level that would have to change by more than itself. words: no more than these.
     """
     parts = []
     for effect in SEEN_EFFECTS:
@@ -159,9 +163,12 @@ def detectable_sentence(comparison: Comparison) -> str:
         size = f"{format_number(middle.detectable, 2)} {format_unit(middle.unit)}"
         size = size if share is None else f"{format_number(100 * share, 2)} %"
         parts.append(f"{effect_in_words(effect)} {'twofold' if share is not None and share > 1 else size}")
-    if not parts:
-        return ""
-    return f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
+    while parts:
+        sentence = f"Smaller changes than these would not have been seen (middle of all joints): {', '.join(parts)}."
+        if len(sentence.split()) <= words:
+            return sentence
+        parts.pop()
+    return ""
 
 
 def detectable_share(change: Change) -> float | None:
