@@ -458,3 +458,19 @@ def test_a_recording_may_say_how_its_arm_is_mounted(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig", settings={"gravity": [0.0, 0.0, 9.81]})
     assert recording.arm.gravity == (0.0, 0.0, 9.81)
     assert yaml.safe_load((tmp_path / "rig" / "recording.yaml").read_text())["gravity"] == [0.0, 0.0, 9.81]
+
+
+def test_friction_of_coupled_axes_is_that_of_their_drives(tmp_path: Path) -> None:
+    """Motor 3 turns with both axes: q3 = m3 - m2, and its torque acts on both. Read as stated, nothing is left over."""
+    coupled = np.array([[1.0, 0, 0], [0, 1, 0], [0, -1, 1]])
+    settings = {"transmission": {"position": coupled.tolist(), "torque": np.linalg.inv(coupled).T.tolist()}}
+
+    def to_motors(table: pd.DataFrame) -> None:
+        table["q3"] += table["q2"]
+        speed = np.gradient(table["q3"], table["t"])
+        table["tau2"] -= table["tau3"]
+        table["tau3"] += 20 * np.tanh(speed / 0.02) + 5 * speed
+
+    answer = answer_to(recording_with(tmp_path / "rig", to_motors, settings))
+    assert names_of(answer) == []
+    assert answer.share < 0.05

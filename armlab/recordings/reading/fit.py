@@ -2,7 +2,9 @@
 
     tau_j = Y_j(q, qd, qdd) phi + v_j qd_j + c_j sign(qd_j) + I_j qdd_j + o_j + s_j q_j + p_j(q),    v, c, I >= 0
 
-p_j are the springs and the weight without load that the robot file states, as it states them.
+Friction and rotor are those of drives, which move with T' qd where tau = T tau_drives; where a second drive acts on a
+joint (coupled axes), v, c and I of it stand there, too. p_j are the springs and the weight without load that the robot
+file states, as it states them.
 A joint has a spring s_j only where the reading says so. The links phi are drawn to those of the simulation by a normal
 prior in the metric of pseudo-inertias (Lee and Park 2018): `near` where they may be as far off as simulations usually
 are, `free` where the data decide. Links that are physically consistent are fitted with the entropic divergence to the
@@ -11,13 +13,13 @@ same bodies (Lee, Wensing and Park 2020), whose barrier keeps every pseudo-inert
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.recordings.reading.reading import Reading
+from armlab.recordings.reading.reading import Reading, drives, second_drives
 from armlab.recordings.reading.signals import Channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from problem.arm import Arm, Link
@@ -34,14 +36,14 @@ from problem.pseudo_inertia import (
 from problem.regressor import observation_matrix, rigid_body_torque
 
 FOLDS = 2  # even and odd blocks are held out in turn
-JOINT_COLUMNS = 5  # columns of a joint: viscous and Coulomb friction, rotor inertia, offset, spring
+JOINT_COLUMNS = 8  # of a joint: viscous and Coulomb friction, rotor inertia, offset, spring, those of a second drive
 SPRING = 4  # which of them is the spring
-NON_NEGATIVE = 3  # of them the first ones, which are not negative
+OF_ANY_SIGN = (3, SPRING)  # the others are not negative
 
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 5), and their products on each fold.
+    """Columns of a motion: rigid (rows, joints, 10 * joints), own (rows, joints, 8), and their products on each fold.
 
     grams: (folds, joints, size, size) of the rigid columns followed by the joint's own ones. stated: (rows, joints),
     torque of the springs and the compensated weight that the robot file states, N m (N).
@@ -54,11 +56,16 @@ class Columns:
     stated: Array
 
 
-def make_columns(arm: Arm, motion: Motion, sign: Array, fold: NDArray[np.intp]) -> Columns:
-    """The columns of a motion (rows, joints). sign: (rows, joints) of the velocity; fold: (rows,) of each row."""
+def make_columns(arm: Arm, motion: Motion, drives: Array, fold: NDArray[np.intp]) -> Columns:
+    """The columns of a motion (rows, joints).
+
+    drives: (rows, joints, 2, 3), velocity, its sign and acceleration of each joint's own drive and of a second one,
+    zeros without it. fold: (rows,) of each row.
+    """
     joints = len(arm)
     rigid = observation_matrix(arm, motion).reshape(motion.samples, joints, 10 * joints)
-    own = np.stack([motion.velocity, sign, motion.acceleration, np.ones_like(sign), motion.position], axis=2)
+    offset_and_spring = np.stack([np.ones_like(motion.position), motion.position], axis=2)
+    own = np.concatenate([drives[:, :, 0], offset_and_spring, drives[:, :, 1]], axis=2)
     grams = np.zeros((FOLDS, joints, 10 * joints + JOINT_COLUMNS, 10 * joints + JOINT_COLUMNS))
     for number in range(FOLDS):
         rows = fold == number
@@ -94,7 +101,7 @@ def _prior(arm: Arm) -> Prior:
 class Score:
     """Held-out errors of a reading. errors: (joints,), rms over the scatter of the joint's torque.
 
-    values: (folds, 10 * joints) of the links, own: (folds, joints, 5) of the joints. distance: of the links from those
+    values: (folds, 10 * joints) of the links, own: (folds, joints, 8) of the joints. distance: of the links from those
     of the simulation, minus the logarithm of their prior over the number of independent rows.
     """
 
@@ -127,13 +134,14 @@ class Fitter:
             reading.clock,
             id(reading.arm.joints),
             reading.arm.gravity,
+            drives(reading).tobytes(),
         )
         if key not in self._columns:
             if len(self._columns) > 24:
                 self._columns.pop(next(iter(self._columns)))
             motion = self.channels.read_motion(reading)
-            sign = self.channels.sign_of_velocity(reading, self.tuning.sign_width)
-            self._columns[key] = make_columns(reading.arm, motion, sign, self.fold)
+            drive_signals = self.channels.drive_signals(reading, motion, self.tuning.sign_width)
+            self._columns[key] = make_columns(reading.arm, motion, drive_signals, self.fold)
         return self._columns[key]
 
     def prior(self, reading: Reading, torque: Array) -> Prior:
@@ -155,22 +163,17 @@ class Fitter:
         The last link may carry a load: it is free in any case. physical: links that bodies can have.
         """
         columns, torque, weight = self._target(reading)
-        prior = self.prior(reading, torque)
-        absent = [
-            10 * reading.joints + JOINT_COLUMNS * joint + SPRING
-            for joint in range(reading.joints)
-            if joint not in reading.springs
-        ]
+        prior, present = self.prior(reading, torque), _present_columns(reading)
         products = [_products(columns, torque, self.fold == number) for number in range(FOLDS)]
         power = [np.sum(torque[self.fold == number] ** 2, axis=0) for number in range(FOLDS)]
-        normal = [self._normal_equations(columns, products, weight, 1 - number, absent) for number in range(FOLDS)]
+        normal = [self._normal_equations(columns, products, weight, 1 - number) for number in range(FOLDS)]
         out = []
         for width in widths:
             each = np.full(reading.joints, width)
             each[-1] = max(width, self.tuning.free_width)
             squares, distance, fitted = np.zeros(reading.joints), 0.0, []
             for number, (gram, product) in enumerate(normal):
-                task = _Task(gram, product, prior, each**-2.0, reading.joints)
+                task = _Task(gram, product, prior, each**-2.0, present)
                 links, own = task.physical() if physical else task.gaussian()
                 squares += _squares(columns.grams[number], products[number], power[number], links, own)
                 distance += task.distance(links, physical) / (
@@ -201,9 +204,9 @@ class Fitter:
         return out / np.bincount(self.channels.block, minlength=self.channels.blocks)[:, None]
 
     def _normal_equations(
-        self, columns: Columns, products: Sequence[Array], weight: Array, fold: int, absent: Sequence[int]
+        self, columns: Columns, products: Sequence[Array], weight: Array, fold: int
     ) -> tuple[Array, Array]:
-        """Gram matrix and product with the torque, in nats, of the rows of a fold. absent: columns left out."""
+        """Gram matrix and product with the torque, in nats, of the rows of a fold."""
         joints, rows = len(weight), self.fold == fold
         blocks = len(np.unique(self.channels.block[rows]))
         scale = blocks * self.tuning.independent_rows / (max(rows.sum(), 1) * self.tuning.model_error**2) * weight**2
@@ -218,7 +221,6 @@ class Fitter:
             gram[:links, places] = scale[joint] * grams[joint, :links, links:]
             gram[places, :links] = gram[:links, places].T
             gram[places, places] = scale[joint] * grams[joint, links:, links:]
-        gram[absent], gram[:, absent], product[absent] = 0.0, 0.0, 0.0
         return gram, product
 
     def beyond_limits(self, reading: Reading) -> int:
@@ -279,20 +281,60 @@ def _squares(grams: Array, products: Array, power: Array, links: Array, own: Arr
     return np.asarray(power + np.sum(both * (np.einsum("jpq,jq->jp", grams, both) - 2 * products), axis=1))
 
 
+def _present_columns(reading: Reading) -> NDArray[np.bool_]:
+    """Which own columns a reading has, (joints, 8): all joints have friction, a rotor and an offset."""
+    present = np.zeros((reading.joints, JOINT_COLUMNS), dtype=bool)
+    present[:, :SPRING] = True
+    present[list(reading.springs), SPRING] = True
+    present[[place is not None for place in second_drives(reading)], SPRING + 1 :] = True
+    return present
+
+
 @dataclass(frozen=True, eq=False)
 class _Task:
-    """One fit: minimise half of x' gram x - product' x plus the prior of the links, x = links and own columns."""
+    """One fit: minimise half of x' gram x - product' x plus the prior of the links, x = links and own columns.
 
-    gram: Array
-    product: Array
+    present: (joints, 8), which own columns there are; the others stay zero.
+    """
+
+    full_gram: Array
+    full_product: Array
     prior: Prior
     precision: Array  # (joints,) of the prior of each link
-    joints: int
+    present: NDArray[np.bool_]
 
     @property
-    def _signed(self) -> NDArray[np.intp]:
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.present)
+
+    @cached_property
+    def _kept(self) -> NDArray[np.intp]:
         links = 10 * self.joints
-        return np.concatenate([links + JOINT_COLUMNS * joint + np.arange(NON_NEGATIVE) for joint in range(self.joints)])
+        return np.concatenate([np.arange(links), links + np.flatnonzero(self.present)])
+
+    @cached_property
+    def gram(self) -> Array:
+        """Of the columns that there are."""
+        return self.full_gram[np.ix_(self._kept, self._kept)]
+
+    @cached_property
+    def product(self) -> Array:
+        """Of the columns that there are."""
+        return self.full_product[self._kept]
+
+    @cached_property
+    def _signed(self) -> NDArray[np.intp]:
+        """Places of what is not negative."""
+        own = np.flatnonzero(self.present) % JOINT_COLUMNS
+        return 10 * self.joints + np.flatnonzero(~np.isin(own, OF_ANY_SIGN))
+
+    def _split(self, x: Array) -> tuple[Array, Array]:
+        """Links (10 * joints,) and all own columns (joints, 8)."""
+        links = 10 * self.joints
+        own = np.zeros(self.present.shape)
+        own[self.present] = x[links:]
+        return x[:links], own
 
     @property
     def _information(self) -> Array:
@@ -311,23 +353,21 @@ class _Task:
         """Links under the normal prior; friction and rotors that would be negative are left out."""
         links = 10 * self.joints
         gram, product = self.gram.copy(), self.product.copy()
-        free = np.ones(len(gram), dtype=bool)
-        x = np.zeros(len(gram))
         information = self._information
         gram[:links, :links] += information
         product[:links] += information @ self.prior.centre
         lengths = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        unit = gram / np.outer(lengths, lengths) + 1e-10 * np.eye(len(gram))
-        signed = self._signed
-        for _ in range(NON_NEGATIVE * self.joints):
-            chosen = np.flatnonzero(free)
-            x[chosen] = np.linalg.solve(unit[np.ix_(chosen, chosen)], (product / lengths)[chosen]) / lengths[chosen]
-            negative = [place for place in signed if free[place] and x[place] < 0]
-            if not negative:
-                break
-            free[negative] = False
-            x[negative] = 0.0
-        return x[:links], x[links:].reshape(self.joints, JOINT_COLUMNS)
+        unit, right = gram / np.outer(lengths, lengths) + 1e-10 * np.eye(len(gram)), product / lengths
+        signed, rest = self._signed, np.setdiff1d(np.arange(len(gram)), self._signed)
+        # of the others given those with a sign: x_rest = start - along @ x_signed
+        solved = np.linalg.solve(unit[np.ix_(rest, rest)], np.column_stack([right[rest], unit[np.ix_(rest, signed)]]))
+        start, along = solved[:, 0], solved[:, 1:]
+        inner = unit[np.ix_(signed, signed)] - unit[np.ix_(signed, rest)] @ along
+        wanted = right[signed] - unit[np.ix_(signed, rest)] @ start
+        x = np.zeros(len(gram))
+        x[signed] = _not_negative(inner, wanted)
+        x[rest] = start - along @ x[signed]
+        return self._split(x / lengths)
 
     def physical(self) -> tuple[Array, Array]:
         """Links that bodies can have; friction and rotors stay positive by a barrier.
@@ -343,7 +383,7 @@ class _Task:
         while True:
             x = self._newton(x, factor * self.precision, factor * FRICTION_BARRIER)
             if factor <= 1:
-                return x[:links], x[links:].reshape(self.joints, JOINT_COLUMNS)
+                return self._split(x)
             factor = max(factor * BARRIER_FALL, 1.0)
 
     def _newton(self, x: Array, precision: Array, barrier: float) -> Array:
@@ -390,6 +430,18 @@ class _Task:
         fit = 0.5 * float(x @ self.gram @ x) - float(self.product @ x)
         divergence = np.sum(slope * x[:links].reshape(self.joints, 10), axis=1) - logarithms
         return fit + float(precision @ divergence) - barrier * float(np.sum(np.log(x[signed])))
+
+
+def _not_negative(gram: Array, product: Array) -> Array:
+    """The least of half of x' gram x - product' x; what would be negative is left out, step by step."""
+    x, free = np.zeros(len(gram)), np.ones(len(gram), dtype=bool)
+    while True:
+        x[free] = np.linalg.solve(gram[np.ix_(free, free)], product[free])
+        negative = free & (x < 0)
+        if not negative.any():
+            return x
+        free &= ~negative
+        x[negative] = 0.0
 
 
 SMALLEST = 1e-100

@@ -115,6 +115,22 @@ class Reading:
         return replace(self, delay=self.delay + more)
 
 
+def drives(reading: Reading) -> Array:
+    """How far joints move drives, (drives, joints), the largest entry of each row being one: drives = this @ joints.
+
+    By virtual work: tau = T tau_drives, so that drives move with T' qd.
+    """
+    moved = reading.torque.T
+    largest = np.take_along_axis(moved, np.argmax(np.abs(moved), axis=1)[:, None], axis=1)
+    return np.asarray(moved / np.where(largest == 0, 1.0, largest))
+
+
+def second_drives(reading: Reading) -> tuple[int | None, ...]:
+    """Of each joint the place of the drive besides its own that acts on it most; None where none does."""
+    others = np.abs(drives(reading).T) * (1 - np.eye(reading.joints))
+    return tuple(int(np.argmax(row)) if row.any() else None for row in others)
+
+
 def read_as_is(recording: Recording, inertial: Array | None) -> Reading:
     """The reading that the recording and its robot file state. inertial: (10 * joints,) of the simulation's links."""
     given, joints = recording.transmission, len(recording.arm)

@@ -9,7 +9,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, ROWS_PER_CUTOFF, travel_bandwidth
 from armlab.recordings.differentiate import differentiate, resample_evenly
 from armlab.recordings.filters import Filter
-from armlab.recordings.reading.reading import Reading
+from armlab.recordings.reading.reading import Reading, drives, second_drives
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
 from problem.motion import Motion
@@ -57,16 +57,24 @@ class Channels:
             self._shifted[key] = out
         return self._shifted[key]
 
-    def sign_of_velocity(self, reading: Reading, width: float) -> Array:
-        """Signs of the velocities of the joints, (rows, joints), behind the low-pass that the torque passed.
+    def drive_signals(self, reading: Reading, motion: Motion, width: float) -> Array:
+        """Velocity, its sign and acceleration of the drives, in the direction of the joint, (rows, joints, 2, 3).
 
-        width: of its top speed, where a joint's sign is taken for full.
+        Of the joint's own drive, and of a second one, zeros without it. Signs are behind the low-pass that the torque
+        passed. width: of a drive's top speed, where its sign is taken for full.
         """
-        out = np.empty((self.rows, reading.joints))
-        for joint, row in enumerate(reading.position):
-            direction = np.zeros(self.motion.position.shape[1])
-            direction[list(reading.position_order)] = row
-            out[:, joint] = self._sign_along(direction / (np.abs(direction).max() or 1.0), width)
+        out = np.zeros((self.rows, reading.joints, 2, 3))
+        moved, second = drives(reading), second_drives(reading)
+        for joint in range(reading.joints):
+            for number, place in enumerate((joint, second[joint])):
+                share = 0.0 if place is None else float(moved[place, joint])
+                if place is None or share == 0:
+                    continue
+                direction = np.zeros(self.motion.position.shape[1])
+                direction[list(reading.position_order)] = moved[place] @ reading.position
+                sign = self._sign_along(direction / (np.abs(direction).max() or 1.0), width)
+                velocity, acceleration = (each @ moved[place] for each in (motion.velocity, motion.acceleration))
+                out[:, joint, number] = share * np.stack([velocity, sign, acceleration], axis=1)
         return out
 
     def _sign_along(self, direction: Array, width: float) -> Array:
