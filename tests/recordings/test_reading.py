@@ -175,9 +175,8 @@ def test_a_doubtful_gain_and_a_near_second_make_it_likely_that_no_name_is_right(
 
 def test_the_margin_is_that_of_the_next_best_mistake_of_another_name(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig", shift("q2", 90.0))
-    channels = thin_channels(recording, TUNING)
-    assert channels is not None
-    judge = Judge(Fitter(channels, TUNING), recording)
+    judge = Judge.of(recording, TUNING)
+    assert judge is not None
     start = judge.trial(read_as_is(recording, ARM.parameters))
     found = search.find_mistakes(judge, start)
     singles = search_singles(judge, start)
@@ -206,9 +205,8 @@ def test_each_mistake_has_its_rivals_where_the_last_step_leaves_one_out(
     steps = iter([lambda without, best: best, lambda without, best: without[0]])
     monkeypatch.setattr(search, "_better_in_place", lambda judge, without, lists, best: next(steps)(without, best))
     recording = recording_with(tmp_path / "rig", both(scale(["tau3"], -1.0), shift("q2", -90.0)))
-    channels = thin_channels(recording, TUNING)
-    assert channels is not None
-    judge = Judge(Fitter(channels, replace(TUNING, max_mistakes=2)), recording)
+    judge = Judge.of(recording, replace(TUNING, max_mistakes=2))
+    assert judge is not None
     found = search.find_mistakes(judge, judge.trial(read_as_is(recording, ARM.parameters)))
     assert len(found.best.reading.mistakes) == len(found.without) == len(found.rivals) == 1
 
@@ -319,18 +317,17 @@ def test_a_mistake_is_found_beside_a_spring(tmp_path: Path) -> None:
 
 def test_fitted_bodies_can_exist_and_friction_takes_energy(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig")
-    channels = thin_channels(recording, TUNING)
-    assert channels is not None
-    (score,) = Fitter(channels, TUNING).scores(read_as_is(recording, ARM.parameters), (TUNING.free_width,), True)
+    rows = thin_channels(recording, TUNING)
+    assert rows is not None
+    (score,) = Fitter(rows.judge, TUNING).scores(read_as_is(recording, ARM.parameters), (TUNING.free_width,), True)
     assert all(least_eigenvalues(values).min() > 0 for values in score.values)
     assert score.own[:, :, :3].min() >= 0
 
 
 def test_what_frees_the_joints_of_their_links_is_no_unit(tmp_path: Path) -> None:
     recording = recording_with(tmp_path / "rig")
-    channels = thin_channels(recording, TUNING)
-    assert channels is not None
-    judge = Judge(Fitter(channels, TUNING), recording)
+    judge = Judge.of(recording, TUNING)
+    assert judge is not None
     start = judge.trial(read_as_is(recording, ARM.parameters))
     assert not any(judge.is_accepted(start, each) for each in search_singles(judge, start))
 
@@ -339,9 +336,8 @@ def test_a_joint_that_travels_as_far_as_the_others_is_in_their_unit(tmp_path: Pa
     """An unknown load makes a joint that hardly moves explain more; only a joint that travels too far is in degrees."""
     for factor, wanted in ((1.0, set[str]()), (180 / np.pi, {"unit_error@1"})):
         recording = recording_with(tmp_path / f"{factor:.0f}", scale(["q1"], factor))
-        channels = thin_channels(recording, TUNING)
-        assert channels is not None
-        judge = Judge(Fitter(channels, TUNING), recording)
+        judge = Judge.of(recording, TUNING)
+        assert judge is not None
         start = read_as_is(recording, ARM.parameters)
         degrees = [
             each
@@ -367,9 +363,9 @@ def test_a_short_run_beside_a_long_one_hides_no_mistake(tmp_path: Path) -> None:
         table["tau2"] *= -1
         table.to_csv(folder / file, index=False)
     recording = load_recording(folder)
-    channels = thin_channels(recording, TUNING)
-    assert channels is not None
-    assert np.bincount(channels.block).min() > 0
+    rows = thin_channels(recording, TUNING)
+    assert rows is not None
+    assert all(np.bincount(each.block).min() > 0 for each in (rows.search, rows.judge))
     assert names_of(answer_to(recording)) == ["torque_sign@2"]
 
 
@@ -377,9 +373,8 @@ def test_a_short_run_beside_a_long_one_hides_no_mistake(tmp_path: Path) -> None:
 def test_a_zero_near_half_a_turn_is_half_a_turn_where_the_data_do_not_tell(tmp_path: Path, angle: float) -> None:
     """No torque depends on the zero of a joint whose axis is vertical."""
     recording = recording_with(tmp_path / "rig")
-    channels = thin_channels(recording, TUNING)
-    assert channels is not None
-    judge = Judge(Fitter(channels, TUNING), recording)
+    judge = Judge.of(recording, TUNING)
+    assert judge is not None
     start = read_as_is(recording, ARM.parameters)
     turned, refined = (judge.trial(encoder_offset(start, 0, np.deg2rad(each))) for each in (180.0, angle))
     assert _is_quarter(judge, turned, refined, angle)
@@ -391,7 +386,7 @@ def test_degrees_are_those_of_joints_that_turn() -> None:
     eye = np.eye(3)
     order = (0, 1, 2)
     arm = replace(ARM, joints=joints)
-    reading = Reading(eye, np.zeros(3), eye, order, order, 1.0, np.zeros(3), arm, None)
+    reading = Reading(eye, np.zeros(3), eye, eye, order, order, 1.0, np.zeros(3), arm, None)
     positions = [each for each in units(reading) if each.mistakes[-1].form == "position"]
     scaled = {
         (each.mistakes[-1].label, each.mistakes[-1].value("factor")): np.diag(each.position) for each in positions

@@ -6,11 +6,9 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.recordings.reading.corrected import correct_recording
-from armlab.recordings.reading.fit import Fitter
 from armlab.recordings.reading.judge import Judge
 from armlab.recordings.reading.reading import SPRING, Mistake, Reading, read_as_is
 from armlab.recordings.reading.search import Found, find_mistakes
-from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.signs import has_no_sign
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.reading.words import INERTIAL_ERROR, describe, measurement
@@ -138,10 +136,9 @@ def read_rightly(recording: Recording, inertial: Array | None, tuning: ReadingTu
     if has_no_sign(recording):
         return Answer((_unsigned(recording),), recording, None)
     inertial = inertial if inertial is not None and are_bodies(inertial) else None
-    channels = thin_channels(recording, tuning)
-    if channels is None:
+    judge = Judge.of(recording, tuning)
+    if judge is None:
         return Answer((), recording, None)
-    judge = Judge(Fitter(channels, tuning), recording)
     start = judge.trial(read_as_is(recording, inertial))
     found = find_mistakes(judge, start)
     share = judge.overall_error(start)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.recordings.reading.reading import Reading, drives, second_drives
+from armlab.recordings.reading.reading import Reading, second_drives
 from armlab.recordings.reading.signals import Channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from problem.arm import Arm, Link
@@ -134,7 +134,6 @@ class Fitter:
             reading.clock,
             id(reading.arm.joints),
             reading.arm.gravity,
-            drives(reading).tobytes(),
         )
         if key not in self._columns:
             if len(self._columns) > 24:

@@ -15,6 +15,7 @@ from armlab.common.arrays import Array
 from armlab.recordings.reading.fit import Fitter, Score
 from armlab.recordings.reading.mistakes import POSITION, TORQUE, improbability, is_of_one_joint
 from armlab.recordings.reading.reading import Mistake, Reading
+from armlab.recordings.reading.signals import thin_channels
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
 from problem.regressor import rigid_body_torque
@@ -100,12 +101,23 @@ class Gain:
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """Scores readings of one recording. looks: counts them."""
+    """Scores readings of one recording.
+
+    fitter: of the instants on which readings are looked for. judging: of those on which they are judged. looks: counts
+    the readings that were looked at.
+    """
 
     fitter: Fitter
+    judging: Fitter
     recording: Recording
     looks: list[int] = field(default_factory=lambda: [0])
     _errors: dict[int, tuple[Reading, Errors, Errors]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, recording: Recording, tuning: ReadingTuning) -> "Judge | None":
+        """The judge of a recording; None where it is too short or its transmission cannot be undone."""
+        rows = thin_channels(recording, tuning)
+        return None if rows is None else cls(Fitter(rows.search, tuning), Fitter(rows.judge, tuning), recording)
 
     @cached_property
     def clock_is_right(self) -> bool:
@@ -141,14 +153,14 @@ class Judge:
         """Held-out errors near the links of the simulation, and with free ones: the same twice without a simulation."""
         if id(reading) not in self._errors:
             widths = self._widths(reading)
-            fits = zip(self.fitter.scores(reading, widths), self.fitter.scores(reading, widths, True), strict=True)
+            fits = zip(self.judging.scores(reading, widths), self.judging.scores(reading, widths, True), strict=True)
             out = [self._best_fit(reading, each) for each in fits]
             self._errors[id(reading)] = (reading, out[0], out[-1])
         return self._errors[id(reading)][1:]
 
     def _best_fit(self, reading: Reading, fits: Sequence[Score]) -> Errors:
         """Of each joint the fit that predicts it better: a reading that is wrong does so by both."""
-        shares = [self.fitter.shares(reading, each) for each in fits]
+        shares = [self.judging.shares(reading, each) for each in fits]
         better = np.argmin([each.errors for each in fits], axis=0)
         errors = np.min([each.errors for each in fits], axis=0)
         chosen = np.where(better, shares[1], shares[0])

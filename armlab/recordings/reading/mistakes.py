@@ -296,11 +296,22 @@ def is_of_one_joint(mistake: Mistake) -> bool:
     return single or mistake.effect in OF_ONE_JOINT
 
 
-def torque_joints(mistake: Mistake) -> frozenset[int]:
-    """Joints (from 1) whose torque alone a mistake changes; 0 stands for all else, which it changes, too."""
-    if mistake.effect == "torque_sign" or mistake.form == TORQUE:
-        return frozenset(mistake.joints or (mistake.joint or 0,))
-    return frozenset({0})
+def contradicted_by(mistake: Mistake) -> frozenset[int]:
+    """Joints (from 1) whose torque would not follow their own friction, were the mistake there.
+
+    Its sign or its column is that of another joint, in position or in torque alone. Any of them that leaves little of
+    its torque is read rightly. A wrong factor hides in friction, and a wrong zero shows at other joints.
+    """
+    if mistake.effect == "torque_sign" or mistake.form in (POSITION, TORQUE):
+        if mistake.effect == "channel_order":
+            return frozenset(place for place, own in enumerate(mistake.joints, 1) if place != own)
+        if mistake.effect in ("torque_sign", "joint_direction", "channel_swap"):
+            return frozenset(mistake.joints or (mistake.joint or 0,))
+        if mistake.effect == "axis_coupling":
+            return frozenset(mistake.joints[1:])
+        if mistake.effect == "unit_error" and mistake.form == TORQUE and mistake.joint is not None:
+            return frozenset((mistake.joint,))
+    return frozenset()
 
 
 def take_back(reading: Reading, mistake: Mistake, recording: Recording) -> Reading:

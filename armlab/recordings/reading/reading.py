@@ -48,7 +48,8 @@ class Mistake:
 class Reading:
     """How recorded channels become joint signals, SI units.
 
-    position: (joints, channels); offset: (joints,); torque: (joints, channels), gains included. position_order,
+    position: (joints, channels); offset: (joints,); torque: (joints, channels), gains included. drives: (drives,
+    joints), how far joints move the drives whose friction they feel, as the recording states it. position_order,
     torque_order: which recorded channel stands at each place. clock: recorded time over true time. delay: (joints,), s,
     by which torque is late. arm, inertial: the robot, and (10 * joints,) of the links of the simulation if there is
     one. mistakes: what was taken back. springs: joints (from 0) that have one beside links and friction.
@@ -57,6 +58,7 @@ class Reading:
     position: Array
     offset: Array
     torque: Array
+    drives: Array
     position_order: tuple[int, ...]
     torque_order: tuple[int, ...]
     clock: float
@@ -115,20 +117,20 @@ class Reading:
         return replace(self, delay=self.delay + more)
 
 
-def drives(reading: Reading) -> Array:
-    """How far joints move drives, (drives, joints), the largest entry of each row being one: drives = this @ joints.
+def second_drives(reading: Reading) -> tuple[int | None, ...]:
+    """Of each joint the drive besides its own that acts on it most; None where none does."""
+    others = np.abs(reading.drives.T) * (1 - np.eye(reading.joints))
+    return tuple(int(np.argmax(row)) if row.any() else None for row in others)
+
+
+def _drives_of(torque: Array) -> Array:
+    """How far joints move drives, with the largest entry of each row one.
 
     By virtual work: tau = T tau_drives, so that drives move with T' qd.
     """
-    moved = reading.torque.T
+    moved = torque.T
     largest = np.take_along_axis(moved, np.argmax(np.abs(moved), axis=1)[:, None], axis=1)
     return np.asarray(moved / np.where(largest == 0, 1.0, largest))
-
-
-def second_drives(reading: Reading) -> tuple[int | None, ...]:
-    """Of each joint the place of the drive besides its own that acts on it most; None where none does."""
-    others = np.abs(drives(reading).T) * (1 - np.eye(reading.joints))
-    return tuple(int(np.argmax(row)) if row.any() else None for row in others)
 
 
 def read_as_is(recording: Recording, inertial: Array | None) -> Reading:
@@ -138,6 +140,7 @@ def read_as_is(recording: Recording, inertial: Array | None) -> Reading:
         position=given.position,
         offset=given.offset,
         torque=given.torque * given.gains,
+        drives=_drives_of(given.torque),
         position_order=tuple(range(given.position.shape[1])),
         torque_order=tuple(range(given.torque.shape[1])),
         clock=1.0,

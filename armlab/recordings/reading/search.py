@@ -8,7 +8,7 @@ import numpy as np
 
 from armlab.recordings.reading import mistakes as table
 from armlab.recordings.reading.judge import Judge, Trial
-from armlab.recordings.reading.reading import Mistake, Reading
+from armlab.recordings.reading.reading import SPRING, Mistake, Reading
 from armlab.recordings.reading.singles import search_singles
 from armlab.recordings.reading.tuning import ReadingTuning
 
@@ -48,7 +48,8 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
             if other is not first and _is_better(other, best, tuning) and judge.is_accepted(start, other):
                 best, beside = other, more
     if best is start:
-        doubts = (each for each in _distinct(singles, tuning.beam) if judge.is_doubt(start, each))
+        mistakes = [each for each in singles if each.reading.mistakes[-1].effect != SPRING]
+        doubts = (each for each in _distinct(mistakes, tuning.beam) if judge.is_doubt(start, each))
         return Found(start, start, doubts=tuple(doubts), looks=judge.looks[0])
     extended, best = best, _merge_at_joints(judge, start, best)
     without, lists = _in_each_place(judge, start, best, singles)

@@ -1,4 +1,7 @@
-"""Filtered channels of the identification runs at a few instants, cut into blocks of time."""
+"""Filtered channels of the identification runs at a few instants, cut into blocks of time.
+
+Readings are looked for on a third of the instants and judged on the others.
+"""
 
 from dataclasses import dataclass, field
 
@@ -6,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, ROWS_PER_CUTOFF, travel_bandwidth
-from armlab.recordings.differentiate import differentiate, resample_evenly
+from armlab.recordings.cutoff import MAX_CUTOFF_SHARE, MIN_CUTOFF_PERIODS, travel_bandwidth
+from armlab.recordings.differentiate import Signals, differentiate, resample_evenly
 from armlab.recordings.filters import Filter
-from armlab.recordings.reading.reading import Reading, drives, second_drives
+from armlab.recordings.reading.reading import Reading, second_drives
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording, Run
 from problem.motion import Motion
@@ -64,7 +67,7 @@ class Channels:
         passed. width: of a drive's top speed, where its sign is taken for full.
         """
         out = np.zeros((self.rows, reading.joints, 2, 3))
-        moved, second = drives(reading), second_drives(reading)
+        moved, second = reading.drives, second_drives(reading)
         for joint in range(reading.joints):
             for number, place in enumerate((joint, second[joint])):
                 share = 0.0 if place is None else float(moved[place, joint])
@@ -107,41 +110,60 @@ class Channels:
         return out
 
 
-def thin_channels(recording: Recording, tuning: ReadingTuning) -> Channels | None:
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """The instants on which readings are looked for, and those on which they are judged."""
+
+    search: Channels
+    judge: Channels
+
+
+def thin_channels(recording: Recording, tuning: ReadingTuning) -> Rows | None:
     """The channels of the runs that identify; None where they are too short or the transmission cannot be undone."""
     given = recording.transmission
     to_torque = given.torque * given.gains
     for matrix in (given.position, to_torque):
         if matrix.shape[0] != matrix.shape[1] or np.linalg.cond(matrix) > tuning.max_transmission_condition:
             return None
-    undo, undo_torque = np.linalg.inv(given.position).T, np.linalg.inv(to_torque).T
     runs = recording.with_role("identify") or recording.runs
     if min(_length(run) for run in runs) < tuning.min_run_s:
         return None
+    signals = [differentiate(run, cutoff_hz=_cutoff_hz(run)) for run in map(resample_evenly, runs)]
+    return Rows(
+        _channels(recording, signals, tuning, (True, False, False)),
+        _channels(recording, signals, tuning, (False, True, True)),
+    )
+
+
+def _channels(
+    recording: Recording, signals: list[Signals], tuning: ReadingTuning, chosen: tuple[bool, ...]
+) -> Channels:
+    """The channels at every instant of each three that is chosen."""
+    given = recording.transmission
+    undo, undo_torque = np.linalg.inv(given.position).T, np.linalg.inv(given.torque * given.gains).T
+    runs = recording.with_role("identify") or recording.runs
     margin = min(tuning.max_delay_s, *(tuning.max_delay_share * _length(run) for run in runs))
     whole_s = sum(_length(run) for run in runs)
-    evens = [resample_evenly(run) for run in runs]
-    cutoffs = [_cutoff_hz(run) for run in evens]
-    told = ROWS_PER_CUTOFF * sum(cutoff * _length(run) for cutoff, run in zip(cutoffs, evens, strict=True))
-    step_s = whole_s / np.clip(told, tuning.blocks * tuning.min_rows, tuning.max_rows)
+    step_s = whole_s / tuning.rows
     motions, stamps, numbers, torques, velocities, blocks = [], [], [], [], [], []
     first = 0
-    for number, (run, cutoff) in enumerate(zip(evens, cutoffs, strict=True)):
-        signals = differentiate(run, cutoff_hz=cutoff)
-        time = signals.run.time
-        inside = signals.filter.rows
+    for number, (run, filtered) in enumerate(zip(runs, signals, strict=True)):
+        time = filtered.run.time
+        inside = filtered.filter.rows
         low, high = time[inside][0] + margin, time[inside][-1] - margin
-        rows = np.flatnonzero((time >= low) & (time <= high))[:: max(round(step_s * run.rate_hz), 1)]
-        motion = signals.motion
+        rows = np.flatnonzero((time >= low) & (time <= high))[:: max(round(step_s * filtered.run.rate_hz), 1)]
+        kept = np.resize(chosen, len(rows))
+        count = int(np.clip(round(tuning.blocks * _length(run) / whole_s), 1, len(rows) // len(chosen)))
+        blocks.append((first + np.arange(len(rows)) * count // len(rows))[kept])
+        first += count
+        rows = rows[kept]
+        motion = filtered.motion
         raw = (motion.position[rows] - given.offset) @ undo
         motions.append(Motion(raw, motion.velocity[rows] @ undo, motion.acceleration[rows] @ undo))
         stamps.append(time[rows])
         numbers.append(np.full(len(rows), number))
-        velocities.append((motion.velocity @ undo, signals.filter, rows))
-        torques.append((time, signals.filter.smooth(signals.run.torque) @ undo_torque))
-        count = int(np.clip(round(tuning.blocks * _length(run) / whole_s), 1, len(rows)))
-        blocks.append(first + np.arange(len(rows)) * count // len(rows))
-        first += count
+        velocities.append((motion.velocity @ undo, filtered.filter, rows))
+        torques.append((time, filtered.filter.smooth(filtered.run.torque) @ undo_torque))
     motion = Motion(*(np.concatenate([getattr(each, name) for each in motions]) for name in _MOTION))
     return Channels(
         motion,

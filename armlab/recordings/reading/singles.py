@@ -21,7 +21,7 @@ def search_singles(judge: Judge, start: Trial) -> list[Trial]:
     found = [
         judge.trial(each)
         for each in _exact(judge, reading)
-        if not table.torque_joints(each.mistakes[-1]) <= quiet
+        if not table.contradicted_by(each.mistakes[-1]) & quiet
         and judge.is_size_plausible(reading, each)
         and judge.fitter.implausible(each) <= absurd
     ]

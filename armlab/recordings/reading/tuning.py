@@ -9,8 +9,12 @@ from armlab.common.tuning import tuned
 class ReadingTuning:
     """How readings of the recording and of the robot file are compared, and when a mistake is named."""
 
-    max_rows: int = tuned(350, unit="rows", meaning="instants of all runs that are fitted", least=50)
-    min_rows: int = tuned(16, unit="rows a block", meaning="instants that are fitted at least", least=2)
+    rows: int = tuned(
+        480,
+        unit="rows",
+        meaning="instants of all runs: on a third of them readings are looked for, on the others they are judged",
+        least=60,
+    )
     blocks: int = tuned(
         20, unit="blocks", meaning="blocks of time of all runs, of which every second is held out", least=4
     )
