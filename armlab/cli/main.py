@@ -73,6 +73,7 @@ _GROUPS = {
         "score": "armlab.cli.proof:score",
         "calibrate": "armlab.cli.proof:calibrate_names",
         "calibrate-unknown": "armlab.cli.proof:calibrate_unknown",
+        "calibrate-reading": "armlab.cli.proof:calibrate_reading",
         "oracle": "armlab.cli.proof:oracle",
         "next-loop": "armlab.cli.proof:next_loop",
         "ablate": "armlab.cli.proof:ablate",

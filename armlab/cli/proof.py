@@ -306,6 +306,41 @@ def calibrate_unknown(claims: tuple[Path, ...], unseen: tuple[Path, ...], out: P
         yield f"wrote {path}"
 
 
+@click.command("calibrate-reading")
+@click.option("--work", type=OutputPath(), default=Path(".armlab/recordings"), show_default=True)
+@click.option("--out", type=OutputPath(), required=True, help="Folder for bound.json and reading_bound.md.")
+@prints_lines
+def calibrate_reading(work: Path, out: Path) -> Iterator[str]:
+    """Learn how much a reading mistake has to explain.
+
+    From the best wrong readings of real recordings: the folders below ARMLAB_RECORDINGS, and the public ones, fetched
+    into --work. Each arm is judged once more with the bound that the others make.
+    """
+    from armlab.common.errors import InputError
+    from armlab.diagnosis.real_folders.reading_bound import (
+        best_wrong_readings,
+        bound_lines,
+        bound_of,
+        leave_each_arm_out,
+        share_told,
+        write_bound,
+    )
+    from armlab.identification.likeness.real_arms import real_folders
+    from armlab.recordings.public import LOCAL_COPIES_VARIABLE, local_copies
+    from armlab.recordings.reading.tuning import ReadingTuning
+
+    local, tuning = local_copies(), ReadingTuning()
+    if local is None:
+        raise InputError(f"no recording folders: {LOCAL_COPIES_VARIABLE} names none")
+    readings = list(best_wrong_readings(list(real_folders(local, work)), tuning))
+    bound, verdicts = bound_of(readings), list(leave_each_arm_out(readings, tuning))
+    yield from bound_lines(verdicts, bound)
+    told, count = share_told(readings, bound)
+    yield f"{len(readings)} recordings of {len(verdicts)} arms: bound {bound:.3f}; {told} of {count} mistakes reach it"
+    for path in write_bound(readings, verdicts, out):
+        yield f"wrote {path}"
+
+
 @click.command()
 @click.option("--quick", is_flag=True, help="A few cases of each tier, of a fixed development seed, not logged.")
 @click.option("--development", type=int, metavar="SEED", help="Sets of a development seed, not logged.")

@@ -1,8 +1,8 @@
 """The judge of readings: held-out errors of two views, and when a mistake may be named.
 
 Many readings are looked at; the errors of the best ones are compared joint by joint and block by block. A mistake is
-the last explanation of a large error: taken back, it has to explain most of what some joint leaves, and no joint may be
-explained worse. What a real arm leaves of its own is often explained by a third, and hardly ever by a half.
+the last explanation of a large error: taken back, it has to explain more than the best wrong reading of a real arm
+explains by chance (`bound.py`).
 """
 
 from collections.abc import Sequence
@@ -48,13 +48,15 @@ class Errors:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """How far errors fall from one reading to another. falls: (joints,), logarithms; sigmas: (joints,) of them.
+    """How far errors fall from one reading to another. falls: (joints,), logarithms; deviations: (joints,), standard.
 
-    total_sigmas: of the sum over the joints, between blocks of time.
+    total_deviation: of the sum over the joints, between blocks of time. total_sigmas: the sum over the joints in such
+    deviations.
     """
 
     falls: Array
-    sigmas: Array
+    deviations: Array
+    total_deviation: float
     total_sigmas: float
 
     @classmethod
@@ -62,7 +64,9 @@ class View:
         """From one reading to another of the same blocks; errors below the smallest one count as that."""
         falls = np.log(np.maximum(before.errors, smallest)) - np.log(np.maximum(after.errors, smallest))
         blocks = before.losses - after.losses
-        return cls(falls, _sigmas(blocks), float(_sigmas(np.sum(blocks, axis=1, keepdims=True))[0]))
+        totals = np.sum(blocks, axis=1, keepdims=True)
+        total = float(_deviations(totals)[0])
+        return cls(falls, _deviations(blocks), total, float(np.mean(totals)) / max(total, 1e-9))
 
     @property
     def best(self) -> int:
@@ -74,16 +78,20 @@ class View:
         """Sum over the joints, nats."""
         return float(np.sum(self.falls))
 
-    def rises(self, tuning: ReadingTuning) -> bool:
-        """Whether some joint is explained worse, beyond chance."""
-        surely = (self.falls < -np.log(tuning.small_rise)) & (self.sigmas < -tuning.rise_sigmas)
-        return bool(np.any(surely | (self.falls < -np.log(tuning.large_rise))))
+    def least_gain(self, sure: float, of_one_joint: bool) -> float:
+        """How far the errors of all joints together fall at least, and that of the best one if that has to tell, too.
+
+        sure: standard deviations that are taken off. What rises counts twice.
+        """
+        rise = float(np.sum(np.maximum(-self.falls, 0.0)))
+        total = self.gain - rise - sure * self.total_deviation
+        alone = float(self.falls[self.best] - sure * self.deviations[self.best])
+        return min(total, alone) if of_one_joint else total
 
 
-def _sigmas(blocks: Array) -> Array:
-    """Mean over the blocks (blocks, columns), in standard errors of it."""
-    error = np.std(blocks, axis=0, ddof=1) / np.sqrt(len(blocks))
-    return np.asarray(np.mean(blocks, axis=0) / np.maximum(error, 1e-9))
+def _deviations(blocks: Array) -> Array:
+    """Standard deviations of means over the blocks (blocks, columns)."""
+    return np.asarray(np.std(blocks, axis=0, ddof=1) / np.sqrt(len(blocks)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,27 +193,20 @@ class Judge:
     def is_accepted(self, before: Trial, after: Trial, mistake: Mistake | None = None) -> bool:
         """Whether a reading explains so much more that a mistake may be named, its last one if left out."""
         mistake = mistake or after.reading.mistakes[-1]
-        return self._passes(before, after, mistake, self._least_fall(mistake, after.reading))
+        return self._reaches(before, after, mistake, self.tuning.least_evidence)
 
     def is_doubt(self, before: Trial, after: Trial) -> bool:
-        """Whether a reading that may not be named explains something surely, and no joint worse."""
-        mistake = after.reading.mistakes[-1]
-        return self._passes(before, after, mistake, DOUBT_SHARE * self._least_fall(mistake, after.reading))
+        """Whether a reading that may not be named explains half as much."""
+        return self._reaches(before, after, after.reading.mistakes[-1], DOUBT_SHARE * self.tuning.least_evidence)
 
-    def may_begin(self, before: Trial, after: Trial) -> bool:
-        """Whether a mistake explains so much that another one is looked for beside it, though joints are worse."""
-        mistake = after.reading.mistakes[-1]
-        return self._passes(before, after, mistake, self._least_fall(mistake, after.reading), may_rise=True)
+    def _reaches(self, before: Trial, after: Trial, mistake: Mistake, least: float) -> bool:
+        """Whether a reading has so much evidence; where the quick fits do not show most of it, it is not judged."""
+        wanted = least + improbability(mistake, after.reading.joints) / self.fitter.channels.blocks
+        return self.may_explain(before, after, wanted) and self.evidence(before, after, mistake) >= least
 
     def improbability(self, reading: Reading) -> float:
         """Of the last mistake of a reading, nats a block: what it has to explain better than the commonest one."""
         return improbability(reading.mistakes[-1], reading.joints) / self.fitter.channels.blocks
-
-    def _least_fall(self, mistake: Mistake, reading: Reading) -> float:
-        beyond = improbability(mistake, reading.joints) / self.fitter.channels.blocks
-        tuning = self.tuning
-        factor = tuning.least_factor if is_of_one_joint(mistake) else tuning.least_total_factor
-        return float(np.log(factor)) + beyond
 
     def overall_error(self, trial: Trial) -> float:
         """Held-out error near the simulation's links, geometric mean over the joints, of the torque's scatter."""
@@ -217,7 +218,7 @@ class Judge:
 
         least: nats; those of a mistake that is named if left out.
         """
-        least = np.log(self.tuning.least_total_factor) if least is None else least
+        least = self.tuning.least_evidence if least is None else least
         falls = [before.free - after.free]
         if before.near is not None and after.near is not None:
             falls.append(before.near - after.near)
@@ -226,42 +227,32 @@ class Judge:
 
     def is_told_by_geometry(self, before: Trial, after: Trial, mistake: Mistake) -> bool:
         """Whether no other links would explain what was recorded as well."""
-        free = self.errors(after.reading)[1]
-        return self._tells(self.gain(before, after).free, free, mistake, self._least_fall(mistake, after.reading))
+        return self._evidence(self.gain(before, after).free, after.reading, mistake) >= self.tuning.least_evidence
 
-    def _passes(self, before: Trial, after: Trial, mistake: Mistake, least: float, may_rise: bool = False) -> bool:
-        """Whether errors fall so far, surely, and no joint is explained worse in either view.
+    def evidence(self, before: Trial, after: Trial, mistake: Mistake) -> float:
+        """What a reading explains beyond chance, nats, in the view that tells more.
 
         By geometry: free links show it. By the links of the simulation: near them the reading is about as good as any
         links make it.
         """
-        if not self.may_explain(before, after, least):
-            return False
         gain = self.gain(before, after)
-        if not may_rise and (gain.near.rises(self.tuning) or gain.free.rises(self.tuning)):
-            return False
-        near, free = self.errors(after.reading)
-        if self._tells(gain.free, free, mistake, least):
-            return True
-        by_links = max(least, float(np.log(self.tuning.least_factor)) + self.improbability(after.reading))
-        if before.near is None or not self._tells(gain.near, near, mistake, by_links):
-            return False
-        first, _ = self.errors(before.reading)
+        free = self._evidence(gain.free, after.reading, mistake)
+        if before.near is None:
+            return free
         floor = self.tuning.smallest_error
+        (first, _), (near, best) = self.errors(before.reading), self.errors(after.reading)
         gap, left = (
-            float(np.sum(np.log(np.maximum(each.errors, floor) / np.maximum(free.errors, floor))))
+            float(np.sum(np.log(np.maximum(each.errors, floor) / np.maximum(best.errors, floor))))
             for each in (first, near)
         )
-        return left < self.tuning.max_open_gap * gap
+        if left >= self.tuning.max_open_gap * gap:
+            return free
+        return max(free, self._evidence(gain.near, after.reading, mistake))
 
-    def _tells(self, view: View, after: Errors, mistake: Mistake, least: float) -> bool:
-        """Whether all joints together fall so far, and the best one alone for a mistake that is told by one joint."""
-        best, tuning = view.best, self.tuning
-        if view.total_sigmas < tuning.min_sigmas and view.sigmas[best] < tuning.min_sigmas:
-            return False
-        if is_of_one_joint(mistake) and (view.falls[best] < least or view.sigmas[best] < tuning.min_sigmas):
-            return False
-        return bool(view.gain >= least and after.errors[best] <= tuning.max_left)
+    def _evidence(self, view: View, reading: Reading, mistake: Mistake) -> float:
+        """What surely falls, less what the best of so many wrong readings explains by chance."""
+        least = view.least_gain(self.tuning.sure_deviations, is_of_one_joint(mistake))
+        return least - improbability(mistake, reading.joints) / self.fitter.channels.blocks
 
     def is_size_plausible(self, parent: Reading, reading: Reading) -> bool:
         """Whether a last mistake that scales makes sizes more alike, as a wrong unit does.

@@ -38,11 +38,10 @@ def find_mistakes(judge: Judge, start: Trial) -> Found:
         return Found(start, start, looks=judge.looks[0])
     singles = search_singles(judge, start)
     best, beside = _extend(judge, start, singles)
-    if not judge.is_usual(best):
-        gross = judge.overall_error(start) > tuning.gross_error
+    if not judge.is_usual(best) and judge.overall_error(start) > tuning.gross_error:
         for first in _distinct(singles, tuning.beam):
             is_taken = first.reading.mistakes == best.reading.mistakes[:1]
-            if is_taken or not (judge.may_begin(start, first) or (gross and judge.may_explain(start, first))):
+            if is_taken or not judge.may_explain(start, first):
                 continue
             other, more = _extend(judge, first, search_singles(judge, first))
             if other is not first and _is_better(other, best, tuning) and judge.is_accepted(start, other):

@@ -117,7 +117,7 @@ def _is_quarter(judge: Judge, turned: Trial | None, refined: Trial, angle: float
     if off < judge.tuning.quarter_tolerance_deg:
         return True
     view = judge.gain(turned, refined).near
-    doubtful = view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.min_sigmas
+    doubtful = view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.rival_sigmas
     return off < judge.tuning.quarter_reach_deg and doubtful
 
 
@@ -151,7 +151,7 @@ def _is_level(judge: Judge, coarse: list[Trial], refined: Trial) -> bool:
         axis = np.array(each.reading.arm.gravity)
         if np.count_nonzero(axis) == 1 and angle_between(own, axis) < judge.tuning.level_reach_deg:
             view = judge.gain(each, refined).near
-            return view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.min_sigmas
+            return view.gain < judge.tuning.min_quarter_gain or view.total_sigmas < judge.tuning.rival_sigmas
     return False
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from armlab.common.tuning import tuned
+from armlab.recordings.reading.bound import learnt_bound
 
 
 @dataclass(frozen=True)
@@ -87,30 +88,27 @@ class ReadingTuning:
         0.1, unit="rad", meaning="a joint that travels less may be read behind its gear, and no reading makes it so"
     )
     min_gain: float = tuned(0.5, unit="nats", meaning="what two mistakes have to explain beyond the best single one")
-    min_sigmas: float = tuned(
-        3.5, unit="standard errors", meaning="between blocks of time, by which errors fall for a mistake that is named"
-    )
     usual_error: float = tuned(
         0.05,
         unit="of the torque's scatter",
         meaning="no other reading is looked for where links and usual friction leave less of every joint",
     )
     gross_error: float = tuned(
-        0.4,
+        0.3,
         unit="of the torque's scatter",
         meaning="of all joints, from which on two mistakes are looked for of which none explains much alone",
     )
-    least_factor: float = tuned(
-        2.0, meaning="by which the error of some joint falls with a mistake taken back, for a mistake that is named"
+    least_evidence: float = tuned(
+        learnt_bound(),
+        unit="nats",
+        meaning="what a mistake that is named has to explain beyond chance",
+        source="the best wrong readings of real arms: armlab calibrate-reading",
     )
-    least_total_factor: float = tuned(
-        1.5, meaning="by which the errors of all joints together fall, for a mistake that has no joint to choose"
-    )
-    small_rise: float = tuned(1.05, meaning="by which the error of no other joint may rise surely")
-    large_rise: float = tuned(1.5, meaning="by which the error of no other joint may rise, surely or not")
-    rise_sigmas: float = tuned(2.5, unit="standard errors", meaning="what makes a rise sure")
-    max_left: float = tuned(
-        0.5, unit="of the torque's scatter", meaning="what the joint that shows a mistake leaves without it at most"
+    sure_deviations: float = tuned(
+        2.0,
+        unit="standard deviations",
+        meaning="between blocks of time, that are taken off what a reading explains",
+        source="a two-sided interval of 95 %",
     )
     max_open_gap: float = tuned(
         0.25,
