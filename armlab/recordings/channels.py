@@ -24,7 +24,7 @@ MOTOR_SIDE_SIGNALS = ("position", "velocity", "reference_position", "reference_v
 def make_raw_run(table: Table, file: RecordingFile, entry: RunEntry, units: dict[str, tuple[Unit, ...]]) -> Run:
     """The run of a table; values may still be NaN, stamps in any order."""
     signals = _read_signals(table, file, units)
-    time, notes = _from_first_stamp(signals.pop("time")[:, 0])
+    time, notes = _from_first_stamp(signals.pop("time")[:, 0], entry.file)
     torque = signals.pop("torque" if file.columns.torque else "current")
     findings = (*table.findings, *notes, *report_assumed_units(file))
     run = Run(entry.file, entry.role, time, signals.pop("position"), torque, findings=findings)
@@ -36,7 +36,7 @@ def make_raw_motion_run(
 ) -> MotionRun:
     """The run of a table without torque; values may still be NaN, stamps in any order."""
     signals = _read_signals(table, file, units)
-    time, notes = _from_first_stamp(signals.pop("time")[:, 0])
+    time, notes = _from_first_stamp(signals.pop("time")[:, 0], entry.file)
     position = signals.pop("position")
     findings = (*table.findings, *notes, *report_assumed_units(file))
     return MotionRun(entry.file, entry.role, time, position, findings=findings).with_signals(time, signals)
@@ -58,8 +58,21 @@ MAX_EPOCH_S = 1e10  # the year 2286
 MIN_EPOCH_S = 1e8  # three years: larger stamps count from another start than that of the recording
 
 
-def _from_first_stamp(time: Array) -> tuple[Array, tuple[Finding, ...]]:
-    """Stamps, s, from the first one where they count from 1970, and a note that says so."""
+def _from_first_stamp(time: Array, file: str) -> tuple[Array, tuple[Finding, ...]]:
+    """Stamps, s, from the first one where they count from 1970, and a note that says so.
+
+    Raises InputError for stamps that single precision cannot tell apart.
+    """
+    known = np.unique(time[np.isfinite(time)])
+    largest = np.float32(min(np.abs(known).max(initial=0.0), float(np.finfo(np.float32).max)))
+    spacing, finest = float(np.spacing(largest)), np.diff(known).min(initial=np.inf)
+    is_coarse = spacing > 1 / SLOWEST_HZ if len(known) == 1 else spacing >= finest
+    if len(time) > 1 and len(known) <= len(time) / 2 and is_coarse and np.all(np.mod(known, spacing) == 0):
+        raise InputError(
+            f"{file}: the time stands still, {len(time) - len(known)} of {len(time)} rows have the stamp of another "
+            f"one: single precision counts in steps of {spacing:g} s there; write stamps in double precision, or count "
+            "from the first one"
+        )
     usual = float(np.median(time[np.isfinite(time)])) if np.isfinite(time).any() else 0.0
     if not MIN_EPOCH_S < usual < MAX_EPOCH_S:
         return time, ()

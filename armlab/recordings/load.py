@@ -1,8 +1,11 @@
 """From a recording folder to a `Recording`: read, repaired where safe, in SI units on the joint side."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from armlab.common.errors import InputError
 from armlab.recordings.channels import (
@@ -13,23 +16,23 @@ from armlab.recordings.channels import (
     take_timing_back,
     to_joint_side,
 )
+from armlab.recordings.clock import cut_at_jumps, cut_into_clocks, keep_long_parts, part_equal_stamps, require_samples
+from armlab.recordings.encoders import read_direction_bit, unwrap_encoders
 from armlab.recordings.reading.signs import compare_joint_names
 from armlab.recordings.recording import AnyRun, Finding, Recording, Run, Transmission
 from armlab.recordings.recording_file import FILE_NAME, RecordingFile, RunEntry, read_recording_file
 from armlab.recordings.repair import (
     drop_bad_rows,
-    drop_duplicate_rows,
+    drop_copied_rows,
+    drop_rows_beyond_limits,
+    drop_zero_rows,
     fill_optional_signals,
     leave_out,
-    read_direction_bit,
-    sort_rows,
-    split_at_gaps,
-    unwrap_encoders,
 )
 from armlab.recordings.stamps import drop_repeated_rows, repair_stamps
 from armlab.recordings.table import read_table
 from armlab.recordings.units import Unit
-from problem.arm import Arm
+from problem.arm import Arm, Joint
 from problem.robot_file import load_arm
 
 
@@ -79,32 +82,43 @@ def _compare_names(file: RecordingFile, arm: Arm) -> tuple[Finding, ...]:
 
 
 def load_runs(recording: Recording, file: RecordingFile, entry: RunEntry) -> tuple[Run, ...]:
-    """The runs of one file: several if its clock steps back or pauses."""
+    """The runs of one file: several where its clock starts anew or its signals jump at a gap."""
     units = channel_units(file, recording.arm, recording.folder)
     table = read_table(recording.folder / entry.file)
-    names = file.columns.signals()
-    names["torque"] = file.columns.torque or file.columns.current or ()
-    run = drop_bad_rows(make_raw_run(table, file, entry, units), table.row_numbers, names)
-    parts = repair_run(run, recording.transmission, file, entry, units)
-    return tuple(take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in parts)
-
-
-def repair_run(
-    run: AnyRun,
-    transmission: Transmission,
-    file: RecordingFile,
-    entry: RunEntry,
-    units: dict[str, tuple[Unit, ...]],
-) -> tuple[AnyRun, ...]:
-    """The run without bad rows, repaired and on the joint side; several if its clock steps back or pauses."""
-    run = leave_out(fill_optional_signals(drop_duplicate_rows(sort_rows(run))), entry.exclude)
-    angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in units.items()}
-    sound = (
-        unwrap_encoders(repair_stamps(drop_repeated_rows(part)), angles)
-        for part in split_at_gaps(read_direction_bit(run))
+    run = make_raw_run(table, file, entry, units)
+    places = RepairPlaces(table.row_numbers, file, entry, units, recording.arm.joints, recording.transmission)
+    return tuple(
+        take_timing_back(part, file.timing, str(recording.folder / FILE_NAME)) for part in repair_run(run, places)
     )
-    joints = (to_joint_side(part, transmission) for part in sound)
-    return tuple(check_rate(part, file.sample_rate_hz) for part in joints)
+
+
+@dataclass(frozen=True, eq=False)
+class RepairPlaces:
+    """Where a run comes from, for its repairs: numbers of its rows in the file, units of its channels, its joints."""
+
+    row_numbers: NDArray[np.intp]
+    file: RecordingFile
+    entry: RunEntry
+    units: dict[str, tuple[Unit, ...]]
+    joints: tuple[Joint, ...]
+    transmission: Transmission
+
+
+def repair_run(raw: AnyRun, places: RepairPlaces) -> tuple[AnyRun, ...]:
+    """The run repaired and on the joint side; several where its clock starts anew or its signals jump at a gap."""
+    columns = places.file.columns
+    names = columns.signals() | {"torque": columns.torque or columns.current or ()}
+    measured = drop_bad_rows(raw, places.row_numbers, names)
+    single = drop_copied_rows(leave_out(measured, places.entry.exclude))
+    rows = single.samples + raw.samples - measured.samples
+    sound = drop_rows_beyond_limits(drop_zero_rows(single), places.joints, places.transmission)
+    clocks = (part_equal_stamps(read_direction_bit(fill_optional_signals(clock))) for clock in cut_into_clocks(sound))
+    exclude = places.entry.exclude
+    parts = keep_long_parts(tuple(part for clock in clocks for part in cut_at_jumps(clock, exclude)), rows)
+    angles = {name: tuple(unit.quantity == "rad" for unit in channels) for name, channels in places.units.items()}
+    even = require_samples(tuple(repair_stamps(drop_repeated_rows(part)) for part in parts))
+    joints = (to_joint_side(unwrap_encoders(part, angles), places.transmission) for part in even)
+    return tuple(check_rate(part, places.file.sample_rate_hz) for part in joints)
 
 
 def with_runs(recording: Recording, runs: Sequence[Run]) -> Recording:

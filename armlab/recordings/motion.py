@@ -7,7 +7,7 @@ from pathlib import Path
 from armlab.common.errors import InputError
 from armlab.common.settings import suggest_name
 from armlab.recordings.channels import channel_units, make_raw_motion_run, make_transmission
-from armlab.recordings.load import repair_run
+from armlab.recordings.load import RepairPlaces, repair_run
 from armlab.recordings.recording import Finding, MotionRun, Role, Transmission
 from armlab.recordings.recording_file import (
     FILE_NAME,
@@ -16,7 +16,6 @@ from armlab.recordings.recording_file import (
     RunEntry,
     read_recording_file,
 )
-from armlab.recordings.repair import drop_bad_rows
 from armlab.recordings.table import read_table
 from problem.arm import Arm
 from problem.mjcf import compile_mjcf
@@ -129,11 +128,11 @@ def _check_controller(file: RecordingFile, joints: int, folder: Path) -> None:
 
 
 def load_motion_runs(recording: MotionRecording, file: RecordingFile, entry: RunEntry) -> tuple[MotionRun, ...]:
-    """The runs of one file: several if its clock steps back or pauses, or where a stretch is left out."""
+    """The runs of one file: several where its clock starts anew or its signals jump at a gap."""
     units = channel_units(file, recording.recorded_arm, recording.folder)
     table = read_table(recording.folder / entry.file)
-    run = drop_bad_rows(make_raw_motion_run(table, file, entry, units), table.row_numbers, file.columns.signals())
-    return repair_run(run, recording.transmission, file, entry, units)
+    places = RepairPlaces(table.row_numbers, file, entry, units, recording.recorded_arm.joints, recording.transmission)
+    return repair_run(make_raw_motion_run(table, file, entry, units), places)
 
 
 def with_motion_runs(recording: MotionRecording, runs: list[MotionRun]) -> MotionRecording:

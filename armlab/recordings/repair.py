@@ -1,19 +1,24 @@
-"""Safe repairs of a run: bad rows, missing cells, the order of rows, gaps of the clock, and encoders that wrap around.
+"""Rows of a run that are no measurement, and cells that are missing. Each repair says how many rows it takes.
 
-Each repair reports what it changed. Data that cannot be repaired safely raise InputError.
+A repair may take a tenth of a run. What takes more is no repair: InputError says what stands in the file.
 """
 
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.recording import AnyRun, Finding, MotionRun, Run
+from armlab.recordings.recording import AnyRun, Finding, MotionRun, Run, Transmission
+from problem.arm import Joint
 
 MAX_PLAUSIBLE_VALUE = 1e9  # no arm moves, pulls or lasts this much in SI units
-MAX_BAD_ROW_SHARE = 0.05  # more bad rows than this, and the file is broken rather than a few rows
+MAX_LOST_SHARE = 0.1  # of the rows of a run: a repair that takes more is a question
+USUAL_SHARE = 0.9  # of the rows, whose values are usual
+USUAL_STEP_SHARE, MAX_USUAL_STEPS = 0.98, 3.0  # of the steps are usual ones; a longer one than three of them is a jump
+BEYOND_LIMITS = 10.0  # times a limit: no arm is there
+BEYOND_USUAL, BEYOND_LEAST = 1e3, 1e3  # times the usual size, and in SI units at least: no sensor reads so (by eye)
 
 
 def required_names(run: MotionRun) -> tuple[str, str]:
@@ -22,14 +27,14 @@ def required_names(run: MotionRun) -> tuple[str, str]:
 
 
 def drop_bad_rows(run: AnyRun, rows: NDArray[np.intp], names: dict[str, tuple[str, ...]]) -> AnyRun:
-    """Leaves out rows whose time, position or torque is not a number, infinite, or larger than any arm can give.
+    """Leaves out rows whose time, position or torque is not a number, infinite, or beyond any sensor.
 
     In a run without torque the command counts instead.
 
     rows: (samples,), number of each row in the file. names: of the columns of each signal, for the message.
-    Raises InputError where more than a few rows are bad.
+    Raises InputError where more than a tenth of the rows are bad.
     """
-    wrong = {name: ~_is_plausible(signal) for name, signal in _required_signals(run).items()}
+    wrong = {name: _is_no_measurement(name, signal) for name, signal in _required_signals(run).items()}
     bad = np.any([flags.any(axis=1) for flags in wrong.values()], axis=0)
     if not bad.any():
         return run
@@ -38,8 +43,8 @@ def drop_bad_rows(run: AnyRun, rows: NDArray[np.intp], names: dict[str, tuple[st
     value = _required_signals(run)[signal][row, column]
     example = f"line {rows[row]}: {names[signal][column]} = {value:g}"
     text = f"{bad.sum()} of {len(bad)} rows hold a value that is not a measurement ({example})"
-    if bad.sum() > max(1, MAX_BAD_ROW_SHARE * len(bad)):
-        raise InputError(f"{run.file}: {text}: too many to repair; export the run again")
+    if bad.sum() > max(1, MAX_LOST_SHARE * len(bad)):
+        raise InputError(f"{run.file}: {text}: {_cause_of_bad_rows(wrong, names)}")
     return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
 
 
@@ -47,9 +52,111 @@ def _required_signals(run: MotionRun) -> dict[str, Array]:
     return {"time": run.time[:, None], **{name: run.signals[name] for name in required_names(run)}}
 
 
-def _is_plausible(values: Array) -> NDArray[np.bool_]:
+def _is_no_measurement(name: str, values: Array) -> NDArray[np.bool_]:
+    """Where values are no numbers or far beyond the usual ones of their column; stamps have no usual size."""
+    size = np.abs(values)
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(values) < MAX_PLAUSIBLE_VALUE)
+        wrong = ~(size < MAX_PLAUSIBLE_VALUE)
+    if name == "time" or not len(values):
+        return np.asarray(wrong)
+    usual = np.quantile(np.where(wrong, 0.0, size), USUAL_SHARE, axis=0)
+    return np.asarray(wrong | (size > np.maximum(BEYOND_USUAL * usual, BEYOND_LEAST)))
+
+
+def _cause_of_bad_rows(wrong: dict[str, NDArray[np.bool_]], names: dict[str, tuple[str, ...]]) -> str:
+    """What to do, by the pattern of what is missing."""
+    for name, flags in wrong.items():
+        empty = np.flatnonzero(flags.all(axis=0))
+        if len(empty):
+            column = names[name][int(empty[0])]
+            return f"column {column} ({name}) holds no number in any row: name another column, or import the log"
+    missing = {name: flags.all(axis=1) for name, flags in wrong.items()}
+    for name, alone in missing.items():
+        others = [flags for other, flags in missing.items() if other not in (name, "time")]
+        if name != "time" and any(np.any(alone & ~other) and np.any(other & ~alone) for other in others):
+            return "its signals stand in different rows: `armlab recording import` puts them on common stamps"
+    return "too many to repair; export the run again"
+
+
+def drop_zero_rows(run: AnyRun) -> AnyRun:
+    """Leaves out rows that hold zeros alone between rows that do not, as drivers send them that had nothing to say.
+
+    A signal that comes to rest at zero stays: no joint jumps there. Raises InputError where that is more than a tenth.
+    """
+    values = np.column_stack([run.signals[name] for name in required_names(run)])
+    zero = np.all(values == 0, axis=1)
+    if not zero.any() or zero.all():
+        return run
+    there = np.flatnonzero(~zero)
+    before = np.searchsorted(there, np.flatnonzero(zero)) - 1
+    sides = (
+        run.position[there[np.clip(before, 0, None)]],
+        run.position[there[np.clip(before + 1, None, len(there) - 1)]],
+    )
+    usual = (
+        np.quantile(np.abs(np.diff(run.position[there], axis=0)), USUAL_STEP_SHARE, axis=0) if len(there) > 1 else 0.0
+    )
+    jumps = np.any(np.minimum(*np.abs(sides)) > MAX_USUAL_STEPS * usual, axis=1)
+    bad = zero.copy()
+    bad[zero] = jumps
+    if not bad.any():
+        return run
+    first = f"first at {run.time[bad][0]:g} s"
+    text = f"{bad.sum()} of {len(bad)} rows hold zeros alone, between rows that do not ({first})"
+    if bad.sum() > MAX_LOST_SHARE * len(bad):
+        raise InputError(f"{run.file}: {text}: does another driver write into the log? Export the arm's rows alone")
+    return run.rows(~bad).with_findings(Finding("bad_value", "repaired", f"{text}; left out"))
+
+
+def drop_rows_beyond_limits(run: AnyRun, joints: Sequence[Joint], transmission: Transmission) -> AnyRun:
+    """Leaves out rows in which a joint stands beyond ten times its limits, or its torque is, as it is in few rows.
+
+    Limits that most of the run exceeds are placeholders, or its unit is another one: that is no matter of single rows.
+    """
+    found = {"position": run.position @ transmission.position.T + transmission.offset}
+    if isinstance(run, Run):
+        found["torque"] = run.torque * transmission.gains @ transmission.torque.T
+    limits = {
+        "position": np.array([np.abs(joint.limits.position).max() for joint in joints]),
+        "torque": np.array([joint.limits.torque for joint in joints]),
+    }
+    bad = np.zeros(run.samples, dtype=bool)
+    worst = ""
+    for name, values in found.items():
+        size = np.abs(values)
+        usual = np.quantile(size, 1 - MAX_LOST_SHARE, axis=0)
+        beyond = size > BEYOND_LIMITS * np.maximum(limits[name], usual)
+        if beyond.any() and not worst:
+            row, joint = (int(place) for place in np.argwhere(beyond)[0])
+            worst = (
+                f"{name} of {joints[joint].name} {values[row, joint]:.4g} at {run.time[row]:.4g} s, "
+                f"limit {limits[name][joint]:.4g}"
+            )
+        bad |= beyond.any(axis=1)
+    if not bad.any():
+        return run
+    text = f"{bad.sum()} of {len(bad)} rows are beyond ten times a limit ({worst}); left out"
+    return run.rows(~bad).with_findings(Finding("bad_value", "repaired", text))
+
+
+def drop_copied_rows(run: AnyRun) -> AnyRun:
+    """Leaves out rows that are equal to an earlier one, stamp and all: written twice, they are one measurement."""
+    table = np.column_stack([run.time, *run.signals.values()])
+    keys = np.nan_to_num(table, nan=np.inf) + 0.0  # of -0.0 and 0.0
+    same = duplicated_rows(keys)
+    if not same.any():
+        return run
+    text = f"{same.sum()} rows repeat an earlier one, stamp and all (first at {run.time[same][0]:g} s); left out"
+    return run.rows(~same).with_findings(Finding("duplicate_row", "repaired", text))
+
+
+def duplicated_rows(table: Array) -> NDArray[np.bool_]:
+    """Which rows are equal to an earlier one; table: (rows, columns) of finite numbers."""
+    whole = np.ascontiguousarray(table).view(np.dtype((np.void, table.dtype.itemsize * table.shape[1]))).ravel()
+    first = np.unique(whole, return_index=True)[1]
+    same = np.ones(len(table), dtype=bool)
+    same[first] = False
+    return same
 
 
 def fill_optional_signals(run: AnyRun) -> AnyRun:
@@ -57,7 +164,7 @@ def fill_optional_signals(run: AnyRun) -> AnyRun:
     for name, signal in run.signals.items():
         if name in required_names(run):
             continue
-        good = _is_plausible(signal)
+        good = np.abs(signal) < MAX_PLAUSIBLE_VALUE
         torn = good.any(axis=0) & ~good.all(axis=0)
         empty = ~good.any(axis=0) & ~np.isnan(signal).all(axis=0)
         if not (torn.any() or empty.any()):
@@ -69,159 +176,6 @@ def fill_optional_signals(run: AnyRun) -> AnyRun:
         text = f"{(~good[:, torn | empty]).sum()} cells of {name} hold no number; filled by linear interpolation"
         run = run.with_signals(run.time, {name: filled}).with_findings(Finding("bad_value", "repaired", text))
     return run
-
-
-def drop_duplicate_rows(run: AnyRun) -> AnyRun:
-    """Leaves out rows that are equal to the row before."""
-    table = np.column_stack([run.time, *run.signals.values()])
-    same = np.append(False, np.all((table[1:] == table[:-1]) | np.isnan(table[1:]), axis=1))
-    if not same.any():
-        return run
-    text = f"{same.sum()} rows repeat the row before (first at {run.time[same][0]:g} s); left out"
-    return run.rows(~same).with_findings(Finding("duplicate_row", "repaired", text))
-
-
-def sort_rows(run: AnyRun) -> AnyRun:
-    """Sorts rows that are in the wrong order, if the sorted stamps are evenly spaced.
-
-    If the clock stepped back, sorted stamps would overlap: then the rows stay, and the run is split there.
-    """
-    backwards = int(np.sum(np.diff(run.time) < 0))
-    if not backwards:
-        return run
-    order = np.argsort(run.time, kind="stable")
-    steps = np.diff(run.time[order])
-    if steps.min() < 0.5 * np.median(steps):
-        return run
-    text = f"{backwards} rows come after a later one; sorted by their stamps"
-    return run.rows(order).with_findings(Finding("time_order", "repaired", text))
-
-
-MAX_BRIDGED_GAP = 5.5  # samples: over a shorter gap of a well sampled motion, interpolation is safe
-MIN_PART_SAMPLES = 50  # samples: a shorter part tells nothing
-
-
-def split_at_gaps(run: AnyRun) -> tuple[AnyRun, ...]:
-    """The parts of a run between gaps and backward steps of the clock; parts that are too short are left out.
-
-    Raises InputError if nothing is left.
-    """
-    pieces = _split_rows_at_breaks(run.time, np.arange(run.samples))
-    long = [piece for piece in pieces if len(piece) >= MIN_PART_SAMPLES]
-    if not long:
-        longest = max(len(piece) for piece in pieces)
-        raise InputError(f"{run.file}: {longest} samples in a row at most; at least {MIN_PART_SAMPLES} are needed")
-    if len(pieces) == 1:
-        return (run,)
-    run = run.with_findings(_describe_cut(run.time, pieces, len(long)))
-    return tuple(replace(run.rows(piece), part=number) for number, piece in enumerate(long, 1))
-
-
-def _split_rows_at_breaks(time: Array, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Rows between breaks. Each piece is searched again, because a long pause hides shorter ones."""
-    steps = np.diff(time[rows])
-    forward = steps[steps > 0]
-    if not len(forward):
-        return [rows]
-    usual = max(float(np.median(forward)), float(np.mean(forward)))
-    breaks = np.flatnonzero((steps < 0) | (steps > MAX_BRIDGED_GAP * usual)) + 1
-    if not len(breaks):
-        return [rows]
-    return [piece for part in np.split(rows, breaks) for piece in _split_rows_at_breaks(time, part)]
-
-
-def _describe_cut(time: Array, pieces: list[NDArray[np.intp]], kept: int) -> Finding:
-    before = np.array([piece[-1] for piece in pieces[:-1]])
-    steps = time[before + 1] - time[before]
-    back = int(np.sum(steps < 0))
-    kind, cause = (
-        ("time_backwards", f"the clock steps back {back} time(s)") if back else ("time_gap", f"{len(steps)} gap(s)")
-    )
-    short = len(pieces) - kept
-    tail = f", {short} of them too short to use and left out" if short else ""
-    text = f"{cause}, first after {time[before[0]]:g} s by {steps[0]:+.4g} s; cut into {len(pieces)} parts{tail}"
-    return Finding(kind, "repaired", text)
-
-
-TURN_RAD = 2 * np.pi
-ENCODER_SIGNALS = ("position", "link_position", "reference_position", "simulated_position")
-MIN_STEP_TURNS = 1e-3  # of a turn, at rest
-PARTS_OF_TURN = (1, 2, 3, 4)  # encoders that repeat within a turn
-FULL_SHARE = 0.9  # of its period that such an encoder has run through, and never more than all of it
-MIN_SIGN_CHANGES = 4  # that tell a direction bit from a bad row
-
-
-def unwrap_encoders(run: AnyRun, angles: dict[str, tuple[bool, ...]]) -> AnyRun:
-    """Adds whole turns where a channel jumps by some between two samples.
-
-    angles: for each signal, which of its channels are angles. A jump that is no whole turn is left alone.
-    """
-    for name in ENCODER_SIGNALS:
-        if name in run.signals:
-            for channel in np.flatnonzero(angles[name]):
-                run = _unwrap_channel(run, name, int(channel))
-    return run
-
-
-def _unwrap_channel(run: AnyRun, name: str, channel: int) -> AnyRun:
-    signal = run.signals[name]
-    for parts in PARTS_OF_TURN:
-        period = TURN_RAD / parts
-        turns = _wraps(signal[:, channel], period)
-        if turns is None or (parts > 1 and not FULL_SHARE <= np.ptp(signal[:, channel]) / period <= 1 + MIN_STEP_TURNS):
-            continue
-        mended = signal.copy()
-        mended[1:, channel] -= period * np.cumsum(turns)
-        what, kind = "whole turns", "wrapped_encoder"
-        if parts > 1:
-            what, kind = f"{360 / parts:g} degrees, its encoder repeats within a turn,", "encoder_period"
-        text = f"{name} of channel {channel + 1} jumps by {what} {np.count_nonzero(turns)} time(s); unwrapped"
-        return run.with_signals(run.time, {name: mended}).with_findings(Finding(kind, "repaired", text, channel + 1))
-    return run
-
-
-def _wraps(signal: Array, period: float) -> Array | None:
-    """Periods by which a signal jumps between two samples, (samples - 1,); None where it does not or moves as fast."""
-    steps = np.diff(signal)
-    turns = np.rint(steps / period)
-    moved = np.abs(steps - period * turns)
-    # whole periods aside, most steps are motion
-    ordinary = max(3 * float(np.quantile(moved, 0.98)), MIN_STEP_TURNS * period)
-    wraps = (turns != 0) & (moved <= ordinary)
-    return None if not wraps.any() or ordinary > period / 2 else np.where(wraps, turns, 0.0)
-
-
-DIRECTION_BITS = range(8, 16)
-
-
-def read_direction_bit(run: AnyRun) -> AnyRun:
-    """Torque or current that servos count as a size with a bit for its direction becomes a number with a sign.
-
-    Such a channel holds whole counts from zero to twice the bit's value, and jumps by that value where it changes sign.
-    """
-    if "torque" not in run.signals:
-        return run
-    torque = run.signals["torque"]
-    for channel, signal in enumerate(torque.T):
-        bit = next((each for each in DIRECTION_BITS if _has_direction_bit(signal, 1 << each)), None)
-        if bit is not None:
-            signed = torque.copy()
-            signed[:, channel] = np.where(signal >= 1 << bit, (1 << bit) - signal, signal)
-            text = (
-                f"the current of channel {channel + 1} holds its direction in bit {bit}: values above "
-                f"{(1 << bit) - 1} are negative; read so (unsigned_current)"
-            )
-            run = run.with_signals(run.time, {"torque": signed})
-            run, torque = run.with_findings(Finding("unsigned_current", "repaired", text, channel + 1)), signed
-    return run
-
-
-def _has_direction_bit(signal: Array, size: int) -> bool:
-    if signal.min() < 0 or not size <= signal.max() < 2 * size or np.any(signal != np.rint(signal)):
-        return False
-    jumps = np.abs(np.diff(signal)) > size / 2
-    signed = np.where(signal >= size, size - signal, signal)
-    return bool(jumps.sum() >= MIN_SIGN_CHANGES and not np.any(np.abs(np.diff(signed)) > size / 2))
 
 
 def leave_out(run: AnyRun, stretches: tuple[tuple[float, float], ...]) -> AnyRun:

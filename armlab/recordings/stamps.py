@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armlab.common.arrays import Array
-from armlab.common.errors import InputError
 from armlab.recordings.recording import AnyRun, Finding, MotionRun
 
 MAX_ROUNDING_LATENESS = 0.01  # of a step: what stamps are rounded to in a file
@@ -52,12 +51,7 @@ class Grid:
 
 
 def repair_stamps(run: AnyRun) -> AnyRun:
-    """The run with stamps that strictly increase, on an even grid unless the samples were taken unevenly.
-
-    Raises InputError where stamps repeat and no even grid fits.
-    """
-    if not np.ptp(run.time) > 0:
-        raise InputError(f"{run.file}: the time stands still at {run.time[0]:g} s: which column holds the time?")
+    """The run on an even grid, unless the samples were taken unevenly; its stamps rise already."""
     if run.even:
         return run
     grid = fit_even_grid(run.time)
@@ -163,22 +157,8 @@ def _fourth_difference(signal: Array) -> Array:
 
 
 def _keep_stamps(run: AnyRun, grid: Grid, worst: float) -> AnyRun:
-    """Keeps the stamps. Of rows with equal stamps and similar values only the first stays."""
-    later = np.append(False, np.diff(run.time) <= 0)
-    if later.any():
-        run = _drop_equal_stamps(run, later)
     text = (
         f"samples were taken at uneven times (up to {worst:.2g} steps off {1 / grid.step:.6g} Hz); "
         "stamps kept, even samples made by splines where the run is filtered"
     )
     return run.with_findings(Finding("time_jitter", "warning" if worst > MIN_WARNED_LATENESS else "note", text))
-
-
-def _drop_equal_stamps(run: AnyRun, later: NDArray[np.bool_]) -> AnyRun:
-    changes = np.abs(np.diff(run.position, axis=0))
-    usual = np.quantile(changes, 0.9, axis=0)
-    if np.any(changes[later[1:]] > 3 * usual):
-        at = run.time[later][0]
-        raise InputError(f"{run.file}: different values with the same time stamp at {at:g} s: which one is right?")
-    text = f"{later.sum()} rows have the stamp of the row before and about its values; left out"
-    return run.rows(~later).with_findings(Finding("duplicate_stamp", "repaired", text))

@@ -45,7 +45,7 @@ def test_a_row_with_a_value_that_is_no_measurement_is_left_out_and_named(tmp_pat
 
 def test_too_many_bad_rows_are_refused_rather_than_dropped(tmp_path: Path) -> None:
     table = frame()
-    table.loc[::10, "tau2"] = np.nan
+    table.loc[::9, "tau2"] = np.nan
     assert "too many to repair" in refusal(loaded, tmp_path, table)
 
 
@@ -82,9 +82,17 @@ def test_a_run_is_cut_at_a_long_gap_so_that_no_filter_runs_across_it(tmp_path: P
 
 
 def test_a_gap_hidden_by_a_much_longer_one_is_found_too(tmp_path: Path) -> None:
-    table = frame().drop(index=range(400, 420))
-    table.loc[1000:, "t"] += 1e4
+    table = frame().drop(index=[*range(400, 420), *range(1000, 1100)])
+    table.loc[1100:, "t"] += 1e4
     assert len(loaded(tmp_path, table)) == 3
+
+
+def test_a_leap_of_the_clock_alone_is_taken_out_where_the_signals_go_on_without_a_jump(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[1000:, "t"] += 1.2
+    (run,) = loaded(tmp_path, table)
+    assert kinds(run) == [("clock_leap", "repaired")]
+    assert_allclose(run.time, frame()["t"], atol=1e-9)
 
 
 def test_a_run_is_cut_where_the_clock_steps_back(tmp_path: Path) -> None:
@@ -186,14 +194,143 @@ def test_stamps_of_a_clock_that_is_coarser_than_the_sampling_are_made_even(tmp_p
     assert run.samples == len(table)
 
 
-def test_different_values_with_one_stamp_are_refused_where_no_even_grid_explains_them(tmp_path: Path) -> None:
+def test_of_rows_with_one_stamp_the_one_that_fits_to_no_side_is_left_out(tmp_path: Path) -> None:
     table = frame()
     rng = np.random.default_rng(0)
-    table["t"] = np.cumsum(rng.uniform(0.2, 1.8, len(table))) / RATE_HZ
+    steps = rng.uniform(0.2, 1.8, len(table))
+    steps[499:501] = 0.5  # no tick is missing beside the row
+    table["t"] = np.cumsum(steps) / RATE_HZ
     table[POSITION] = motion_at(table["t"].to_numpy()).position
-    table.loc[500, "t"] = table["t"][499]
-    table.loc[500, "q1"] += 1.0
-    assert "which one is right?" in refusal(loaded, tmp_path, table)
+    table.loc[499.5] = table.loc[499]
+    table.loc[499.5, "q1"] += 1.0
+    (run,) = loaded(tmp_path, table.sort_index())
+    assert run.samples == len(table) - 1
+    assert ("duplicate_stamp", "repaired") in kinds(run)
+    assert np.abs(np.diff(run.position[:, 0])).max() < 0.1
+
+
+@pytest.mark.parametrize("seconds", [4.0, 40.0])
+def test_equal_stamps_are_spread_where_the_clock_lost_a_tick_in_short_and_long_runs(
+    tmp_path: Path, seconds: float
+) -> None:
+    """As one joint's log has them, once a second: 0.363, 0.363, 0.365."""
+    table = frame(seconds=seconds)
+    late = np.arange(100, len(table), round(RATE_HZ))
+    true = table["t"].to_numpy(copy=True)
+    table.loc[late, "t"] = true[late - 1]
+    (run,) = loaded(tmp_path, table)
+    assert kinds(run) == [("equal_stamps", "repaired")]
+    assert f"{len(late)} rows" in run.findings[0].text
+    assert_allclose(run.time, true, atol=1e-9)
+
+
+@pytest.mark.parametrize("lengths", [(800, 800), (800, 800, 800, 800), (800, 800, 800), (500, 1100, 700)])
+def test_episodes_whose_clock_starts_anew_are_runs_of_their_own_whatever_their_lengths(
+    tmp_path: Path, lengths: tuple[int, ...]
+) -> None:
+    episodes = [frame(seed).iloc[:rows] for seed, rows in enumerate(lengths)]
+    runs = loaded(tmp_path, pd.concat(episodes))
+    assert [run.samples for run in runs] == list(lengths)
+    for run, episode in zip(runs, episodes, strict=True):
+        assert_array_equal(run.position, episode[POSITION])
+        assert kinds(run) == [("time_backwards", "repaired")]
+
+
+def test_episodes_of_one_motion_are_not_mixed_though_their_values_are_alike(tmp_path: Path) -> None:
+    first, second = frame(0), frame(0)
+    second[POSITION] += 1e-4
+    runs = loaded(tmp_path, pd.concat([first, second]))
+    assert [run.samples for run in runs] == [len(first), len(second)]
+
+
+def test_rows_out_of_place_are_sorted_within_each_of_several_episodes(tmp_path: Path) -> None:
+    order = np.arange(1600)
+    order[[300, 301]] = 301, 300
+    order[900:910] = order[900:910][::-1]
+    runs = loaded(tmp_path, pd.concat([frame(0).iloc[order], frame(1).iloc[order]]))
+    assert [run.samples for run in runs] == [1600, 1600]
+    assert_array_equal(runs[1].position, frame(1)[POSITION])
+
+
+def test_rows_in_no_order_at_all_are_sorted_where_that_makes_the_motion_smooth(tmp_path: Path) -> None:
+    table = frame().sample(frac=1.0, random_state=0)
+    (run,) = loaded(tmp_path, table)
+    assert_array_equal(run.position, frame()[POSITION])
+
+
+def test_rows_of_two_episodes_in_no_order_are_refused(tmp_path: Path) -> None:
+    table = pd.concat([frame(0), frame(1)]).sample(frac=1.0, random_state=0)
+    assert "do several logs or drivers share the file?" in refusal(loaded, tmp_path, table)
+
+
+def test_a_stamp_that_is_wrong_is_not_sorted_into_other_values(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[900, "t"] = 1.0024
+    runs = loaded(tmp_path, table)
+    assert [run.samples for run in runs] == [900, 700]
+    assert max(np.abs(np.diff(run.position, axis=0)).max() for run in runs) < 0.05
+
+
+def test_a_clock_of_whole_seconds_is_refused_with_what_would_be_right(tmp_path: Path) -> None:
+    table = frame()
+    table["t"] = np.floor(table["t"])
+    said = refusal(loaded, tmp_path, table)
+    assert "1592 of 1600 rows have the stamp of the row before" in said
+    assert "steps of 1 s" in said
+
+
+def test_stamps_in_single_precision_are_refused_with_the_reason(tmp_path: Path) -> None:
+    table = frame()
+    table["t"] = (table["t"] + 1_767_225_600).astype("float32").astype(float)
+    said = refusal(loaded, tmp_path, table)
+    assert "single precision" in said
+    assert "128 s" in said
+
+
+def test_rows_of_zeros_between_rows_of_motion_are_left_out_and_counted(tmp_path: Path) -> None:
+    table = frame()
+    zeros = table.iloc[::20].copy()
+    zeros["t"] += 0.2 / RATE_HZ
+    zeros[[*POSITION, "tau1", "tau2", "tau3"]] = 0.0
+    (run,) = loaded(tmp_path, pd.concat([table, zeros]).sort_values("t"))
+    assert kinds(run) == [("bad_value", "repaired")]
+    assert f"{len(zeros)} of {len(table) + len(zeros)} rows hold zeros alone" in run.findings[0].text
+    assert_array_equal(run.position, table[POSITION])
+
+
+def test_a_log_that_starts_and_ends_in_zeros_keeps_them(tmp_path: Path) -> None:
+    table = frame()
+    ramp = np.clip((np.arange(len(table)) - 200) / 400, 0, 1) * np.clip((1400 - np.arange(len(table))) / 400, 0, 1)
+    table[[*POSITION, "tau1", "tau2", "tau3"]] *= ramp[:, None]
+    (run,) = loaded(tmp_path, table)
+    assert run.samples == len(table)
+    assert kinds(run) == []
+
+
+@pytest.mark.parametrize(("column", "value"), [("q2", 253.0), ("tau3", 40000.0), ("q1", 65535.0)])
+def test_a_few_values_beyond_ten_times_a_limit_are_left_out_and_named(
+    tmp_path: Path, column: str, value: float
+) -> None:
+    table = frame()
+    table.loc[[300, 700, 701], column] = value
+    (run,) = loaded(tmp_path, table)
+    assert run.samples == len(table) - 3
+    assert "3 of 1600 rows" in run.findings[0].text
+
+
+def test_repairs_that_would_take_more_than_a_tenth_together_are_refused(tmp_path: Path) -> None:
+    table = frame()
+    table.loc[::15, "tau2"] = np.nan
+    table.loc[5::15, "q1"] = 500.0
+    assert "more than a tenth" in refusal(loaded, tmp_path, table)
+
+
+def test_the_least_number_of_samples_is_asked_after_all_repairs(tmp_path: Path) -> None:
+    table = frame().iloc[:60]
+    held = table.copy()
+    held[:] = np.repeat(table.to_numpy()[::2], 2, axis=0)
+    held["t"] = table["t"]
+    assert "at least 50 are needed" in refusal(loaded, tmp_path, held)
 
 
 def test_a_wrapped_encoder_is_unwrapped(tmp_path: Path) -> None:
