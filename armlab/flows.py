@@ -19,7 +19,8 @@ from armlab.identification.identifier import METHODS, Identifier
 from armlab.identification.identify import robot_path, wrong_reading
 from armlab.identification.model import Model
 from armlab.identification.torque_model import TorqueModel
-from armlab.identification.validation import RunError, run_error
+from armlab.identification.validation import RunError, format_percent, run_error
+from armlab.recordings.identifiable import require_identifiable, require_torque
 from armlab.recordings.recording import Recording
 from bench.config import find_algorithm, parse_params
 from bench.execute import Outcome, Trial, run_trial
@@ -131,6 +132,7 @@ def identify(
     """
     if method not in METHODS:
         raise InputError(f"unknown method {method!r}: {suggest_name(method, list(METHODS))}")
+    require_identifiable(recording)
     runs = recording.runs_to_identify()
     wrong = None if as_read else wrong_reading(recording)
     if wrong is not None:
@@ -155,11 +157,14 @@ class Prediction:
     def __repr__(self) -> str:
         lines = [f"Prediction of {self.recording.name!r}: error in percent of the torque, filtered and as recorded"]
         for each in self.errors[:SHOWN]:
-            lines.append(f"  {each.run} ({each.role}): {each.relative_percent:.2f} %, {each.recorded_percent:.2f} %")
+            lines.append(f"  {each.run} ({each.role}): {_filtered_and_recorded(each)}")
         return "\n".join(lines + _count_more(len(self.errors), "runs"))
 
     def _repr_html_(self) -> str:
-        rows = [(e.run, e.role, f"{e.relative_percent:.2f}", f"{e.recorded_percent:.2f}") for e in self.errors]
+        rows = [
+            (each.run, each.role, format_percent(each.relative_percent), format_percent(each.recorded_percent))
+            for each in self.errors
+        ]
         text = "Error in percent of the torque."
         return notebook_html(
             f"Prediction of {self.recording.name}", text, ("run", "role", "filtered", "recorded"), rows
@@ -170,12 +175,17 @@ def predict(model: TorqueModel, recording: Recording) -> Prediction:
     """The torque of a model for every run of a recording, and its errors.
 
     model: of `identify`, of a file, or `diagnosis.model`.
-    Raises InputError where the model has another number of joints than the recording.
+    Raises InputError where the model has another number of joints than the recording, and for torque that is none.
     """
     if len(model.arm) != len(recording.arm):
         raise InputError(f"the model has {len(model.arm)} joints, {recording.name} has {len(recording.arm)}")
+    require_torque(recording.runs, recording.arm, recording.name)
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     return Prediction(recording, errors, {run.name: model.predict(run) for run in recording.runs})
+
+
+def _filtered_and_recorded(error: RunError) -> str:
+    return f"{format_percent(error.relative_percent)}, {format_percent(error.recorded_percent)}"
 
 
 def _count_more(count: int, what: str) -> list[str]:

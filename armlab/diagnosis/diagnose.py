@@ -50,7 +50,7 @@ from armlab.diagnosis.prediction import (
 from armlab.diagnosis.pruning import Pruned, prefer_one_body, prune, scan_what_is_left, withdraw
 from armlab.diagnosis.result import Claim, Diagnosis, Unexplained
 from armlab.diagnosis.settings import Baseline, Settings
-from armlab.diagnosis.simulation import read_simulation, reason_misread, reason_unusable
+from armlab.diagnosis.simulation import read_simulation, reason_misread
 from armlab.diagnosis.solver import State
 from armlab.diagnosis.surrogate import Structure
 from armlab.diagnosis.told.selection import stated_findings, with_minor_ones, without_lesser_unknowns
@@ -67,6 +67,7 @@ from armlab.diagnosis.yardstick import Yardstick, fit_yardstick, predicts_better
 from armlab.effects.library import library
 from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.check import signs_of_wrong_reading
+from armlab.recordings.identifiable import reason_not_identifiable
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.tuning import ReadingTuning
 from armlab.recordings.recording import Recording
@@ -133,7 +134,7 @@ def _reading_alone(
 ) -> Diagnosis:
     """What is said where physics is not asked. setup: how the recording is to be read, if that was asked."""
     simulation = read_simulation(recording, baseline)
-    reason = reason_unusable(recording, settings.tuning.soundness)
+    reason = reason_not_identifiable(recording)
     if reason is None and setup is not None and setup.looks == 0 and not setup.is_lost:
         reason = TOO_SHORT_TO_READ
     if reason is not None:
@@ -156,7 +157,7 @@ def find_setup(
     None for a recording that cannot be used anyhow, and where the links of the robot file play no part.
     """
     simulation = read_simulation(recording, baseline)
-    if simulation.kind == "simulated" or reason_unusable(recording, settings.tuning.soundness) is not None:
+    if simulation.kind == "simulated" or reason_not_identifiable(recording) is not None:
         return None
     progress("reading the recording rightly")
     return read_rightly(recording, simulation.inertial, settings.tuning.reading)
@@ -175,7 +176,7 @@ def prepare(
 ) -> DesignMatrix | Diagnosis:
     """The runs filtered, and the columns of the links; a diagnosis where nothing can be said, and why."""
     simulation = read_simulation(recording, baseline)
-    reason = reason_unusable(recording, settings.tuning.soundness)
+    reason = reason_not_identifiable(recording)
     if reason is not None:
         return Diagnosis(recording, simulation, "inconclusive", reason)
     progress("filtering")

@@ -43,6 +43,7 @@ from armlab.identification.payload import (
     load_document,
     number_line,
 )
+from armlab.recordings.identifiable import require_identifiable
 from armlab.recordings.load import load_recording
 from armlab.recordings.recording import Recording
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm
@@ -104,7 +105,7 @@ def nominal_payload_lines(loaded: Path, setting: PayloadSetting, progress: Progr
     setting.check(recording.arm)
     if recording.arm.links is None:
         raise InputError(f"--without is needed: the robot {recording.arm.name} has no nominal `links` to stand for it")
-    recording.runs_to_identify()
+    require_identifiable(recording)
     settings = Settings()
     if setting.cutoff_hz is not None:
         settings = vary(settings, "data.cutoff_hz", setting.cutoff_hz)

@@ -19,7 +19,6 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.recording import Recording, Run
 from problem.arm import Arm
-from problem.joint_words import joints_in_words
 from problem.motion import Motion
 from problem.regressor import rigid_body_torque
 
@@ -142,21 +141,6 @@ def _has_simulated_torque(recording: Recording) -> bool:
 
 def _has_nominal(recording: Recording) -> bool:
     return recording.arm.links is not None or recording.simulation is not None
-
-
-def reason_unusable(recording: Recording, tuning: SoundnessTuning) -> str | None:
-    """The reason in a sentence; None for a recording that can be used. InputError where no run identifies."""
-    runs = recording.runs_to_identify()
-    seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
-    if seconds < tuning.min_duration_s:
-        return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
-    travel = np.max([np.ptp(run.position, axis=0) for run in runs], axis=0)
-    if not np.any(travel > tuning.min_travel):
-        return "No joint moves in any run that identifies: there is nothing that the torques could be compared with."
-    silent = [joint + 1 for joint in range(len(recording.arm)) if all(not np.ptp(run.torque[:, joint]) for run in runs)]
-    if silent:
-        return f"The torque of {joints_in_words(recording.arm, silent)} never changes: is the right column named?"
-    return None
 
 
 def reason_misread(observed: Observed, simulation: Simulation, tuning: SoundnessTuning) -> str | None:

@@ -89,8 +89,6 @@ class DataTuning:
 class SoundnessTuning:
     """When a recording cannot be used, or was read wrongly."""
 
-    min_duration_s: float = tuned(2.0, unit="s", meaning="least time of all runs that identify")
-    min_travel: float = tuned(1e-3, unit="rad (m)", meaning="a joint that travels less does not move")
     unit_factor: float = tuned(
         3.0, meaning="torque that is so many times too large or small on all joints is in another unit", least=1.0
     )

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, pinvh
 
 from armlab.common.arrays import Array
 from armlab.identification.estimators.least_squares import Estimator, Prior
@@ -96,7 +96,10 @@ def _solve_scaled(gram: Array, cross: Array) -> Array:
     scale = np.sqrt(np.maximum(np.diag(gram), 0))
     scale = np.where(scale > 0, scale, 1.0)
     scaled = gram / np.outer(scale, scale) + GRAM_RIDGE * np.eye(len(gram))
-    return np.asarray(cho_solve(cho_factor(scaled), cross / scale) / scale)
+    try:
+        return np.asarray(cho_solve(cho_factor(scaled), cross / scale) / scale)
+    except LinAlgError:  # a joint that few rows fit exactly outweighs the others beyond the rounding of the products
+        return np.asarray(pinvh((scaled + scaled.T) / 2, rtol=GRAM_RIDGE) @ (cross / scale) / scale)
 
 
 def regression_moments(data: Regression) -> Moments:

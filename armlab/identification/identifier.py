@@ -33,7 +33,14 @@ from armlab.identification.estimators.physical import PhysicalEstimate, Physical
 from armlab.identification.model import Model
 from armlab.identification.priors import NO_PULL, Pull
 from armlab.identification.recorded_motion import RecordedMotion
-from armlab.identification.regression import Regression, cutoff_of, regression, signals_of, suggested_cutoff
+from armlab.identification.regression import (
+    Regression,
+    cutoff_of,
+    regression,
+    require_rows,
+    signals_of,
+    suggested_cutoff,
+)
 from armlab.identification.selection import with_load
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
@@ -106,6 +113,8 @@ class Identifier:
     def fit(self, runs: Sequence[Run]) -> "Identifier":
         """Identifies from all runs together; ValueError for runs that do not fit the arm."""
         structure, signals, data = self.prepare(runs)
+        if self.pull.kind == NO_PULL.kind:
+            require_rows(data)
         cutoff = cutoff_of(signals[0])
         for _ in range(MAX_LOAD_ROUNDS):
             estimate = METHODS[self.method]((structure, signals, data), self.pull)(data)

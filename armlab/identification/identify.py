@@ -31,10 +31,12 @@ from armlab.identification.validation import (
     RunError,
     error_table,
     filter_of_errors,
+    format_percent,
     run_error,
     total_error_line,
 )
 from armlab.recordings.cutoff_trial import choose_cutoff_hz
+from armlab.recordings.identifiable import require_identifiable, require_torque
 from armlab.recordings.load import load_recording
 from armlab.recordings.reading.answer import Answer, read_rightly
 from armlab.recordings.reading.corrected import CORRECTED_FOLDER, corrected_texts
@@ -84,7 +86,7 @@ def overfit_warnings(errors: tuple[RunError, ...]) -> Iterator[str]:
     fitted, held_out = (_percent_by_joint(errors, role) for role in ROLES)
     for joint, percent in held_out.items():
         known = fitted.get(joint)
-        if known is not None and percent > MAX_HELD_OUT_RATIO * known:
+        if known and percent > MAX_HELD_OUT_RATIO * known:
             yield (
                 f"warning: joint {joint} leaves {percent:.0f} % of its torque held out and {known:.0f} % of what was "
                 "fitted: the model does not carry over; record longer motion, or fit fewer numbers (--tolerance)"
@@ -95,14 +97,21 @@ def _percent_by_joint(errors: tuple[RunError, ...], role: Role) -> dict[int, flo
     """The mean error of each joint over the runs of a role, percent of the torque."""
     own = [each for each in errors if each.role == role]
     return {
-        joint.joint: float(np.mean([each.joints[number].percent for each in own]))
+        joint.joint: float(np.mean([each.joints[number].percent or 0.0 for each in own]))
         for number, joint in enumerate(own[0].joints if own else ())
     }
 
 
 def _joint_errors(errors: tuple[RunError, ...]) -> Table:
     rows = [
-        [each.run, each.role, str(joint.joint), f"{joint.rms:.4g}", f"{joint.percent:.2f} %", _percent_of_rated(joint)]
+        [
+            each.run,
+            each.role,
+            str(joint.joint),
+            f"{joint.rms:.4g}",
+            format_percent(joint.percent),
+            _percent_of_rated(joint),
+        ]
         for each in errors
         for joint in each.joints
     ]
@@ -110,7 +119,7 @@ def _joint_errors(errors: tuple[RunError, ...]) -> Table:
 
 
 def _percent_of_rated(error: JointError) -> str:
-    return "–" if error.percent_rated is None else f"{error.percent_rated:.2f} %"
+    return format_percent(error.percent_rated)
 
 
 def _parameters(model: Model) -> Table:
@@ -156,6 +165,7 @@ def identify_recording(folder: Path, out: Path, options: IdentifyOptions) -> Res
     it. `corrected/` in `out` then holds the recording as it should be read.
     """
     recording = load_recording(folder)
+    require_identifiable(recording)
     runs = recording.runs_to_identify()
     if options.tolerance and recording.arm.links is None:
         raise InputError(f"--tolerance needs nominal `links`, and the robot {recording.arm.name} has none")
@@ -252,6 +262,7 @@ def predict_recording(path: Path, folder: Path, out: Path | None) -> ResultLines
     model, recording = Model.load(path), load_recording(folder)
     if len(model.arm) != len(recording.arm):
         raise InputError(f"{path} is for {len(model.arm)} joints, {folder} has {len(recording.arm)}")
+    require_torque(recording.runs, recording.arm, str(folder))
     errors = tuple(run_error(model, model.signals(run)) for run in recording.runs)
     yield error_table(errors)
     written: tuple[Path, ...] = ()

@@ -23,10 +23,11 @@ from armlab.identification.covariance import uncertainty
 from armlab.identification.estimators.least_squares import WeightedLeastSquares, joint_weights
 from armlab.identification.estimators.physical import TYPICAL_BODY, load_cvxpy
 from armlab.identification.priors import point_mass
-from armlab.identification.regression import Regression, regression, signals_of, suggested_cutoff
+from armlab.identification.regression import Regression, regression, require_rows, signals_of, suggested_cutoff
 from armlab.identification.selection import counterbalance_groups
 from armlab.identification.structure import Structure
 from armlab.recordings.differentiate import Signals
+from armlab.recordings.identifiable import require_identifiable
 from armlab.recordings.load import load_recording
 from problem.arm import PARAMETER_NAMES, PARAMETER_UNITS, Arm, Link
 from problem.pseudo_inertia import link_from_centre_of_mass, link_of, pseudo_inertias
@@ -148,6 +149,7 @@ def identify_payload(
         raise DataError("runs with the load and runs without it are needed")
     columns = np.vstack([place.columns(structure, each) for each in loaded])
     data = _append_columns(regression(structure, [*without, *loaded]), columns)
+    require_rows(data)
     _check_load_columns(data.matrix, columns.shape[1])
     estimate = WeightedLeastSquares()(data)
     spread = uncertainty(data, estimate)
@@ -171,6 +173,7 @@ def torque_gains(
     columns = np.vstack(blocks)
     moved = np.linalg.norm(columns, axis=0) > 0  # a joint that the load never loads does not determine its gain
     data = _append_columns(regression(structure, [*without, *loaded]), columns[:, moved])
+    require_rows(data)
     _check_load_columns(data.matrix, int(moved.sum()))
     estimate = WeightedLeastSquares()(data)
     spread = uncertainty(data, estimate)
@@ -240,6 +243,8 @@ class _PayloadTask:
         if len(bare.arm) != len(carrying.arm):
             raise InputError(f"{without} has {len(bare.arm)} joints, {loaded} has {len(carrying.arm)}")
         setting.check(carrying.arm)
+        require_identifiable(carrying)
+        require_identifiable(bare)
         runs = carrying.runs_to_identify(), bare.runs_to_identify()
         cutoff = setting.cutoff_hz or max(map(suggested_cutoff, (*runs[0], *runs[1])))
         signals = ([signals_of(run, cutoff, LOAD_POSITION_FACTOR) for run in each] for each in runs)

@@ -106,6 +106,21 @@ def _target(structure: Structure, signals: Signals) -> Array:
     return np.asarray(signals.torque + signals.filter(compensation_torque(structure.arm, signals.motion)))
 
 
+def require_rows(data: Regression) -> None:
+    """Raises DataError for fewer independent rows than unknowns: such a fit explains everything and says nothing.
+
+    A filter leaves two independent samples a period of its cut-off.
+    """
+    independent = data.joints * sum(
+        max(int(2 * samples / (data.rate_hz * data.correlation_s)), 1) for samples in data.lengths
+    )
+    if independent <= data.matrix.shape[1]:
+        raise DataError(
+            f"the runs hold {independent} independent rows below {1 / data.correlation_s:.3g} Hz for "
+            f"{data.matrix.shape[1]} unknown numbers: record longer motion, or give a higher --cutoff-hz"
+        )
+
+
 def regression(structure: Structure, signals: Sequence[Signals]) -> Regression:
     """The regression of one or more runs; ValueError for runs of another arm or without any rows.
 

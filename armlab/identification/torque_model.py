@@ -181,5 +181,7 @@ def parameter_line(parameter: ParameterValue) -> str:
     numbers = ", ".join(f"{value:.4g}" for value in values)
     spread = ""
     if parameter.interval is not None and not isinstance(parameter.value, tuple):
-        spread = f" [{parameter.interval[0]:.4g}, {parameter.interval[1]:.4g}]"
+        low, high = (f"{end:.4g}" for end in parameter.interval)
+        width = float(np.ptp(parameter.interval))
+        spread = f" [{low}, {high}]" if low != high else f" within {width / 2:.1g}" if width else " (no interval)"
     return f"{parameter.name} = {numbers}{spread} {parameter.unit}"

@@ -11,14 +11,19 @@ from armlab.identification.torque_model import TorqueModel
 from armlab.recordings.differentiate import Signals
 from armlab.recordings.filters import LowPass
 
+MIN_TORQUE = 1e-9  # N m (N), root mean square: less is a signal without power, whose share says nothing
+
 
 @dataclass(frozen=True)
 class JointError:
-    """Errors of one joint, counted from 1: N m (N), percent of the torque, percent of the rated torque or None."""
+    """Errors of one joint, counted from 1: N m (N), percent of the torque, of the rated torque.
+
+    None for a percentage of a torque without power, and of one that is not known.
+    """
 
     joint: int
     rms: float
-    percent: float
+    percent: float | None
     percent_rated: float | None
 
 
@@ -31,9 +36,9 @@ class RunError:
 
     run: str
     role: str
-    relative_percent: float
+    relative_percent: float | None
     cutoff_hz: float | None
-    recorded_percent: float
+    recorded_percent: float | None
     joints: tuple[JointError, ...]
 
 
@@ -55,9 +60,15 @@ def run_error(model: TorqueModel, signals: Signals) -> RunError:
     )
 
 
-def relative_percent(error: Array, torque: Array) -> float:
-    """||error|| / ||torque||, in percent."""
-    return float(100 * np.linalg.norm(error) / max(float(np.linalg.norm(torque)), 1e-300))
+def relative_percent(error: Array, torque: Array) -> float | None:
+    """||error|| / ||torque||, in percent; None of a torque without power."""
+    size = float(np.linalg.norm(torque))
+    return float(100 * np.linalg.norm(error) / size) if size > MIN_TORQUE * np.sqrt(torque.size) else None
+
+
+def format_percent(percent: float | None) -> str:
+    """`1.23 %`, a dash for a percentage of nothing."""
+    return "-" if percent is None else f"{percent:.2f} %"
 
 
 def _joint_error(model: TorqueModel, joint: int, left: Array, torque: Array) -> JointError:
@@ -74,16 +85,17 @@ def error_table(errors: tuple[RunError, ...]) -> str:
     ]
     for each in errors:
         for joint in each.joints:
-            rated = "-" if joint.percent_rated is None else f"{joint.percent_rated:.2f}"
+            percent, rated = ("-" if each is None else f"{each:.2f}" for each in (joint.percent, joint.percent_rated))
             name = f"{each.run:<21} {each.role:<9}"
-            lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {joint.percent:12.2f} {rated:>11}")
+            lines.append(f"{name} {joint.joint:5d} {joint.rms:9.4g} {percent:>12} {rated:>11}")
         lines.append(total_error_line(each))
     return "\n".join(lines)
 
 
 def total_error_line(error: RunError) -> str:
     """The error of a run over all joints, in a line."""
-    return f"{error.run}: {error.relative_percent:.2f} % in all, {error.recorded_percent:.2f} % of torque as recorded"
+    whole, recorded = format_percent(error.relative_percent), format_percent(error.recorded_percent)
+    return f"{error.run}: {whole} in all, {recorded} of torque as recorded"
 
 
 def filter_of_errors(errors: tuple[RunError, ...]) -> str:

@@ -59,6 +59,8 @@ def _order(run: MotionRun, rows: Rows) -> list[Rows]:
     back = steps < 0
     if not back.any():
         return [rows]
+    if back.sum() > (1 - MAX_LOST_SHARE) * len(rows):  # the last row first, as some databases list them
+        return _order(run, rows[::-1])
     order = np.argsort(time, kind="stable")
     is_in_order = back.sum() <= MAX_LOST_SHARE * len(rows)
     if _is_one_clock(run.position[rows], time, order, is_in_order):
@@ -100,10 +102,12 @@ def part_equal_stamps(run: AnyRun) -> AnyRun:
         return run
     stamps, counts = np.unique(run.time, return_counts=True)
     if len(stamps) < run.samples / MAX_ROWS_PER_STAMP:
-        step = f"counts in steps of {np.median(np.diff(stamps)):g} s" if len(stamps) > 1 else "stands still"
+        if len(stamps) == 1:
+            raise InputError(f"{run.file}: the time stands still at {stamps[0]:g} s: which column holds the time?")
         raise InputError(
-            f"{run.file}: {tied.sum()} of {run.samples} rows have the stamp of the row before, the time {step}: which "
-            "column holds the fraction of seconds? `recording import --time SECONDS,NANOSECONDS` takes two"
+            f"{run.file}: {tied.sum()} of {run.samples} rows have the stamp of the row before, the time counts in steps "
+            f"of {np.median(np.diff(stamps)):g} s: which column holds the fraction of seconds? `recording import --time "
+            "SECONDS,NANOSECONDS` takes two"
         )
     spread = _spread(run, stamps, counts)
     if np.all(np.diff(spread.time) > 0):

@@ -213,7 +213,7 @@ def test_results_of_an_experiment_and_a_prediction_show_tables_in_a_notebook(rec
     assert "<td>de</td><td>1</td><td>2</td>" in html
     error = SimpleNamespace(run="a<b", role="identify", relative_percent=1.234, recorded_percent=2.0)
     html = armlab.Prediction(recording, (error,), {})._repr_html_()
-    assert "<td>a&lt;b</td><td>identify</td><td>1.23</td><td>2.00</td>" in html
+    assert "<td>a&lt;b</td><td>identify</td><td>1.23 %</td><td>2.00 %</td>" in html
 
 
 def test_a_table_of_latex_escapes_what_latex_would_take_for_a_command():

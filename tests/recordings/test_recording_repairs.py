@@ -258,6 +258,11 @@ def test_rows_in_no_order_at_all_are_sorted_where_that_makes_the_motion_smooth(t
     assert_array_equal(run.position, frame()[POSITION])
 
 
+def test_rows_that_stand_last_first_are_turned_round(tmp_path: Path) -> None:
+    (run,) = loaded(tmp_path, frame().iloc[::-1])
+    assert_array_equal(run.position, frame()[POSITION])
+
+
 def test_rows_of_two_episodes_in_no_order_are_refused(tmp_path: Path) -> None:
     table = pd.concat([frame(0), frame(1)]).sample(frac=1.0, random_state=0)
     assert "do several logs or drivers share the file?" in refusal(loaded, tmp_path, table)

@@ -69,6 +69,7 @@ from armlab.diagnosis.tuning import ComparisonTuning
 from armlab.diagnosis.verdict_files import check_output_folder
 from armlab.effects.library import effect_named
 from armlab.effects.words import place_in_words
+from armlab.recordings.identifiable import require_identifiable
 from armlab.recordings.load import load_recording
 from problem.arm import Arm
 
@@ -496,6 +497,7 @@ def compare_recordings(
     chosen: Baseline | None = next((each for each in get_args(Baseline) if each == baseline), None)
     first, second, *more = (load_recording(each) for each in folders)
     check_output_folder(out, second)
+    require_identifiable(first, second, *more)
     try:
         comparison = compare(first, second, *more, baseline=chosen, seed=seed, dates=dates, progress=progress)
     except DataError as error:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from armlab.common.arrays import Array
+from armlab.common.errors import DataError
 from armlab.identification.regression import MAX_CUTOFF_SHARE, suggested_cutoff
 from armlab.identification.torque_model import TorqueModel
 from armlab.identification.validation import relative_percent
@@ -33,7 +34,10 @@ class JudgedRun:
         torque, error = self.run.torque, self.run.torque - model.predict(self.run)
         rows = self.low_pass.rows
         filtered = relative_percent(self.low_pass(error), self.low_pass(torque))
-        return Percent(relative_percent(error[rows], torque[rows]), filtered)
+        recorded = relative_percent(error[rows], torque[rows])
+        if filtered is None or recorded is None:
+            raise DataError(f"{self.run.name} has no torque that an error could be a share of")
+        return Percent(recorded, filtered)
 
     def filtered_error(self, model: TorqueModel) -> Array:
         """The error of a model behind the low-pass, (kept, joints), N m (N)."""

@@ -1,0 +1,100 @@
+"""The one gate before numbers: can anything be identified from these runs? Each answer says what is needed.
+
+It is asked of the recording as it is read, after all repairs, by all who fit or compare torques.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from armlab.common.arrays import Array
+from armlab.common.errors import InputError
+from armlab.recordings.recording import Recording, Run
+from armlab.recordings.repair import duplicated_rows
+from problem.arm import Arm
+from problem.joint_words import joints_in_words
+
+MIN_DURATION_S = 2.0  # of all runs that identify: too short to tell physics from chance (chosen by eye)
+MIN_TRAVEL = 1e-3  # rad or m: a joint that travels less does not move (chosen by eye)
+MAX_COPIED_SHARE = 0.5  # of the rows of a run that validates, found in a run that identifies
+
+
+def require_identifiable(*recordings: Recording) -> None:
+    """Raises InputError, in one line, where one of several recordings, or all together, tell nothing of an arm.
+
+    A joint may be without torque in one of several recordings: that is a change between them.
+    """
+    for recording in recordings:
+        reason = reason_still(recording.runs_to_identify()) or reason_copied(recording)
+        if reason is not None:
+            raise InputError(f"{recording.folder}: {reason}")
+    runs = [run for recording in recordings for run in recording.runs_to_identify()]
+    require_torque(runs, recordings[0].arm, " and ".join(str(each.folder) for each in recordings))
+
+
+def require_torque(runs: Sequence[Run], arm: Arm, name: str) -> None:
+    """Raises InputError for runs whose channels are no measurement."""
+    reason = reason_dead(runs, arm)
+    if reason is not None:
+        raise InputError(f"{name}: {reason}")
+
+
+def reason_not_identifiable(recording: Recording) -> str | None:
+    """The reason in a sentence; None for a recording that can be used. InputError where no run identifies."""
+    runs = recording.runs_to_identify()
+    seconds = sum(float(run.time[-1] - run.time[0]) for run in runs)
+    if seconds < MIN_DURATION_S:
+        return f"The runs hold {seconds:.2g} s in all: too short to tell physics from chance; record 10 s or more."
+    return reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
+
+
+def reason_still(runs: Sequence[Run]) -> str | None:
+    """An arm that stands."""
+    if any(np.any(np.ptp(run.position, axis=0) > MIN_TRAVEL) for run in runs):
+        return None
+    return "No joint moves in any run that identifies: there is nothing that the torques could be compared with."
+
+
+def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
+    """Torques that never change, and columns that are copies of others."""
+    dead = [joint for joint in range(len(arm)) if all(np.ptp(run.torque[:, joint]) == 0 for run in runs)]
+    if dead:
+        zero = all(not np.any(run.torque[:, dead]) for run in runs)
+        if zero and len(dead) == len(arm):
+            return (
+                "The torque of all joints is zero throughout: the driver does not fill it. Name the columns of a "
+                "measured torque or current, or those of the commands (reference_position) for a recording of motion."
+            )
+        said = "is zero throughout" if zero else "never changes"
+        words = joints_in_words(arm, [joint + 1 for joint in dead])
+        return f"The torque of {words} {said}: is the right column named?"
+    for name in ("torque", "position"):
+        signals = [run.signals[name] for run in runs]
+        for first, second in combinations(range(len(arm)), 2):
+            if all(_is_copy(each[:, first], each[:, second]) for each in signals):
+                words = joints_in_words(arm, [first + 1, second + 1])
+                return f"The {name} of {words} is the same in every row: one column is a copy of the other."
+    return None
+
+
+def _is_copy(first: Array, second: Array) -> bool:
+    return bool(np.ptp(first) > 0 and np.array_equal(first, second))
+
+
+def reason_copied(recording: Recording) -> str | None:
+    """A run that validates and holds the rows of one that identifies."""
+    for judge in recording.with_role("validate"):
+        for run in recording.with_role("identify"):
+            rows = np.vstack([_content(run), _content(judge)])
+            copied = duplicated_rows(rows)[run.samples :].mean()
+            if copied > MAX_COPIED_SHARE:
+                return (
+                    f"{judge.name} validates and holds rows of {run.name}, which identifies ({copied:.0%} of them): "
+                    "its errors say nothing of other motion. Give another run, or none."
+                )
+    return None
+
+
+def _content(run: Run) -> Array:
+    return np.hstack([run.position, run.torque])
