@@ -105,9 +105,9 @@ def part_equal_stamps(run: AnyRun) -> AnyRun:
         if len(stamps) == 1:
             raise InputError(f"{run.file}: the time stands still at {stamps[0]:g} s: which column holds the time?")
         raise InputError(
-            f"{run.file}: {tied.sum()} of {run.samples} rows have the stamp of the row before, the time counts in steps "
-            f"of {np.median(np.diff(stamps)):g} s: which column holds the fraction of seconds? `recording import --time "
-            "SECONDS,NANOSECONDS` takes two"
+            f"{run.file}: {tied.sum()} of {run.samples} rows have the stamp of the row before, the time counts in "
+            f"steps of {np.median(np.diff(stamps)):g} s: which column holds the fraction of seconds? `recording "
+            "import --time SECONDS,NANOSECONDS` takes two"
         )
     spread = _spread(run, stamps, counts)
     if np.all(np.diff(spread.time) > 0):

@@ -132,7 +132,7 @@ def test_each_mistake_in_recording_yaml_is_told_in_one_line(tmp_path: Path, chan
         ("t,q1,q2,q3,tau1,tau2,tau3\n1,2,3\n1,2,3,4,5,6,7\n", "line 2: 3 cells where the header has 7"),
         ("t,q1,q2,q3,tau1,tau2,tau3\n1,2,3,4,5,6,7,8\n", "line 2: 8 cells"),
         ("t,q1,q2,q3,tau1,tau2,tau3\n1,2,3,4,5,6,7\n", "at least 50 are needed"),
-        (b"\xff\xfe\x00\x01", "not UTF-8 text"),
+        (b"q\xff\x00\x01", "not UTF-8 text"),
     ],
 )
 def test_each_mistake_in_a_run_file_is_told_in_one_line(tmp_path: Path, text: str | bytes, message: str) -> None:

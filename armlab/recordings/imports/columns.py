@@ -122,7 +122,11 @@ def choose_columns(
 
 def _recognise(log: Log, signal: str) -> Known | None:
     names = log.source.table.filled
-    return recognise_time(names) if signal == "time" else recognise_signal(names, signal, log.joints)
+    return (
+        recognise_time(names, tuple(log.source.stamps))
+        if signal == "time"
+        else recognise_signal(names, signal, log.joints)
+    )
 
 
 def _ask_columns(log: Log, signal: str, columns: Mapping[str, Known], reason: str | None) -> Question:
@@ -166,8 +170,11 @@ def _expand_names(given: str, table: Table, signal: str, joints: Sequence[str], 
     twice = [name for name in chosen if chosen.count(name) > 1]
     if twice:
         raise InputError(f"--{signal.replace('_', '-')} {given} names column {twice[0]} twice")
-    if signal == "time" and len(chosen) > 1:
-        raise InputError(f"--time {given} names {len(chosen)} columns: {', '.join(chosen)}; give one")
+    if signal == "time" and len(chosen) > 2:
+        raise InputError(
+            f"--time {given} names {len(chosen)} columns: {', '.join(chosen)}; give one, or two: of seconds and their "
+            "fraction, of date and time"
+        )
     if not joints or signal in ("time", *SENSOR_SIGNALS):
         return chosen
     if len(chosen) != len(joints):

@@ -5,7 +5,7 @@ A plan is made anew with each answer: an answer is an option, as if it had been 
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from armlab.common.errors import InputError, UndecidedError
@@ -17,11 +17,13 @@ from armlab.recordings.imports.impossible import ask_impossible_units
 from armlab.recordings.imports.numbers import read_numbers
 from armlab.recordings.imports.proposals import propose_robot
 from armlab.recordings.imports.questions import Options, Question
+from armlab.recordings.imports.rates import put_on_common_stamps
 from armlab.recordings.imports.robots import ImportedRobot, read_robot
 from armlab.recordings.imports.scales import choose_gains, choose_units
 from armlab.recordings.imports.sources import ReadOptions, Source, read_sources
+from armlab.recordings.imports.two_columns import JOINED, join_all
 from armlab.recordings.recording_file import check_new_folder
-from armlab.recordings.units import SENSOR_SIGNALS
+from armlab.recordings.units import SENSOR_SIGNALS, TIME_UNITS
 from problem.robot_file import built_in_arms
 
 SEPARATOR_WORDS = {"tab": "\t", "blank": " ", "space": " ", "comma": ",", "semicolon": ";"}
@@ -76,12 +78,22 @@ def plan_import(files: Sequence[Path], options: Options, read: ReadSources = rea
     log, commands, unmatched = choose_commands(log)
     chosen_columns, unnamed = choose_columns(log, commands, unmatched)
     columns = {signal: known.value for signal, known in chosen_columns.items()}
+    if len(columns.get("time", ())) == 2:
+        sources = join_all(sources, columns["time"])
+        log, columns = replace(log, source=next(iter(sources.values()))), {**columns, "time": (JOINED,)}
     _check_sources(sources, columns)
     _check_order(columns)
     count = len(columns["position"]) if "position" in columns else None
     gear = choose_gear(options, columns, has_all_columns=not unnamed)
     chosen_units, unmeasured = choose_units(log, columns, gear)
     units = {name: known.value[0] if len(known.value) == 1 else known.value for name, known in chosen_units.items()}
+    if not unnamed and not unmatched and "time" in units:
+        factor = TIME_UNITS[str(units["time"])].factor
+        sources = {
+            path: replace(source, table=put_on_common_stamps(source.table, columns, factor))
+            for path, source in sources.items()
+        }
+        log = replace(log, source=next(iter(sources.values())))
     gains, unscaled = choose_gains(options.get("gains"), columns, units)
     numbers = read_numbers(log, sources, columns, units, gear)
     impossible = ask_impossible_units(numbers, units, gains, log.source.same_units)

@@ -12,6 +12,7 @@ import numpy as np
 
 from armlab.common.arrays import Array
 from armlab.common.errors import InputError
+from armlab.recordings.imports.two_columns import find_two_columns
 from armlab.recordings.units import TIME_UNITS
 
 TIME_NAMES = ("__time", "time", "timestamp", "timestamps", "stamp", "t", "robot_time", "header_stamp")
@@ -92,10 +93,18 @@ class Known:
     reason: str
 
 
-def recognise_time(names: Sequence[str]) -> Known | None:
-    """The time column, by its name."""
+def recognise_time(names: Sequence[str], stamps: Sequence[str]) -> Known | None:
+    """The time column, by its name, or two of seconds and their fraction, or the one column of stamps as text.
+
+    stamps: columns of stamps as text.
+    """
     found = next((name for name in names if _split_unit(name).stem in TIME_NAMES), None)
-    return Known((found,), "a usual name") if found is not None else None
+    if found is not None:
+        return Known((found,), "a usual name")
+    two = find_two_columns(names)
+    if two is not None:
+        return Known(two, "seconds and their fraction")
+    return Known(tuple(stamps), "stamps as text") if len(stamps) == 1 else None
 
 
 def time_unit(name: str, stamps: Array) -> Known | None:

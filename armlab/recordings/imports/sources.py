@@ -35,7 +35,7 @@ class Source:
 
     prefixes: of positions and commands whose columns end with the names of joints, by the signal. not_angles: joints
     whose numbers are neither angles nor lengths. same_units: signals that have the unit of another one, by the format.
-    reason: why the units are these.
+    stamps: how columns of text that are stamps are written, by name. reason: why the units are these.
     """
 
     table: Table
@@ -44,6 +44,7 @@ class Source:
     prefixes: Mapping[str, str] = field(default_factory=dict)
     not_angles: tuple[str, ...] = ()
     same_units: Mapping[str, str] = field(default_factory=dict)
+    stamps: Mapping[str, str] = field(default_factory=dict)
     reason: str = "the file names it"
 
     @property
@@ -93,7 +94,8 @@ def _read_source(path: Path, options: ReadOptions) -> Source:
         return Source(read_table(path), {}, "Parquet columns")
     if suffix in TEXT_SUFFIXES:
         text = read_odd_csv(path, options.separator, options.decimal)
-        return Source(text.table, text.units, str(text.layout), reason="from the header")
+        read = "".join(f"; {name} is {words}, from the first row" for name, words in text.stamps.items())
+        return Source(text.table, text.units, f"{text.layout}{read}", stamps=text.stamps, reason="from the header")
     known = ", ".join((".mat", ".parquet", *BAG_SUFFIXES, *TEXT_SUFFIXES))
     raise InputError(f"cannot import {path}: its ending should be one of {known}, or it should be a bag's folder")
 

@@ -1,23 +1,26 @@
-"""CSV files of any layout: any separator, decimal comma, rows of units, comments, with or without a header."""
+"""CSV files of any layout: any separator, decimal comma, rows of units, comments, stamps as text, without a header."""
 
 import re
-from collections.abc import Iterator, Set
-from dataclasses import dataclass
-from itertools import product
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from itertools import chain, islice, product
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from armlab.common.arrays import Array
 from armlab.common.errors import InputError
-from armlab.recordings.table import (
-    Table,
-    check_column_count,
-    drop_broken_last_row,
+from armlab.recordings.imports.text_stamps import StampFormat, find_stamp_format, seconds_of
+from armlab.recordings.repair import MAX_LOST_SHARE
+from armlab.recordings.table import Table, check_column_count
+from armlab.recordings.text_rows import (
+    NO_NUMBER,
+    NumberedLine,
+    RowLayout,
+    open_lines,
     parse_numbers,
-    read_text,
-    split_rows,
+    read_rows,
+    split_line,
 )
 
 SEPARATORS = {",": "comma", ";": "semicolon", "\t": "tab", " ": "blank"}
@@ -25,8 +28,6 @@ DECIMALS = (".", ",")
 COMMENT_START = re.compile(r"^\s*[#%!]+\s*")
 SAMPLE_LINES = 200
 MIN_DATA_ROWS = 2
-NO_NUMBER = ("", "nan", "null", "none", "na", "n/a")  # cells that stand for a number that is missing, in lower case
-NumberedRows = list[tuple[int, list[str]]]
 
 
 @dataclass(frozen=True)
@@ -43,117 +44,174 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class TextTable:
-    """A table with the layout of the file, and the units that the file names."""
+    """A table with the layout of the file, and the units that the file names.
+
+    stamps: how columns of text that are stamps are written, by name; their numbers are seconds from the first one.
+    texts: names of columns of other text, which hold no signal.
+    """
 
     table: Table
     layout: Layout
     units: dict[str, str]
+    stamps: dict[str, str]
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """The first lines of a file as cells in a layout. width: of most rows. data: which rows, from 0, hold numbers.
+
+    texts: columns whose cells are text in these rows. has_end: whether rows end with a separator that starts no cell.
+    """
+
+    rows: list[tuple[int, list[str]]]
+    width: int = 0
+    data: tuple[int, ...] = ()
+    texts: frozenset[int] = field(default_factory=frozenset)
+    has_end: bool = False
+
+    @property
+    def score(self) -> float:
+        """Rows of numbers; more columns of numbers, and fewer of text, decide between equals."""
+        return len(self.data) + (self.width - len(self.texts)) / (self.width + 1) if self.width > 1 else 0.0
 
 
 def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None = None) -> TextTable:
     """The columns of a text file with numbers; without a header they are called c1, c2, ...
 
-    A column without any number becomes NaN. separator, decimal: found in the file if left out. Raises InputError for a
-    file without rows of numbers, and for rows of different length before the last.
+    A column without any number becomes NaN, but for stamps as text, which become seconds. separator, decimal: found in
+    the file if left out. Raises InputError for a file without rows of numbers, and for rows of different length before
+    the last.
     """
     if separator is not None and (len(separator) != 1 or separator in '\r\n"'):
         words = ", ".join(SEPARATORS.values())
         raise InputError(f"--separator {separator!r} should be one character, or one of the words {words}")
-    text = read_text(path)
-    layout = find_layout(text, separator, decimal, path)
-    rows = _split_lines(text, layout, str(path))
-    data = _data_rows(rows[:SAMPLE_LINES], layout)
-    first = data[0] if data else len(rows)
-    body = rows[first:]
-    if len(body) < MIN_DATA_ROWS:
-        raise InputError(f"{path} holds no rows of numbers with {layout}; give --separator and --decimal")
-    width = len(body[0][1])
-    check_column_count(width, path)
-    names, units = _parse_header([cells for _, cells in rows[:first] if len(cells) == width], width)
-    body, findings = drop_broken_last_row(body, width, text, str(path))
-    values = np.array([_parse_cells(cells, layout) for _, cells in body]).reshape(len(body), width)
+    with open_lines(path) as lines:
+        head = list(islice(lines, SAMPLE_LINES))
+        layout, sample = _find_layout(head, separator, decimal, path)
+        check_column_count(sample.width, path)
+        above = [cells for _, cells in sample.rows[: sample.data[0]] if len(cells) == sample.width]
+        names, units = _parse_header(above, sample.width)
+        formats = _stamp_formats(sample)
+        first = sample.rows[sample.data[0]][0]
+        rows = read_rows(
+            chain((each for each in head if each[0] >= first), lines),
+            RowLayout(
+                layout.separator,
+                sample.width,
+                layout.decimal,
+                sample.has_end,
+                COMMENT_START,
+                {column: _converter(formats.get(column)) for column in sample.texts},
+            ),
+            str(path),
+        )
+    worst = int(np.argmax(rows.words))
+    if rows.words[worst] > MAX_LOST_SHARE * len(rows.values):
+        line = int(rows.numbers[np.isnan(rows.values[:, worst])][0])
+        raise InputError(
+            f"{path}: column {names[worst]} holds text in {rows.words[worst]} of {len(rows.values)} rows (first at line "
+            f"{line} or later), numbers in others: is its separator or decimal sign another one there?"
+        )
+    values = rows.values
     values[np.isinf(values)] = np.nan  # an infinite number is no measurement
-    table = Table(path.name, names, values, np.array([line for line, _ in body], dtype=np.intp), findings)
-    return TextTable(table, layout, units)
+    for column in formats:
+        values[:, column] = seconds_of(rows.texts[column].astype(np.int64))
+    stamps = {names[column]: known.words for column, known in formats.items()}
+    table = Table(path.name, names, values, rows.numbers, rows.findings)
+    texts = tuple(names[column] for column in sorted(sample.texts - set(formats)))
+    return TextTable(table, layout, units | dict.fromkeys(stamps, "s"), stamps, texts)
 
 
-def find_layout(text: str, separator: str | None, decimal: str | None, path: Path) -> Layout:
-    """The layout in which most lines are numbers, in equal rows; InputError where none fits."""
-    sample = "\n".join(text.splitlines()[:SAMPLE_LINES])
+def _converter(known: StampFormat | None) -> Callable[[Sequence[str]], NDArray[np.generic]]:
+    return known.parse if known is not None else lambda cells: np.zeros(len(cells), dtype=np.int8)
+
+
+def _stamp_formats(sample: Sample) -> dict[int, StampFormat]:
+    """Formats of the columns of text that are stamps."""
+    found = {column: find_stamp_format([sample.rows[row][1][column] for row in sample.data]) for column in sample.texts}
+    return {column: known for column, known in found.items() if known is not None}
+
+
+def _find_layout(
+    head: list[NumberedLine], separator: str | None, decimal: str | None, path: Path
+) -> tuple[Layout, Sample]:
+    """The layout in which most lines are numbers, in equal rows, and the lines in it; InputError where none fits."""
     tried = product([separator] if separator else SEPARATORS, [decimal] if decimal else DECIMALS)
     layouts = [Layout(*pair) for pair in tried if pair[0] != pair[1] or separator]
-    best = max(layouts, key=lambda layout: _score_layout(sample, layout))
-    if _score_layout(sample, best) < MIN_DATA_ROWS:
-        raise InputError(
-            f"{path} holds no rows of numbers that could be recognised; give --separator and --decimal, or leave out "
-            "columns of text"
-        )
-    return best
+    samples = {layout: take_sample(head, layout, str(path)) for layout in layouts}
+    best = max(layouts, key=lambda layout: samples[layout].score)
+    if len(samples[best].data) < MIN_DATA_ROWS or samples[best].score < MIN_DATA_ROWS:
+        raise InputError(f"{path} holds no rows of numbers{_reason_no_rows(head, samples[best])}")
+    return best, samples[best]
 
 
-def _score_layout(sample: str, layout: Layout) -> float:
-    """Rows of numbers of the most frequent width; more columns decide between equals."""
-    rows = _split_lines(sample, layout, "")
-    widths = [len(rows[index][1]) for index in _data_rows(rows, layout)]
+def _reason_no_rows(head: list[NumberedLine], sample: Sample) -> str:
+    """What stands there instead."""
+    if not any(line.strip() for _, line in head):
+        return ": the file is empty"
+    for number, cells in reversed(sample.rows):
+        text = next((cell for cell in cells if cell.strip() and _is_text(cell, ".")), None)
+        if text is not None and len(cells) > 1:
+            return (
+                f": line {number} has '{text.strip()[:40]}' in column {cells.index(text) + 1}; a row should hold "
+                "numbers, and stamps like 2026-01-31T12:00:00.004; are --separator and --decimal others?"
+            )
+    return " in columns; give --separator and --decimal"
+
+
+def take_sample(head: list[NumberedLine], layout: Layout, where: str) -> Sample:
+    """Cells of the first lines, and which of them are rows of numbers."""
+    rows = list[tuple[int, list[str]]]()
+    comments = set[int]()
+    for number, line in head:
+        bare = COMMENT_START.sub("", line)
+        cells = split_line(bare, layout.separator, f"{where}, line {number}")
+        if any(cell.strip() for cell in cells):
+            comments |= {number} if COMMENT_START.match(line) else set()
+            rows.append((number, cells))
+    has_end = _has_end(rows)
+    if has_end:
+        rows = [(number, cells[:-1] if not cells[-1].strip() else cells) for number, cells in rows]
+    holding = [(number, cells) for number, cells in rows if number not in comments and _holds_number(cells, layout)]
+    widths = [len(cells) for _, cells in holding]
     if not widths:
-        return 0.0
-    common = max(set(widths), key=widths.count)
-    return widths.count(common) + common / (common + 1) if common > 1 else 0.0
-
-
-def _split_lines(text: str, layout: Layout, where: str) -> NumberedRows:
-    lines = text.splitlines()
-    comments = {number for number, line in enumerate(lines, 1) if COMMENT_START.match(line)}
-    bare = "\n".join(COMMENT_START.sub("", line) for line in lines)
-    if layout.separator == " ":
-        bare = "\n".join(re.sub(r"[ \t]+", " ", line.strip()) for line in bare.split("\n"))
-    rows = split_rows(bare, layout.separator, where)
-    widths = {len(cells) for _, cells in rows if cells[-1].strip()}
-    rows = [(line, _drop_empty_last_cell(cells, widths)) for line, cells in rows]
-    in_comments = [(line, cells) for line, cells in rows if line in comments]
-    numbers = {in_comments[index][0] for index in _data_rows(in_comments, layout)}
-    return [each for each in rows if each[0] not in numbers]  # numbers in a comment are not measurements
-
-
-def _drop_empty_last_cell(cells: list[str], widths: Set[int]) -> list[str]:
-    """A separator at the end of a line starts another cell only where another line has something in that cell.
-
-    widths: of the lines whose last cell holds something.
-    """
-    return cells[:-1] if len(cells) > 1 and not cells[-1].strip() and len(cells) not in widths else cells
-
-
-def _data_rows(rows: NumberedRows, layout: Layout) -> list[int]:
-    """Which rows (from 0) hold numbers: one in each column, but for columns that have none in any row."""
-    parsed = {index: _numbers_or_holes(cells, layout) for index, (_, cells) in enumerate(rows)}
-    held = dict[int, NDArray[np.bool_]]()  # by the width of the rows: columns with a number
-    for values in parsed.values():
-        if values is not None:
-            held[len(values)] = held.get(len(values), False) | ~np.isnan(values)
-    return [
+        return Sample(rows)
+    width = max(set(widths), key=lambda each: (widths.count(each), each))
+    body = [cells for _, cells in holding if len(cells) == width]
+    last = body[len(body) // 2 :]  # the first rows may be units or settings
+    is_text = [sum(_is_text(cells[column], layout.decimal) for cells in last) for column in range(width)]
+    texts = frozenset(column for column, count in enumerate(is_text) if count > len(last) / 2)
+    numbers = [column for column in range(width) if column not in texts]
+    data = tuple(
         index
-        for index, values in parsed.items()
-        if values is not None and not np.any(np.isnan(values) & held[len(values)])
-    ]
+        for index, (number, cells) in enumerate(rows)
+        if len(cells) == width
+        and number not in comments
+        and _holds_number([cells[column] for column in numbers], layout)
+        and not any(_is_text(cells[column], layout.decimal) for column in numbers)
+    )
+    return Sample(
+        [each for each in rows if each[0] not in comments or each[0] < holding[0][0]], width, data, texts, has_end
+    )
 
 
-def _numbers_or_holes(cells: list[str], layout: Layout) -> Array | None:
-    """Numbers of a row, NaN for those that are missing; None for a row without numbers or with other text."""
-    values = _parse_cells(cells, layout)
-    holes = np.isnan(values)
-    if holes.all() or any(cells[index].strip().lower() not in NO_NUMBER for index in np.flatnonzero(holes)):
-        return None
-    return values
+def _has_end(rows: list[tuple[int, list[str]]]) -> bool:
+    """Whether a separator at the end of lines starts no cell: no line of that width has something in it."""
+    widths = [len(cells) for _, cells in rows if len(cells) > 1 and not cells[-1].strip()]
+    if not widths:
+        return False
+    width = max(set(widths), key=widths.count)
+    return all(not cells[-1].strip() for _, cells in rows if len(cells) == width)
 
 
-def _parse_cells(cells: list[str], layout: Layout) -> Array:
-    point = cells if layout.decimal == "." else [_to_decimal_point(cell) for cell in cells]
-    return np.array(parse_numbers(point))
+def _holds_number(cells: Sequence[str], layout: Layout) -> bool:
+    return not np.isnan(parse_numbers(cells, layout.decimal)).all()
 
 
-def _to_decimal_point(cell: str) -> str:
-    """A number with a decimal comma; a cell with a point is refused: the point may separate thousands."""
-    return cell.replace(",", ".") if "." not in cell else "not a number"
+def _is_text(cell: str, decimal: str) -> bool:
+    """Whether a cell holds neither a number nor a word for one that is missing."""
+    return cell.strip().lower() not in NO_NUMBER and bool(np.isnan(parse_numbers([cell], decimal)[0]))
 
 
 def _parse_header(lines: list[list[str]], width: int) -> tuple[tuple[str, ...], dict[str, str]]:
