@@ -1,6 +1,5 @@
 """Other formats: what is in them arrives unchanged, under names that a person can choose from."""
 
-import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -254,9 +253,8 @@ def test_a_tip_needs_a_robot_file_with_links(tmp_path: Path, given: dict[str, ob
     ("spoil", "message"),
     [
         (lambda rows: rows[:5], "at least"),
-        (lambda rows: [re.sub(r"[^,]+$", "1e300", row) if n % 2 else row for n, row in enumerate(rows)], "measurement"),
     ],
-    ids=["five rows", "numbers that are none"],
+    ids=["five rows"],
 )
 def test_a_log_that_no_command_could_use_is_not_imported(
     tmp_path: Path, spoil: Callable[[list[str]], list[str]], message: str

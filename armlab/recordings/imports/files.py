@@ -10,6 +10,7 @@ from pathlib import Path
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
 from armlab.recordings.imports.gears import Gear
+from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
 from armlab.recordings.imports.questions import Options
 from armlab.recordings.imports.sources import Source
@@ -179,7 +180,13 @@ def _describe_source(source: Source) -> str:
 
 def _run_file(path: str, paths: Iterable[str]) -> str:
     """The name of a run: that of its file, with its folder's where two files have one name."""
-    own = Path(path)
-    alike = sum(Path(each).stem == own.stem for each in paths)
+    own = _bare_name(path)
+    alike = sum(_bare_name(each) == own for each in paths)
     place = list(paths).index(path) + 1
-    return f"{own.stem}.csv" if alike == 1 else f"{own.resolve().parent.name}-{own.stem}-{place}.csv"
+    return f"{own}.csv" if alike == 1 else f"{Path(path).resolve().parent.name}-{own}-{place}.csv"
+
+
+def _bare_name(path: str) -> str:
+    """The name of a log without its endings, `log` of `log.csv.gz`."""
+    whole = Path(path)
+    return Path(whole.stem).stem if whole.suffix.lower() in PACKED_SUFFIXES else whole.stem

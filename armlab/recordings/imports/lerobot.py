@@ -24,10 +24,18 @@ def is_lerobot(path: Path) -> bool:
     return path.is_dir() and (path / INFO).is_file()
 
 
-def read_lerobot(folder: Path) -> dict[str, Table]:
-    """The episodes of a dataset by their names, like `episode-000003`; InputError, in one line, for a broken one."""
+def dataset_of(file: Path) -> Path | None:
+    """The folder of the dataset that a Parquet file of episodes stands in, `data/chunk-000/FILE`; None outside one."""
+    return next((folder for folder in file.resolve().parents[:3] if is_lerobot(folder)), None)
+
+
+def read_lerobot(folder: Path, file: Path | None = None) -> dict[str, Table]:
+    """The episodes of a dataset by their names, like `episode-000003`. file: the one whose episodes are wanted.
+
+    Raises InputError, in one line, for a broken dataset.
+    """
     names = {vector: _entry_names(_features(folder), vector, folder) for vector in (COMMAND, STATE)}
-    files = sorted((folder / "data").rglob("*.parquet"))
+    files = sorted((folder / "data").rglob("*.parquet")) if file is None else [file]
     if not files:
         raise InputError(f"{folder} has no Parquet file below data/: is the dataset complete?")
     episodes: dict[str, Table] = {}

@@ -32,7 +32,11 @@ def read_mat(path: Path) -> Table:
     The signals are those whose length most variables share; a matrix may hold its samples in rows or columns.
     Raises InputError for a file that is not a .mat file, for version 7.3, and for a file without signals.
     """
-    found = _read_arrays_in_process(path)
+    return table_of_arrays(_read_arrays_in_process(path), path)
+
+
+def table_of_arrays(found: list[tuple[str, Array]], path: Path) -> Table:
+    """The arrays that share the most frequent length as columns; InputError where none is long enough."""
     lengths = [size for _, array in found for size in array.shape if size >= MIN_SIGNAL_SAMPLES]
     if not lengths:
         raise InputError(f"{path} holds no numeric array of at least {MIN_SIGNAL_SAMPLES} samples")

@@ -52,6 +52,7 @@ STEMS: Mapping[str, Stem] = {
     "joint_angle": Stem("position"),
     "q": Stem("position"),
     "pos": Stem("position"),
+    "observation.state": Stem("position", None, "LeRobot datasets"),
 }
 STEMS_BEFORE_JOINT_NAMES = ("position", "effort", "torque", "joint_position", "joint_torque")
 FRANKA_STEM, FRANKA_UNITS = "tau_j", {"q": "rad"}

@@ -50,13 +50,15 @@ class Series:
     """The messages of one topic as they were recorded.
 
     times: (messages,), ns; values: (messages, names), NaN where a message leaves one out. delay: how much later than
-    stamped the messages were recorded, the median, ns; None without stamps.
+    stamped the messages were recorded, the median, ns; None without stamps. foreign: messages without a joint of the
+    robot, which are left out.
     """
 
     names: tuple[str, ...]
     times: NDArray[np.int64]
     values: Array
     delay: int | None
+    foreign: int = 0
 
 
 def read_bag(path: Path, topic: str | None = None, commands: str | None = None, joints: Sequence[str] = ()) -> Table:
@@ -73,6 +75,10 @@ def read_bag(path: Path, topic: str | None = None, commands: str | None = None, 
     if command is not None and not len(command.times):
         raise InputError(f"{path} holds no message on {commands}")
     first, findings = states[0], list[Finding]()
+    for series in states:
+        if series.foreign:
+            text = f"{series.foreign} messages hold no joint of the robot, such as a gripper's, and are left out"
+            findings.append(Finding("foreign_messages", "note", text))
     names, columns, known = list(first.names), [first.values], np.ones(len(first.times), dtype=bool)
     for other in states[1:]:
         columns.append(_on_times(other, first.times))
@@ -109,6 +115,13 @@ def _read_series(
     store = get_typestore(Stores.ROS2_HUMBLE)
     for kind, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, kind))
+    if path.is_dir() and not (path / "metadata.yaml").is_file():
+        bags = sorted(each.name for each in path.iterdir() if each.suffix.lower() in (".db3", ".mcap", ".bag"))
+        if len(bags) == 1:
+            path = path / bags[0]
+        else:
+            held = f"name one of its files: {', '.join(bags)}" if bags else "nor has it a .db3, .mcap or .bag file"
+            raise InputError(f"{path} has no metadata.yaml, so it is no ROS 2 bag as a folder; {held}")
     try:
         with AnyReader([path], default_typestore=store) as reader:
             if commands is not None:
@@ -152,17 +165,38 @@ def _check_topic(reader: Any, wanted: str, types: Sequence[str], what: str, path
 
 def _read_topic(reader: Any, topic: str, parse: Parser, joints: Sequence[str]) -> Series:
     links = [link for link in reader.connections if link.topic == topic]
-    messages = []
+    messages, foreign = list[JointMessage](), 0
     for link, recorded, raw in reader.messages(connections=links):
         message = reader.deserialize(raw, link.msgtype)
-        messages.append(JointMessage(recorded, stamp_of(message), parse(message, link.msgtype, topic, joints)))
+        held = parse(message, link.msgtype, topic, joints)
+        if joints and not any(name.endswith(f"_{joint}") for name in held for joint in joints):
+            foreign += 1
+            continue
+        messages.append(JointMessage(recorded, stamp_of(message), held))
+    if foreign and not messages:
+        raise InputError(f"{topic} names none of the robot's joints ({', '.join(joints)}): is it another robot's?")
     names = tuple(dict.fromkeys(name for message in messages for name in message.values))
     values = np.array([[message.values.get(name, np.nan) for name in names] for message in messages])
     recorded = np.array([message.recorded for message in messages], dtype=np.int64)
     stamps = np.array([message.stamp for message in messages], dtype=np.int64)
     stamped = bool(len(stamps)) and bool(np.any(stamps != stamps[0]))
     delay = int(np.median(recorded - stamps)) if stamped else None
-    return Series(names, stamps if stamped else recorded, values.reshape(len(messages), len(names)), delay)
+    times = stamps if stamped else recorded
+    return Series(names, *_join_messages(times, values.reshape(len(messages), len(names))), delay, foreign)
+
+
+def _join_messages(times: NDArray[np.int64], values: Array) -> tuple[NDArray[np.int64], Array]:
+    """One row for messages in a row with one stamp that hold different joints."""
+    if not np.isnan(values).any():
+        return times, values
+    joined_times, joined = list[int](), list[Array]()
+    for time, row in zip(times.tolist(), values, strict=True):
+        if joined and time == joined_times[-1] and np.all(np.isnan(joined[-1]) | np.isnan(row)):
+            joined[-1] = np.where(np.isnan(row), joined[-1], row)
+        else:
+            joined_times.append(time)
+            joined.append(row)
+    return np.array(joined_times, dtype=np.int64), np.array(joined)
 
 
 def _on_times(series: Series, times: NDArray[np.int64]) -> Array:

@@ -5,16 +5,32 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from armlab.common.errors import InputError
-from armlab.recordings.imports.lerobot import COMMAND, PERCENT_NAMES, STAMP, STATE, is_lerobot, read_lerobot
+from armlab.recordings.imports.frames import read_json, read_json_lines, read_npz, read_parquet
+from armlab.recordings.imports.lerobot import (
+    COMMAND,
+    PERCENT_NAMES,
+    STAMP,
+    STATE,
+    dataset_of,
+    is_lerobot,
+    read_lerobot,
+)
 from armlab.recordings.imports.matlab import read_mat
+from armlab.recordings.imports.packed import PACKED_SUFFIXES, unpacked
 from armlab.recordings.imports.ros import read_bag
 from armlab.recordings.imports.text import read_odd_csv
-from armlab.recordings.table import Table, read_table
+from armlab.recordings.table import Table
 
 BAG_SUFFIXES = (".db3", ".mcap", ".bag")
 TEXT_SUFFIXES = (".csv", ".txt", ".dat", ".tsv", ".log", ".asc")
 BAG_UNITS = {"position": "rad", "velocity": "rad/s", "effort": "N.m", "command": "rad"}
 BAG_PREFIXES = {"position": "position_", "reference_position": "command_"}
+FRAME_READERS = {
+    ".parquet": read_parquet,
+    ".json": read_json,
+    ".jsonl": read_json_lines,
+    ".ndjson": read_json_lines,
+}
 LEROBOT_PREFIXES = {"position": f"{STATE}.", "reference_position": f"{COMMAND}."}
 
 
@@ -64,8 +80,10 @@ def read_sources(path: Path, options: ReadOptions) -> dict[str, Source]:
 
     Raises InputError for an unknown format and a broken file, and UndecidedError where an option has to choose.
     """
-    if not is_lerobot(path):
+    dataset = dataset_of(path) if path.suffix.lower() == ".parquet" else None
+    if dataset is None and not is_lerobot(path):
         return {str(path): _read_source(path, options)}
+    found = read_lerobot(path) if dataset is None else read_lerobot(dataset, path)
     return {
         str(path / name): Source(
             table=table,
@@ -76,7 +94,7 @@ def read_sources(path: Path, options: ReadOptions) -> dict[str, Source]:
             same_units={"reference_position": "position"},
             reason="as in LeRobot datasets",
         )
-        for name, table in read_lerobot(path).items()
+        for name, table in found.items()
     }
 
 
@@ -84,20 +102,31 @@ def _read_source(path: Path, options: ReadOptions) -> Source:
     if not path.exists():
         raise InputError(f"no file {path}")
     suffix = path.suffix.lower()
+    if suffix in PACKED_SUFFIXES:
+        with unpacked(path) as inside:
+            return _read_source(inside, options)
     if suffix in BAG_SUFFIXES or path.is_dir():
         table = read_bag(path, options.topic, options.commands, options.joints)
         note = "joint states; rad, rad/s and N.m by ROS convention"
         return Source(table, _bag_units(table), note, BAG_PREFIXES, reason="as in ROS messages")
     if suffix == ".mat":
         return Source(read_mat(path), {}, "MATLAB variables")
-    if suffix == ".parquet":
-        return Source(read_table(path), {}, "Parquet columns")
+    if suffix in FRAME_READERS:
+        frame = FRAME_READERS[suffix](path)
+        read = "".join(f"; {name} is {words}, from the first row" for name, words in frame.stamps.items())
+        return Source(frame.table, dict.fromkeys(frame.stamps, "s"), f"{suffix} columns{read}", stamps=frame.stamps)
+    if suffix == ".npz":
+        return Source(read_npz(path), {}, "NumPy arrays")
     if suffix in TEXT_SUFFIXES:
         text = read_odd_csv(path, options.separator, options.decimal)
         read = "".join(f"; {name} is {words}, from the first row" for name, words in text.stamps.items())
         return Source(text.table, text.units, f"{text.layout}{read}", stamps=text.stamps, reason="from the header")
-    known = ", ".join((".mat", ".parquet", *BAG_SUFFIXES, *TEXT_SUFFIXES))
-    raise InputError(f"cannot import {path}: its ending should be one of {known}, or it should be a bag's folder")
+    known = ", ".join((".mat", ".npz", *FRAME_READERS, *BAG_SUFFIXES, *TEXT_SUFFIXES))
+    packed = ", ".join(PACKED_SUFFIXES)
+    raise InputError(
+        f"cannot import {path}: its ending should be one of {known}, packed ({packed}) or not, or it should be a bag's "
+        "folder"
+    )
 
 
 def _bag_units(table: Table) -> dict[str, str]:

@@ -110,8 +110,8 @@ def read_odd_csv(path: Path, separator: str | None = None, decimal: str | None =
     if rows.words[worst] > MAX_LOST_SHARE * len(rows.values):
         line = int(rows.numbers[np.isnan(rows.values[:, worst])][0])
         raise InputError(
-            f"{path}: column {names[worst]} holds text in {rows.words[worst]} of {len(rows.values)} rows (first at line "
-            f"{line} or later), numbers in others: is its separator or decimal sign another one there?"
+            f"{path}: column {names[worst]} holds text in {rows.words[worst]} of {len(rows.values)} rows (line {line} "
+            "or later), numbers in others: is its separator or decimal sign another one there?"
         )
     values = rows.values
     values[np.isinf(values)] = np.nan  # an infinite number is no measurement
