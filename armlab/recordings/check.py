@@ -9,6 +9,7 @@ import numpy as np
 from armlab.common.arrays import Array
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
+from armlab.recordings.identifiable import has_no_torque, reason_not_identifiable, reason_still
 from armlab.recordings.load import load_runs, open_recording, with_runs
 from armlab.recordings.motion import (
     MotionRecording,
@@ -209,12 +210,20 @@ def check_recording(folder: Path) -> CheckResult:
     empty, file = open_recording(folder)
     runs, refused = _read_runs(lambda entry: load_runs(empty, file, entry), file)
     whole = with_runs(empty, runs)
-    geometry = _check_geometry(whole) if runs else ()
+    tells_nothing = _find_nothing_to_identify(whole)
+    is_readable = bool(runs) and not has_no_torque(runs) and reason_still(runs) is None
+    geometry = (*tells_nothing, *(_check_geometry(whole) if is_readable else ()))
     beside = _compare_with_simulator(whole, with_actuators=False)
     beside = (*_find_impossible_links(whole), *_stated_laws(whole.arm), *beside)
     return CheckResult(
         whole, tuple(_collect_findings(whole, whole.arm, (*whole.findings, *beside, *geometry))), refused
     )
+
+
+def _find_nothing_to_identify(recording: Recording) -> tuple[Finding, ...]:
+    """A warning where no command can identify anything from the recording."""
+    reason = reason_not_identifiable(recording) if recording.with_role("identify") else None
+    return () if reason is None else (Finding("not_identifiable", "warning", reason),)
 
 
 def _read_runs(

@@ -56,6 +56,11 @@ def reason_still(runs: Sequence[Run]) -> str | None:
     return "No joint moves in any run that identifies: there is nothing that the torques could be compared with."
 
 
+def has_no_torque(runs: Sequence[Run]) -> bool:
+    """Whether the torque of no joint ever changes."""
+    return all(not np.any(np.ptp(run.torque, axis=0)) for run in runs)
+
+
 def reason_dead(runs: Sequence[Run], arm: Arm) -> str | None:
     """Torques that never change, and columns that are copies of others."""
     dead = [joint for joint in range(len(arm)) if all(np.ptp(run.torque[:, joint]) == 0 for run in runs)]

@@ -192,7 +192,11 @@ def _parse_slowly(lines: list[str], numbers: NDArray[np.intp], layout: RowLayout
             cells.append(row)
             kept.append(number)
     except csv.Error as error:
-        raise InputError(f"{where}, line {numbers[0]} or later: not valid CSV: {error}") from None
+        odd = next((place for place, line in enumerate(lines) if line.count('"') % 2), None)
+        if odd is not None:
+            said = f"{where}, line {numbers[odd]}: a quote opens there and does not close in its line"
+            raise InputError(said) from None
+        raise InputError(f"{where}, line {numbers[len(kept)]}: not valid CSV: {error}") from None
     texts = {column: make([row[column] for row in cells]) for column, make in layout.texts.items()}
     values = np.array([parse_numbers(row, layout.decimal) for row in cells]).reshape(len(cells), layout.width)
     values[:, list(layout.texts)] = np.nan

@@ -4,11 +4,12 @@ import os
 import re
 import shutil
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from armlab.common.documents import Document
 from armlab.common.errors import InputError
+from armlab.recordings.identifiable import has_no_torque, reason_copied, reason_dead, reason_still
 from armlab.recordings.imports.gears import Gear
 from armlab.recordings.imports.packed import PACKED_SUFFIXES
 from armlab.recordings.imports.plan import ImportPlan, plan_import
@@ -16,7 +17,7 @@ from armlab.recordings.imports.questions import Options
 from armlab.recordings.imports.sources import Source
 from armlab.recordings.load import load_recording
 from armlab.recordings.motion import is_motion_only, load_motion_recording
-from armlab.recordings.recording import Role
+from armlab.recordings.recording import MotionRun, Role
 from armlab.recordings.recording_file import Draft, DraftRun, Keys, write_recording
 
 MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and the last are named
@@ -24,12 +25,16 @@ MAX_LISTED_COLUMNS = 3  # of a signal; of more, numbered in a row, the first and
 
 @dataclass(frozen=True, eq=False)
 class ImportedRecording:
-    """A recording that was written. whole_robot: the file of the whole robot, where joints are locked."""
+    """A recording that was written. whole_robot: the file of the whole robot, where joints are locked.
+
+    repairs: what reading the runs repairs, in words, by the file.
+    """
 
     folder: Path
     plan: ImportPlan
     draft: Draft
     whole_robot: Path | None
+    repairs: tuple[tuple[str, str], ...] = ()
 
     @property
     def lines(self) -> list[str]:
@@ -37,6 +42,7 @@ class ImportedRecording:
         whole = f"{self.whole_robot}: the whole robot, for `armlab export-model`"
         return [
             *(f"{name}: {text}" for name, text in describe_plan(self.plan)),
+            *(f"{file}: repaired: {text}" for file, text in self.repairs),
             *([whole] if self.whole_robot else []),
             f"{self.folder}: written; `armlab recording check {self.folder}` examines it",
         ]
@@ -65,6 +71,7 @@ class ImportedRecording:
             "units": self.plan.units,
             "reasons": {"columns": self.plan.column_reasons, "units": self.plan.unit_reasons},
             "doubts": self.plan.doubts,
+            "repairs": [{"file": file, "text": text} for file, text in self.repairs],
         }
 
 
@@ -104,12 +111,32 @@ def write_plan(plan: ImportPlan) -> ImportedRecording:
     copies = plan.robot.copies(folder)
     write_recording(draft, folder, copies)
     try:
-        (load_motion_recording if is_motion_only(folder) else load_recording)(folder)
+        repairs, useless = _read_written(folder)
     except InputError as error:
         _remove_written(folder, was_there)
         raise InputError(f"nothing is written: {str(error).replace(f'{folder}{os.sep}', '')}") from None
     whole = folder / plan.robot.whole_name if plan.robot.whole_name in copies else None
-    return ImportedRecording(folder, plan, draft, whole)
+    return ImportedRecording(folder, replace(plan, doubts=(*plan.doubts, *useless)), draft, whole, repairs)
+
+
+def _repairs_of(runs: Sequence[MotionRun]) -> tuple[tuple[str, str], ...]:
+    """What was repaired, once a file."""
+    return tuple(dict.fromkeys((run.file, finding.text) for run in runs for finding in run.repairs))
+
+
+def _read_written(folder: Path) -> tuple[tuple[tuple[str, str], ...], tuple[str, ...]]:
+    """What reading repairs, and why nothing can be identified from what was written, if that is so.
+
+    Raises InputError for what no command could use, a torque that no joint has among it.
+    """
+    if is_motion_only(folder):
+        return _repairs_of(load_motion_recording(folder).runs), ()
+    recording = load_recording(folder)
+    runs = recording.with_role("identify") or recording.runs
+    if has_no_torque(runs):
+        raise InputError(f"{runs[0].file}: {reason_dead(runs, recording.arm)}")
+    reason = reason_still(runs) or reason_dead(runs, recording.arm) or reason_copied(recording)
+    return _repairs_of(recording.runs), () if reason is None else (reason,)
 
 
 def _remove_written(folder: Path, was_there: bool) -> None:

@@ -1,8 +1,8 @@
 """Signals that come in rows of their own, at their own rates: put on the stamps of the slowest one, and said so.
 
-A log of several topics or messages holds cells that are empty in turn. Each column is interpolated between its own rows
-by a cubic spline, a command linearly; over a gap of its own it is not. (A line between positions would lose part of the
-motion: a dt^2 / 8 of an acceleration a.)
+A log of several topics or messages holds cells that are empty in turn. Each column is interpolated between its own
+rows, by a cubic spline if it is smooth, else linearly; over a gap of its own it is not. A line between positions would
+lose part of the motion: a dt^2 / 8 of an acceleration a.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +18,8 @@ from armlab.recordings.clock import MAX_BRIDGED_GAP
 from armlab.recordings.recording import Finding
 from armlab.recordings.repair import MAX_LOST_SHARE
 from armlab.recordings.table import Table
+
+SMOOTH_SIGNALS = ("position", "link_position", "velocity")
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,9 +46,11 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     stamped = np.flatnonzero(np.isfinite(stamps))
     time, values = stamps[stamped], values[stamped]
     counts = np.isfinite(values).sum(axis=0)
-    slowest = int(np.argmin(counts))
+    few = counts <= (1 + MAX_LOST_SHARE) * counts.min()
+    # of columns that come as rarely, the torque keeps its stamps: positions are smooth, it has noise and steps
+    slowest = min(np.flatnonzero(few).tolist(), key=lambda column: wanted[column][0] != "torque")
     clocks = np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) < 0) + 1)
-    orders = [1 if signal.startswith("reference") else 3 for signal, _ in wanted]
+    orders = [3 if signal in SMOOTH_SIGNALS else 1 for signal, _ in wanted]
     parts = [_interpolate(time, values, clock, slowest, orders) for clock in clocks]
     rows = np.concatenate([part.rows for part in parts])
     slow = wanted[slowest]
@@ -66,7 +70,7 @@ def put_on_common_stamps(table: Table, columns: Mapping[str, Sequence[str]], tim
     listed = ", ".join(f"{signal} {count}" for signal, count in most.items())
     text = (
         f"signals come in rows of their own ({listed} of {len(table.values)} rows): all put on {len(rows)} stamps of "
-        f"{slow[1]} by splines, from rows up to {1e3 * lag:.3g} ms away on average"
+        f"{slow[1]} by interpolation, from rows up to {1e3 * lag:.3g} ms away on average"
     )
     finding = Finding("several_rates", "note", text)
     return replace(
