@@ -6,7 +6,7 @@ COMPILED := problem/kernel.c problem/kernel_build.py armlab/effects/drive_train.
 	armlab/concealed/servo/servo_arm.c armlab/concealed/servo/servo_arm_build.py
 
 .DEFAULT_GOAL := help
-.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test suite lint structure table3-time diagnosis-time profile speed regression fuzz hostile prove prove-quick docs pictures lock clean
+.PHONY: help install install-dev table3 figure2 figure3 paper study search-space tune landscape best-known real real-leave-one-out real-motion real-conditioning relations prove-changes test suite lint structure table3-time diagnosis-time profile speed regression fuzz logs hostile prove prove-quick docs pictures lock clean
 
 help: ## what can be made
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 22
@@ -133,6 +133,9 @@ regression: .venv/dev ## the best condition numbers against the committed baseli
 fuzz: .venv/dev ## damaged files for every reader of recordings, FUZZ_SECONDS in all
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[fuzz]' --no-build-isolation
 	$(BIN)/python tests/recordings/fuzz_readers.py --seconds $(or $(FUZZ_SECONDS),600)
+
+logs: .venv/dev ## 2,000 logs that chance makes of clean runs: right numbers or a refusal in one line
+	cd tests/recordings && PYTHONPATH=../..:..:. ../../$(BIN)/python changed_logs.py --logs 2000
 
 hostile: .venv/dev ## damaged input for the commands: tests/hostile_outcomes.csv
 	PYTHONPATH=tests $(BIN)/python tests/hostile_commands.py

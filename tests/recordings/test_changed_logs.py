@@ -1,0 +1,16 @@
+"""Whatever is done to a log, its numbers are those of the clean runs, or it is refused in one line."""
+
+import pytest
+from changed_logs import judge_seed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+pytest.importorskip("pyarrow")
+
+
+@given(seed=st.integers(0, 2**32))
+@settings(max_examples=50, deadline=None)
+def test_a_changed_log_comes_to_the_numbers_of_its_clean_runs_or_is_refused_in_one_line(seed: int) -> None:
+    log, judged = judge_seed(seed)
+    assert judged.outcome in ("agrees", "refused"), f"{', '.join(log.words)}, {log.clock}, {log.form}: {judged.line}"
+    assert "\n" not in judged.line
